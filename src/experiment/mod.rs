@@ -1,0 +1,1 @@
+//! Phantom, resection, sweep, estimation: scenario in, outcome out.

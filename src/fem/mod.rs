@@ -1,0 +1,1 @@
+//! Elements, assembly, boundary conditions, solvers, integrators, units.

@@ -1,0 +1,5 @@
+//! Constitutive laws, published literature, the multi-task Gaussian process over it, meta-models.
+
+pub mod law;
+
+pub use law::Hyperelastic;

@@ -1,0 +1,1 @@
+//! Rigid (and deformable where segmentation needs it) registration.

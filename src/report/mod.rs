@@ -1,0 +1,1 @@
+//! HTML page, figures, tables, VTK series.

@@ -1,0 +1,1 @@
+//! Cavity mask on post, resected-tissue mask on pre, subtraction.

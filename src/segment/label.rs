@@ -1,0 +1,26 @@
+//! The integers of a label map.
+
+/// Outside the brain.
+pub const BACKGROUND: u8 = 0;
+/// Cerebrospinal fluid outside the ventricles.
+pub const CSF: u8 = 1;
+/// Grey matter.
+pub const GREY_MATTER: u8 = 2;
+/// White matter.
+pub const WHITE_MATTER: u8 = 3;
+/// Lateral and third ventricles.
+pub const VENTRICLE: u8 = 4;
+/// Resected tissue: a label of its own before meshing, so that the margin is smooth and conforming.
+pub const RESECTED: u8 = 5;
+
+/// The name a scenario uses for a label; `None` for an unknown one.
+pub fn name(label: u8) -> Option<&'static str> {
+    Some(match label {
+        CSF => "csf",
+        GREY_MATTER => "grey_matter",
+        WHITE_MATTER => "white_matter",
+        VENTRICLE => "ventricle",
+        RESECTED => "resected",
+        _ => return None,
+    })
+}

@@ -1,0 +1,1 @@
+//! Named node, facet and cell sets: ventricle wall, falx, base, resection margin, load patch.
