@@ -1,1 +1,13 @@
 //! Files that appear whole or not at all, checksums, manifests, resume.
+//!
+//! A stage's outputs are each written to `NAME.part` and renamed; the manifest comes last, so a stage whose manifest
+//! is there is complete. A stage is skipped when its key (inputs + settings + stage version) is the manifest's and
+//! every output still has the bytes the manifest names.
+
+mod manifest;
+mod stage;
+mod write;
+
+pub use manifest::{Manifest, OutputRecord, Provenance};
+pub use stage::{Produced, Stage, StageError, StageOutcome};
+pub use write::{WriteError, sha256_hex, write_whole};

@@ -1,6 +1,52 @@
-//! One file per subcommand: read, call, write, print.
+//! One file per subcommand: read, call, write, print. No algorithm lives here.
+//!
+//! A subcommand file has an `Args` struct (clap) and a `run(args, &Session) -> Result<(), Failure>`. Results go to
+//! stdout (JSON with `--json`), logs and progress to stderr. Exit codes: 0 done, 1 failed, 2 usage, 3 input rejected,
+//! 4 computed but the quality gate refused it (outputs kept).
 
-/// Entry point of the program.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+mod completions;
+mod doctor;
+mod failure;
+mod man;
+mod session;
+
+pub use failure::{Failure, Reject};
+pub use session::{GlobalOptions, Session};
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// From a pre- and post-operative T1 pair to a biomechanical answer. Research software, not a medical device.
+#[derive(Debug, Parser)]
+#[command(name = "hgm", version, max_term_width = 110)]
+pub struct Hgm {
+    #[command(flatten)]
+    global: GlobalOptions,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Doctor(doctor::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// Entry point of the program: parses, runs, turns failures into exit codes.
+pub fn main() -> ExitCode {
+    let hgm = Hgm::parse();
+    let json = hgm.global.json;
+    let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
+        Command::Doctor(args) => doctor::run(&args, &session),
+        Command::Completions(args) => completions::run(&args, &session),
+        Command::Man(args) => man::run(&args, &session),
+    });
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.report(json);
+            failure.exit_code()
+        }
+    }
 }

@@ -1,0 +1,250 @@
+//! A stage on disk: skipped when nothing that matters has changed.
+
+use super::manifest::{Manifest, OutputRecord, Provenance};
+use super::write::{WriteError, sha256_hex, write_whole};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A function on values whose results live in files. Build it with every input and setting that can change the result.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    name: String,
+    version: u32,
+    folder: PathBuf,
+    settings: Value,
+    inputs: BTreeMap<String, String>,
+    provenance: Provenance,
+}
+
+/// What a stage's function gives back.
+#[derive(Clone, Debug, Default)]
+pub struct Produced {
+    /// Bytes by path relative to the stage's folder.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+    /// Figures for later stages and the report.
+    pub facts: Value,
+}
+
+/// How the stage ended.
+#[derive(Clone, Debug)]
+pub struct StageOutcome {
+    /// Whether the files were already there.
+    pub skipped: bool,
+    /// The manifest, old or new.
+    pub manifest: Manifest,
+}
+
+/// Why a stage did not end.
+#[derive(Debug, Error)]
+pub enum StageError<E> {
+    /// The function itself failed.
+    #[error(transparent)]
+    Compute(E),
+    /// The disk refused.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+impl Stage {
+    /// A stage named `name` (its manifest is `.stages/NAME.manifest.json`), whose code is at `version`, with outputs
+    /// below `folder`.
+    ///
+    /// # Panics
+    /// When the settings cannot be serialised, a programming error.
+    pub fn new(name: &str, version: u32, folder: &Path, settings: &impl Serialize) -> Self {
+        Self {
+            name: name.to_owned(),
+            version,
+            folder: folder.to_path_buf(),
+            settings: serde_json::to_value(settings).expect("settings are plain data"),
+            inputs: BTreeMap::new(),
+            provenance: Provenance { frame: String::new(), units: "mm, RAS+, Pa".to_owned(), seed: None },
+        }
+    }
+
+    /// Adds an input by role; a change of its bytes makes the stage run again.
+    #[must_use]
+    pub fn input(mut self, role: &str, bytes: &[u8]) -> Self {
+        self.inputs.insert(role.to_owned(), sha256_hex(bytes));
+        self
+    }
+
+    /// Adds everything an earlier stage made as one input.
+    ///
+    /// # Panics
+    /// Never: checksums are plain data.
+    #[must_use]
+    pub fn after(mut self, earlier: &Manifest) -> Self {
+        let all = serde_json::to_string(&(&earlier.outputs, &earlier.facts)).expect("checksums are plain data");
+        self.inputs.insert(format!("stage {}", earlier.stage), sha256_hex(all.as_bytes()));
+        self
+    }
+
+    /// States the frame of the coordinates.
+    #[must_use]
+    pub fn frame(mut self, frame: &str) -> Self {
+        frame.clone_into(&mut self.provenance.frame);
+        self
+    }
+
+    /// States the seed.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.provenance.seed = Some(seed);
+        self
+    }
+
+    /// What decides whether the stage may be skipped.
+    pub fn key(&self) -> String {
+        let parts = serde_json::json!({
+            "program": env!("CARGO_PKG_VERSION"), "stage": self.name, "version": self.version,
+            "settings": self.settings, "inputs": self.inputs, "seed": self.provenance.seed,
+        });
+        sha256_hex(parts.to_string().as_bytes())
+    }
+
+    /// The manifest left by an earlier run, if it can be read.
+    pub fn previous(&self) -> Option<Manifest> {
+        serde_json::from_slice(&std::fs::read(self.manifest_path()).ok()?).ok()
+    }
+
+    /// Why the stage would run now: one line per changed input or setting; empty when it would be skipped.
+    pub fn why(&self) -> Vec<String> {
+        let Some(old) = self.previous() else {
+            return vec!["it has not finished before".to_owned()];
+        };
+        let mut reasons = Vec::new();
+        for role in self.inputs.keys().chain(old.inputs.keys().filter(|role| !self.inputs.contains_key(*role))) {
+            if self.inputs.get(role) != old.inputs.get(role) {
+                reasons.push(format!("input `{role}` changed"));
+            }
+        }
+        changed_settings("", &old.settings, &self.settings, &mut reasons);
+        for (name, record) in &old.outputs {
+            match std::fs::read(self.folder.join(name)) {
+                Err(_) => reasons.push(format!("output `{name}` is missing")),
+                Ok(bytes) if sha256_hex(&bytes) != record.sha256 => {
+                    reasons.push(format!("output `{name}` was changed"));
+                }
+                Ok(_) => {}
+            }
+        }
+        if reasons.is_empty() && old.key != self.key() {
+            reasons.push("the program, the stage's code or the seed changed".to_owned());
+        }
+        reasons
+    }
+
+    /// Skips when nothing changed (unless `force`), else computes, writes every file with `NAME.manifest.json` beside it,
+    /// and last the stage's own manifest.
+    ///
+    /// # Panics
+    /// Never: a manifest is plain data.
+    ///
+    /// # Errors
+    /// [`StageError`]: the function's own error (nothing written) or the disk's.
+    pub fn run<E>(
+        &self,
+        force: bool,
+        compute: impl FnOnce() -> Result<Produced, E>,
+    ) -> Result<StageOutcome, StageError<E>> {
+        if !force
+            && self.why().is_empty()
+            && let Some(manifest) = self.previous()
+        {
+            return Ok(StageOutcome { skipped: true, manifest });
+        }
+        let produced = compute().map_err(StageError::Compute)?;
+        // The old manifest must not vouch for a mixture of old and new files.
+        std::fs::remove_file(self.manifest_path()).ok();
+        let mut outputs = BTreeMap::new();
+        for (name, bytes) in &produced.files {
+            write_whole(&self.folder.join(name), bytes)?;
+            outputs.insert(name.clone(), OutputRecord { sha256: sha256_hex(bytes) });
+        }
+        let mut manifest = Manifest {
+            program: concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned(),
+            stage: self.name.clone(),
+            key: self.key(),
+            settings: self.settings.clone(),
+            inputs: self.inputs.clone(),
+            outputs: BTreeMap::new(),
+            provenance: self.provenance.clone(),
+            warnings: produced.warnings,
+            facts: produced.facts,
+        };
+        let text = |manifest: &Manifest| serde_json::to_string_pretty(manifest).expect("a manifest is plain data");
+        for (name, record) in &outputs {
+            let one = Manifest { outputs: BTreeMap::from([(name.clone(), record.clone())]), ..manifest.clone() };
+            write_whole(&self.folder.join(format!("{name}.manifest.json")), text(&one).as_bytes())?;
+        }
+        manifest.outputs = outputs;
+        write_whole(&self.manifest_path(), text(&manifest).as_bytes())?;
+        Ok(StageOutcome { skipped: false, manifest })
+    }
+
+    fn manifest_path(&self) -> PathBuf {
+        self.folder.join(format!(".stages/{}.manifest.json", self.name))
+    }
+}
+
+fn changed_settings(path: &str, old: &Value, new: &Value, reasons: &mut Vec<String>) {
+    if let (Value::Object(a), Value::Object(b)) = (old, new) {
+        for name in b.keys().chain(a.keys().filter(|name| !b.contains_key(*name))) {
+            let dotted = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+            changed_settings(
+                &dotted,
+                a.get(name).unwrap_or(&Value::Null),
+                b.get(name).unwrap_or(&Value::Null),
+                reasons,
+            );
+        }
+    } else if old != new {
+        reasons.push(format!("setting `{path}` changed from {old} to {new}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::convert::Infallible;
+
+    fn produce(text: &str) -> Result<Produced, Infallible> {
+        let files = vec![("a/x.txt".to_owned(), text.as_bytes().to_vec())];
+        Ok(Produced { files, facts: serde_json::json!({"length": text.len()}), ..Produced::default() })
+    }
+
+    fn never() -> Result<Produced, Infallible> {
+        panic!("a finished stage ran again")
+    }
+
+    #[test]
+    fn a_finished_stage_is_skipped_until_something_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let stage = |input: &[u8], setting: i32| {
+            Stage::new("s", 1, folder.path(), &serde_json::json!({"depth": setting})).input("scan", input)
+        };
+        assert!(!stage(b"1", 1).run(false, || produce("hello")).unwrap().skipped);
+        assert!(stage(b"1", 1).run(false, never).unwrap().skipped);
+        assert_eq!(stage(b"2", 1).why(), ["input `scan` changed"]);
+        assert_eq!(stage(b"1", 2).why(), ["setting `depth` changed from 1 to 2"]);
+        assert!(!stage(b"1", 1).run(true, || produce("hello")).unwrap().skipped, "--force computes again");
+        std::fs::write(folder.path().join("a/x.txt"), "tampered").unwrap();
+        assert_eq!(stage(b"1", 1).why(), ["output `a/x.txt` was changed"]);
+        assert!(!stage(b"1", 1).run(false, || produce("hello")).unwrap().skipped);
+    }
+
+    #[test]
+    fn a_failed_stage_writes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let stage = Stage::new("s", 1, folder.path(), &());
+        assert!(stage.run(false, || Err::<Produced, _>("no")).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert_eq!(stage.why(), ["it has not finished before"]);
+    }
+}

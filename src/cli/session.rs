@@ -1,0 +1,135 @@
+//! What every subcommand shares: global options, settings from a file, output, progress, input files.
+
+use super::failure::{Failure, Reject};
+use anyhow::{Context, anyhow};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+/// Options of every command.
+#[derive(Clone, Debug, clap::Args)]
+pub struct GlobalOptions {
+    /// Settings file (TOML, one table per room: [register], [segment], [mesh], [material], [solver] ...)
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Machine-readable result on stdout, logs on stderr
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Threads to use (results do not depend on it) [default: all cores]
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Seed of everything random
+    #[arg(long, global = true, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Compute again what is already there
+    #[arg(long, global = true)]
+    pub force: bool,
+    /// More log lines (twice: even more)
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Only errors
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+/// The global options, resolved: thread pool built, settings file parsed, logging on.
+#[derive(Debug)]
+pub struct Session {
+    /// The options as given.
+    pub options: GlobalOptions,
+    config: toml::Table,
+}
+
+impl Session {
+    /// Starts logging and the thread pool and reads the settings file.
+    ///
+    /// # Errors
+    /// A settings file that cannot be read or parsed is rejected.
+    pub fn open(options: GlobalOptions) -> Result<Self, Failure> {
+        let level = match (options.quiet, options.verbose) {
+            (true, _) => "error",
+            (false, 0) => "warn",
+            (false, 1) => "info",
+            (false, _) => "debug",
+        };
+        let subscriber = tracing_subscriber::fmt()
+            .with_env_filter(tracing_subscriber::EnvFilter::new(format!("hgm={level}")))
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+            .without_time()
+            .with_target(false);
+        // Fails only when a test has set one up before; the first stays.
+        subscriber.try_init().ok();
+        if options.threads == Some(0) {
+            return Err(Failure::Rejected(anyhow!("--threads 0: give 1 or more, or leave it out for all cores")));
+        }
+        rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build_global().ok();
+        let config = match &options.config {
+            None => toml::Table::new(),
+            Some(path) => {
+                let text = String::from_utf8(read_input(path)?);
+                let text = text.with_context(|| format!("{}: not UTF-8 text", path.display())).reject()?;
+                text.parse().with_context(|| format!("{}: not a TOML settings file", path.display())).reject()?
+            }
+        };
+        Ok(Self { options, config })
+    }
+
+    /// The settings of one room: the table `[room]` of the settings file over the defaults. Command-line options go
+    /// over the result in the subcommand.
+    ///
+    /// # Errors
+    /// Unknown or ill-typed keys are rejected by name.
+    pub fn settings<T: DeserializeOwned + Default>(&self, room: &str) -> Result<T, Failure> {
+        match self.config.get(room) {
+            None => Ok(T::default()),
+            Some(table) => {
+                table.clone().try_into().with_context(|| format!("{}: table [{room}]", self.config_name())).reject()
+            }
+        }
+    }
+
+    fn config_name(&self) -> String {
+        self.options.config.as_ref().map_or_else(String::new, |path| path.display().to_string())
+    }
+
+    /// Prints the result: `value` with `--json`, else the text.
+    ///
+    /// # Errors
+    /// A value that cannot be serialised.
+    pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
+        if self.options.json {
+            println!("{}", serde_json::to_string_pretty(value)?);
+        } else if !text.is_empty() {
+            println!("{}", text.trim_end());
+        }
+        Ok(())
+    }
+
+    /// A progress bar of `steps` steps with time left; hidden when stderr is not a terminal or with `-q`.
+    ///
+    /// # Panics
+    /// Never: the template is a constant.
+    pub fn progress(&self, steps: u64, what: &'static str) -> ProgressBar {
+        if self.options.quiet || !std::io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let style = ProgressStyle::with_template("{prefix:>14} [{bar:30}] {pos}/{len} {msg} (left {eta})")
+            .expect("the template is constant")
+            .progress_chars("=> ");
+        ProgressBar::new(steps).with_style(style).with_prefix(what)
+    }
+}
+
+/// A file the user named, whole.
+///
+/// # Errors
+/// Rejected with the file's name and what to do.
+pub fn read_input(path: &Path) -> Result<Vec<u8>, Failure> {
+    if path.is_dir() {
+        return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", path.display())));
+    }
+    std::fs::read(path).with_context(|| format!("{}: cannot be read; check the path", path.display())).reject()
+}
