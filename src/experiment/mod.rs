@@ -1,1 +1,3 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
+
+pub mod outcome;

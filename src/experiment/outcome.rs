@@ -1,0 +1,318 @@
+//! What an experiment found: the numbers behind its report, as they are kept in `sim/outcome.json`.
+//!
+//! Lengths in mm, moduli in Pa, areas in mm2, volumes in cc. A figure that could not be computed is absent, never NaN
+//! (JSON has none). Maps are ordered by name, samples in order of their grid: the same experiment gives the same bytes.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Which experiment was run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExperimentKind {
+    /// A reference simulated with known moduli, looked for again among the samples.
+    Phantom,
+    /// A patient: the rest mesh without the resected tissue against the post-operative surfaces.
+    Resection,
+}
+
+/// One experiment: settings' worth of samples against one reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentOutcome {
+    /// Which experiment.
+    pub kind: ExperimentKind,
+    /// What the samples are compared with, one sentence.
+    pub reference: String,
+    /// Tissues whose material is varied (`grey_matter`, ...), in the order of the grid's axes.
+    pub tissues: Vec<String>,
+    /// Every sample, in the order of the grid.
+    pub samples: Vec<SampleOutcome>,
+    /// `id` of the sample with the smallest RMSE.
+    pub best_sample: Option<String>,
+    /// RMSE of the undeformed mesh per node set, mm: what a sample must beat.
+    #[serde(default)]
+    pub rest_rmse_mm: BTreeMap<String, f64>,
+    /// Measurement errors below which differences mean nothing.
+    #[serde(default)]
+    pub noise_floor: Option<NoiseFloor>,
+    /// Volumes of a resection.
+    #[serde(default)]
+    pub volumes: Option<ResectionVolumes>,
+    /// The boundary sets of the mesh.
+    #[serde(default)]
+    pub sets: Vec<SetOutcome>,
+    /// The registrations behind the case, in the order they were run.
+    #[serde(default)]
+    pub registrations: Vec<RegistrationOutcome>,
+    /// The mesh and its quality.
+    #[serde(default)]
+    pub mesh: Option<MeshOutcome>,
+    /// Loads in words, for the methods paragraph: "gravity 9.81 m/s2 towards -z".
+    #[serde(default)]
+    pub loads: Vec<String>,
+    /// Warnings in the order they were raised.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+}
+
+/// One simulation of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SampleOutcome {
+    /// Name of the sample, part of its file's name: `sample-05`.
+    pub id: String,
+    /// How many standard deviations of the prior each tissue lies from its mean.
+    #[serde(default)]
+    pub sd_levels: BTreeMap<String, f64>,
+    /// Shear modulus at rest per tissue, Pa.
+    pub shear_modulus_pa: BTreeMap<String, f64>,
+    /// The constitutive law per tissue.
+    #[serde(default)]
+    pub laws: BTreeMap<String, LawOutcome>,
+    /// RMSE per node set (`all`, `ventricle`, `margin`), mm; empty when the sample did not converge.
+    #[serde(default)]
+    pub rmse_mm: BTreeMap<String, f64>,
+    /// Whether the solver reached its tolerance.
+    pub converged: bool,
+    /// Newton iterations over all load steps.
+    #[serde(default)]
+    pub newton_iterations: usize,
+    /// Relative residual after every Newton iteration.
+    #[serde(default)]
+    pub relative_residuals: Vec<f64>,
+    /// Largest displacement, mm.
+    #[serde(default)]
+    pub displacement_max_mm: Option<f64>,
+    /// The sample's mesh file, relative to the case directory: `sim/sample-05.vtu`.
+    #[serde(default)]
+    pub file: Option<String>,
+}
+
+/// A law and its parameters, as a scenario writes them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LawOutcome {
+    /// `neo-hookean`, `mooney-rivlin`, `ogden`.
+    pub law: String,
+    /// Parameters by name, units in the names.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Errors of the measurement itself, mm, each where it is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseFloor {
+    /// Expected error of the rigid registration over the brain.
+    #[serde(default)]
+    pub registration_mm: Option<f64>,
+    /// What the voxel size alone costs.
+    #[serde(default)]
+    pub voxel_mm: Option<f64>,
+    /// Expected error of the segmented surfaces.
+    #[serde(default)]
+    pub segmentation_mm: Option<f64>,
+}
+
+impl NoiseFloor {
+    /// The parts together as independent errors, mm; `None` when no part is known.
+    pub fn combined_mm(&self) -> Option<f64> {
+        let parts = [self.registration_mm, self.voxel_mm, self.segmentation_mm];
+        let squares: Vec<f64> = parts.iter().flatten().map(|mm| mm * mm).collect();
+        (!squares.is_empty()).then(|| squares.iter().sum::<f64>().sqrt())
+    }
+}
+
+/// Volumes of a resection, cubic centimetres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResectionVolumes {
+    /// The cavity on the post-operative image.
+    #[serde(default)]
+    pub cavity_cc: Option<f64>,
+    /// The resected tissue on the pre-operative image.
+    #[serde(default)]
+    pub resected_cc: Option<f64>,
+    /// The ventricles before surgery.
+    #[serde(default)]
+    pub ventricle_before_cc: Option<f64>,
+    /// The ventricles after surgery.
+    #[serde(default)]
+    pub ventricle_after_cc: Option<f64>,
+    /// The brain before surgery.
+    #[serde(default)]
+    pub brain_cc: Option<f64>,
+}
+
+/// One boundary set of the mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SetOutcome {
+    /// Name: `ventricle`, `margin`, `base`, `falx`, `superior`.
+    pub name: String,
+    /// Nodes in the set.
+    pub nodes: usize,
+    /// Area of its facets, mm2.
+    #[serde(default)]
+    pub area_mm2: Option<f64>,
+    /// Area-weighted centre, mm, RAS+ of the MNI frame.
+    #[serde(default)]
+    pub centroid_mm: Option<[f64; 3]>,
+}
+
+/// One rigid registration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegistrationOutcome {
+    /// Frame of the moving image: `post`.
+    pub moving: String,
+    /// Frame of the fixed image: `pre`.
+    pub fixed: String,
+    /// Rotation angle of the result, degrees.
+    pub rotation_deg: f64,
+    /// Translation of the brain's centre, mm.
+    pub translation_mm: [f64; 3],
+    /// The similarity's name: `Mattes mutual information`.
+    pub similarity: String,
+    /// Similarity at the start.
+    #[serde(default)]
+    pub similarity_before: Option<f64>,
+    /// Similarity at the end.
+    #[serde(default)]
+    pub similarity_after: Option<f64>,
+}
+
+/// A mesh in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshOutcome {
+    /// The meshing engine: `lattice`, `cgal`, `gmsh`, `tetgen`.
+    pub engine: String,
+    /// Nodes.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tets: usize,
+    /// Volume per label name, cc.
+    #[serde(default)]
+    pub volume_cc: BTreeMap<String, f64>,
+    /// Smallest dihedral angle, degrees.
+    #[serde(default)]
+    pub dihedral_min_deg: Option<f64>,
+    /// Tetrahedra with a dihedral angle below 10 degrees, percent.
+    #[serde(default)]
+    pub dihedral_below_10_percent: Option<f64>,
+    /// Mean radius ratio (1 is regular).
+    #[serde(default)]
+    pub radius_ratio_mean: Option<f64>,
+    /// Smallest scaled Jacobian (1 is regular).
+    #[serde(default)]
+    pub scaled_jacobian_min: Option<f64>,
+}
+
+/// Why a text is not an outcome.
+#[derive(Debug, Error)]
+#[error("{name}: not an outcome of this program ({reason}); run the experiment again")]
+pub struct OutcomeError {
+    name: String,
+    reason: String,
+}
+
+impl ExperimentOutcome {
+    /// The text of `sim/outcome.json`.
+    ///
+    /// # Errors
+    /// [`OutcomeError`] when a number is not finite: JSON cannot hold it.
+    pub fn to_json(&self, name: &str) -> Result<String, OutcomeError> {
+        let fail = |reason: String| OutcomeError { name: name.to_owned(), reason };
+        let value = serde_json::to_value(self).map_err(|e| fail(e.to_string()))?;
+        // serde_json turns NaN into null without a word; reading it back would then fail far from the cause.
+        let again: Result<Self, _> = serde_json::from_value(value.clone());
+        again.map_err(|e| fail(format!("a figure is not a finite number: {e}")))?;
+        serde_json::to_string_pretty(&value).map(|text| text + "\n").map_err(|e| fail(e.to_string()))
+    }
+
+    /// An outcome from the text of `sim/outcome.json`; `name` is the file's name for messages.
+    ///
+    /// # Errors
+    /// [`OutcomeError`] naming file and place.
+    pub fn from_json(text: &str, name: &str) -> Result<Self, OutcomeError> {
+        serde_json::from_str(text).map_err(|e| OutcomeError { name: name.to_owned(), reason: e.to_string() })
+    }
+
+    /// The sample with the smallest RMSE, as named by `best_sample`.
+    pub fn best(&self) -> Option<&SampleOutcome> {
+        let id = self.best_sample.as_ref()?;
+        self.samples.iter().find(|s| &s.id == id)
+    }
+
+    /// Names of the node sets with an RMSE, `all` first, then in alphabetical order.
+    pub fn rmse_sets(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for map in self.samples.iter().map(|s| &s.rmse_mm).chain([&self.rest_rmse_mm]) {
+            names.extend(map.keys().cloned());
+        }
+        names.sort_by_key(|name| (name != "all", name.clone()));
+        names.dedup();
+        names
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome() -> ExperimentOutcome {
+        let sample = |n: usize, rmse: f64| SampleOutcome {
+            id: format!("sample-{n:02}"),
+            sd_levels: BTreeMap::from([("grey_matter".to_owned(), n as f64 - 1.0)]),
+            shear_modulus_pa: BTreeMap::from([("grey_matter".to_owned(), 300.0 + 100.0 * n as f64)]),
+            laws: BTreeMap::new(),
+            rmse_mm: BTreeMap::from([("ventricle".to_owned(), rmse), ("all".to_owned(), rmse)]),
+            converged: true,
+            newton_iterations: 5,
+            relative_residuals: vec![1e-3, 1e-9],
+            displacement_max_mm: Some(4.0),
+            file: None,
+        };
+        ExperimentOutcome {
+            kind: ExperimentKind::Phantom,
+            reference: "a simulation".to_owned(),
+            tissues: vec!["grey_matter".to_owned()],
+            samples: vec![sample(0, 2.0), sample(1, 0.5)],
+            best_sample: Some("sample-01".to_owned()),
+            rest_rmse_mm: BTreeMap::new(),
+            noise_floor: None,
+            volumes: None,
+            sets: vec![],
+            registrations: vec![],
+            mesh: None,
+            loads: vec![],
+            warnings: vec![],
+        }
+    }
+
+    #[test]
+    fn json_brings_the_same_outcome_back() {
+        let text = outcome().to_json("sim/outcome.json").unwrap();
+        assert_eq!(ExperimentOutcome::from_json(&text, "sim/outcome.json").unwrap(), outcome());
+        assert_eq!(outcome().best().unwrap().id, "sample-01");
+        assert_eq!(outcome().rmse_sets(), ["all", "ventricle"]);
+    }
+
+    #[test]
+    fn nan_and_unknown_fields_are_refused_by_name() {
+        let mut bad = outcome();
+        bad.samples[0].rmse_mm.insert("all".to_owned(), f64::NAN);
+        assert!(bad.to_json("sim/outcome.json").unwrap_err().to_string().contains("sim/outcome.json"));
+        let text = outcome().to_json("x").unwrap().replacen("\"kind\"", "\"kinds\"", 1);
+        assert!(ExperimentOutcome::from_json(&text, "sim/outcome.json").unwrap_err().to_string().contains("kinds"));
+    }
+
+    #[test]
+    fn independent_errors_add_in_squares() {
+        let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), segmentation_mm: None };
+        assert!((floor.combined_mm().unwrap() - 0.5).abs() < 1e-12);
+        assert!(NoiseFloor::default().combined_mm().is_none());
+    }
+}
