@@ -39,4 +39,13 @@ impl TriMesh {
     pub fn area_mm2(&self) -> f64 {
         (0..self.triangles.len()).map(|t| self.area_vector_mm2(t).norm()).sum()
     }
+
+    /// Volume enclosed by a closed surface in mm3; positive when it is outward.
+    pub fn enclosed_volume_mm3(&self) -> f64 {
+        let cone = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|n| Vector3::from(self.nodes_mm[n as usize]));
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        self.triangles.iter().map(cone).sum()
+    }
 }
