@@ -1,3 +1,4 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
 pub mod outcome;
+pub mod rmse;
