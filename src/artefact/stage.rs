@@ -214,9 +214,9 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    fn produce(text: &str) -> Result<Produced, Infallible> {
+    fn produce(text: &str) -> Produced {
         let files = vec![("a/x.txt".to_owned(), text.as_bytes().to_vec())];
-        Ok(Produced { files, facts: serde_json::json!({"length": text.len()}), ..Produced::default() })
+        Produced { files, facts: serde_json::json!({"length": text.len()}), ..Produced::default() }
     }
 
     fn never() -> Result<Produced, Infallible> {
@@ -229,14 +229,17 @@ mod tests {
         let stage = |input: &[u8], setting: i32| {
             Stage::new("s", 1, folder.path(), &serde_json::json!({"depth": setting})).input("scan", input)
         };
-        assert!(!stage(b"1", 1).run(false, || produce("hello")).unwrap().skipped);
+        assert!(!stage(b"1", 1).run(false, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped);
         assert!(stage(b"1", 1).run(false, never).unwrap().skipped);
         assert_eq!(stage(b"2", 1).why(), ["input `scan` changed"]);
         assert_eq!(stage(b"1", 2).why(), ["setting `depth` changed from 1 to 2"]);
-        assert!(!stage(b"1", 1).run(true, || produce("hello")).unwrap().skipped, "--force computes again");
+        assert!(
+            !stage(b"1", 1).run(true, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped,
+            "--force computes again"
+        );
         std::fs::write(folder.path().join("a/x.txt"), "tampered").unwrap();
         assert_eq!(stage(b"1", 1).why(), ["output `a/x.txt` was changed"]);
-        assert!(!stage(b"1", 1).run(false, || produce("hello")).unwrap().skipped);
+        assert!(!stage(b"1", 1).run(false, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped);
     }
 
     #[test]

@@ -1,4 +1,5 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
+pub mod estimate;
 pub mod outcome;
 pub mod rmse;

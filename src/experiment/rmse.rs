@@ -75,10 +75,10 @@ mod tests {
     use super::*;
 
     fn square(z: f64, size: f64) -> TriMesh {
-        let n = 11;
-        let step = size / (n - 1) as f64;
-        let nodes = (0..n * n).map(|i| [(i % n) as f64 * step, (i / n) as f64 * step, z]).collect();
-        let cells = (0..(n - 1) * (n - 1)).map(|c| (c % (n - 1) + c / (n - 1) * n) as u32);
+        let n = 11u32;
+        let step = size / f64::from(n - 1);
+        let nodes = (0..n * n).map(|i| [f64::from(i % n) * step, f64::from(i / n) * step, z]).collect();
+        let cells = (0..(n - 1) * (n - 1)).map(|c| c % (n - 1) + c / (n - 1) * n);
         let triangles = cells.flat_map(|o| [[o, o + 1, o + 12], [o, o + 12, o + 11]]).collect();
         TriMesh { nodes_mm: nodes, triangles }
     }

@@ -1,0 +1,226 @@
+//! Levenberg-Marquardt on residuals in mm with a Gaussian prior on the log-parameters.
+
+use super::LogPrior;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Residuals at a point and, when asked for, how they change.
+#[derive(Clone, Debug)]
+pub struct Linearisation {
+    /// Observed minus simulated, mm, one per observation.
+    pub residuals_mm: DVector<f64>,
+    /// d residual / d ln(parameter), mm, one column per parameter.
+    pub jacobian_mm: DMatrix<f64>,
+}
+
+/// A model that turns log-parameters into residuals; the solver with its sensitivities, or a test's formula.
+pub trait Forward {
+    /// Why a point could not be evaluated (an equilibrium that does not exist, say).
+    type Error: std::fmt::Display;
+
+    /// Residuals and Jacobian at these log-parameters. One call costs one solve and one tangent solve per parameter.
+    ///
+    /// # Errors
+    /// The model's own.
+    fn linearise(&mut self, log_parameters: &[f64]) -> Result<Linearisation, Self::Error>;
+}
+
+/// How to descend.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EstimateSettings {
+    /// Standard deviation of one observation, mm.
+    pub noise_mm: f64,
+    /// Stop when no log-parameter moves more than this.
+    pub step_tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// Longest step of a log-parameter: a factor e^1 in one go is as far as a linearisation carries.
+    pub longest_step: f64,
+}
+
+impl Default for EstimateSettings {
+    fn default() -> Self {
+        Self { noise_mm: 0.5, step_tolerance: 1e-6, iterations: 30, longest_step: 1.0 }
+    }
+}
+
+/// How the descent ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Convergence {
+    /// The last step was below the tolerance.
+    StepBelowTolerance,
+    /// No step, however short, lowered the cost: the residuals' own precision is reached.
+    NoDescent,
+    /// The iterations ran out: the figures are the best found, not a minimum.
+    IterationsExhausted,
+}
+
+/// The best point found and the way there.
+#[derive(Clone, Debug)]
+pub struct Descent {
+    /// ln(parameter) at the minimum.
+    pub log_parameters: Vec<f64>,
+    /// Residuals and Jacobian there.
+    pub linearisation: Linearisation,
+    /// Minus log posterior (up to a constant) after every accepted step, the start first.
+    pub costs: Vec<f64>,
+    /// Calls of the forward model.
+    pub evaluations: usize,
+    /// Why it stopped.
+    pub convergence: Convergence,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, Error, PartialEq)]
+pub enum EstimateError {
+    /// The model failed at the start.
+    #[error("the model cannot be evaluated at the start: {0}")]
+    Start(String),
+    /// Nothing to fit.
+    #[error("there are {observations} observations for {parameters} parameters: give more, or fix a parameter")]
+    TooFewObservations {
+        /// Residuals.
+        observations: usize,
+        /// Parameters.
+        parameters: usize,
+    },
+    /// A residual is NaN or infinite.
+    #[error("residual {0} is not a finite number")]
+    NotFinite(usize),
+}
+
+/// Minimises sum r^2 / (2 noise^2) + sum (theta - mean)^2 / (2 sd^2) over theta = ln(parameters) from `start`.
+///
+/// # Errors
+/// [`EstimateError`] when the start cannot be evaluated; a trial point that fails only shortens the step.
+pub fn estimate<M: Forward>(
+    model: &mut M,
+    prior: &[LogPrior],
+    start: &[f64],
+    settings: &EstimateSettings,
+) -> Result<Descent, EstimateError> {
+    let weight = settings.noise_mm.powi(-2);
+    let precision = DVector::from_iterator(prior.len(), prior.iter().map(LogPrior::precision));
+    let mean = DVector::from_iterator(prior.len(), prior.iter().map(|p| p.mean));
+    let cost = |theta: &DVector<f64>, r: &DVector<f64>| {
+        let away = theta - &mean;
+        0.5 * weight * r.norm_squared() + 0.5 * away.dot(&away.component_mul(&precision))
+    };
+
+    let mut theta = DVector::from_column_slice(start);
+    let mut here = model.linearise(start).map_err(|e| EstimateError::Start(e.to_string()))?;
+    if here.residuals_mm.len() < prior.iter().filter(|p| p.sd.is_none()).count().max(1) {
+        let (observations, parameters) = (here.residuals_mm.len(), start.len());
+        return Err(EstimateError::TooFewObservations { observations, parameters });
+    }
+    if let Some(n) = here.residuals_mm.iter().position(|r| !r.is_finite()) {
+        return Err(EstimateError::NotFinite(n));
+    }
+    let mut costs = vec![cost(&theta, &here.residuals_mm)];
+    let (mut evaluations, mut damping) = (1, 1e-3);
+    let mut convergence = Convergence::IterationsExhausted;
+    'descent: for _ in 0..settings.iterations {
+        let jt = here.jacobian_mm.transpose();
+        let gradient = &jt * &here.residuals_mm * weight + (&theta - &mean).component_mul(&precision);
+        let hessian = &jt * &here.jacobian_mm * weight + DMatrix::from_diagonal(&precision);
+        loop {
+            let scale = hessian.diagonal().map(|d| d.max(1e-12)) * damping;
+            let damped = &hessian + DMatrix::from_diagonal(&scale);
+            let Some(factor) = damped.cholesky() else {
+                damping *= 10.0;
+                continue;
+            };
+            let mut step = -factor.solve(&gradient);
+            let longest = step.amax();
+            if longest > settings.longest_step {
+                step *= settings.longest_step / longest;
+            }
+            if step.amax() < settings.step_tolerance {
+                convergence = Convergence::StepBelowTolerance;
+                break 'descent;
+            }
+            let trial = &theta + &step;
+            evaluations += 1;
+            let there = model.linearise(trial.as_slice()).ok();
+            let there = there.filter(|t| t.residuals_mm.iter().all(|r| r.is_finite()));
+            let lower = there.filter(|t| cost(&trial, &t.residuals_mm) < costs[costs.len() - 1]);
+            if let Some(there) = lower {
+                costs.push(cost(&trial, &there.residuals_mm));
+                (theta, here) = (trial, there);
+                damping = (damping * 0.1).max(1e-12);
+                break;
+            }
+            damping *= 10.0;
+            if damping > 1e8 {
+                convergence = Convergence::NoDescent;
+                break 'descent;
+            }
+        }
+    }
+    Ok(Descent { log_parameters: theta.as_slice().to_vec(), linearisation: here, costs, evaluations, convergence })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// r_i = a_i / mu_1 + b_i / mu_2 - observed: what a linear-elastic body under gravity does.
+    struct Compliance {
+        observed: Vec<f64>,
+    }
+
+    fn simulate(log: &[f64]) -> Vec<f64> {
+        (0..40).map(|i| f64::from(i) * (-log[0]).exp() + f64::from((i * i) % 17) * (-log[1]).exp()).collect()
+    }
+
+    impl Forward for Compliance {
+        type Error = String;
+        fn linearise(&mut self, log: &[f64]) -> Result<Linearisation, String> {
+            if log.iter().any(|l| l.abs() > 20.0) {
+                return Err("no equilibrium".to_owned());
+            }
+            let value = simulate(log);
+            let residuals_mm = DVector::from_iterator(40, value.iter().zip(&self.observed).map(|(s, o)| s - o));
+            let column = |i: usize, p: usize| {
+                let c = if p == 0 { i as f64 } else { f64::from(((i * i) % 17) as u32) };
+                -c * (-log[p]).exp()
+            };
+            Ok(Linearisation { residuals_mm, jacobian_mm: DMatrix::from_fn(40, 2, column) })
+        }
+    }
+
+    fn no_prior() -> Vec<LogPrior> {
+        ["a", "b"].map(|name| LogPrior { name: name.to_owned(), mean: 0.0, sd: None }).to_vec()
+    }
+
+    #[test]
+    fn noise_free_parameters_come_back() {
+        let truth = [1.3, 0.4];
+        let mut model = Compliance { observed: simulate(&truth) };
+        let settings = EstimateSettings { noise_mm: 0.1, ..EstimateSettings::default() };
+        let descent = estimate(&mut model, &no_prior(), &[3.0, -1.0], &settings).unwrap();
+        for p in 0..2 {
+            assert!((descent.log_parameters[p] - truth[p]).abs() < 1e-6);
+        }
+        assert!(descent.costs.windows(2).all(|w| w[1] < w[0]), "the cost falls at every accepted step");
+    }
+
+    #[test]
+    fn a_tight_prior_holds_the_parameter() {
+        let mut model = Compliance { observed: simulate(&[1.3, 0.4]) };
+        let tight = |mean| LogPrior { name: String::new(), mean, sd: Some(1e-6) };
+        let descent =
+            estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();
+        assert!((descent.log_parameters[0] - 2.0).abs() < 1e-4 && descent.log_parameters[1].abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_start_without_equilibrium_is_refused_with_its_reason() {
+        let mut model = Compliance { observed: simulate(&[1.0, 1.0]) };
+        let error = estimate(&mut model, &no_prior(), &[50.0, 0.0], &EstimateSettings::default()).unwrap_err();
+        assert_eq!(error, EstimateError::Start("no equilibrium".to_owned()));
+    }
+}

@@ -1,0 +1,34 @@
+//! Estimation with error bars: the moduli that explain an observed deformation.
+//!
+//! Levenberg-Marquardt in the logarithms of the parameters, with the Gaussian-process prior of room `material` as a
+//! Gaussian over them, then the Laplace approximation of the posterior (MacKay, "Information Theory, Inference, and
+//! Learning Algorithms", chapter 27) and what the data can and cannot tell apart.
+
+mod levenberg_marquardt;
+mod posterior;
+
+pub use levenberg_marquardt::{
+    Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
+};
+pub use posterior::{Identifiability, Posterior, Verdict, laplace};
+
+use serde::{Deserialize, Serialize};
+
+/// A Gaussian over one log-parameter: what is known before the patient is seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LogPrior {
+    /// Name of the parameter: `shear_modulus_pa of grey_matter`.
+    pub name: String,
+    /// Mean of ln(parameter).
+    pub mean: f64,
+    /// Standard deviation of ln(parameter); infinite for no prior knowledge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd: Option<f64>,
+}
+
+impl LogPrior {
+    /// 1 / sd^2, zero without prior knowledge.
+    pub fn precision(&self) -> f64 {
+        self.sd.map_or(0.0, |sd| 1.0 / (sd * sd))
+    }
+}

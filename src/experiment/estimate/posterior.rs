@@ -1,0 +1,163 @@
+//! How sure the estimate is, and what it cannot tell apart.
+
+use super::{Descent, LogPrior};
+use nalgebra::{DMatrix, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+
+/// Whether the data say something about a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The data narrow the prior.
+    Identified,
+    /// The interval comes from the prior: the data add little.
+    PriorDominated,
+    /// Without prior the interval spans more than a factor 10 either way: not identifiable.
+    NotIdentifiable,
+}
+
+/// The Laplace approximation: a Gaussian over the log-parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Posterior {
+    /// Names, in the order of everything below.
+    pub names: Vec<String>,
+    /// Most probable value of every parameter (exp of the mode of its logarithm).
+    pub mode: Vec<f64>,
+    /// Standard deviation of ln(parameter).
+    pub log_sd: Vec<f64>,
+    /// 95 % interval of every parameter.
+    pub interval_95: Vec<[f64; 2]>,
+    /// Covariance of the log-parameters, row by row.
+    pub log_covariance: Vec<Vec<f64>>,
+    /// What the data can tell.
+    pub identifiability: Identifiability,
+}
+
+/// Panel of identifiability, from the data alone (prior left out).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identifiability {
+    /// One verdict per parameter.
+    pub verdicts: Vec<Verdict>,
+    /// Correlation of the sensitivities d u / d ln(parameter), row by row; near 1: a valley.
+    pub sensitivity_correlation: Vec<Vec<f64>>,
+    /// Ratio of the largest to the smallest eigenvalue of the Gauss-Newton matrix.
+    pub condition: f64,
+    /// The direction in log-parameters along which the data change least: along it the cost has its valley.
+    pub valley: Vec<f64>,
+    /// Standard deviation of the log-parameters along the valley from the data alone.
+    pub valley_log_sd: f64,
+}
+
+/// Two-sided 95 % of a Gaussian.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// The Laplace posterior at the end of a descent. `noise_mm` is the standard deviation of one observation and
+/// `information_share` the share of observations that are independent (neighbouring surface points see the same
+/// error; 1 for independent ones).
+pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information_share: f64) -> Posterior {
+    let n = prior.len();
+    let jacobian = &descent.linearisation.jacobian_mm;
+    let fisher: DMatrix<f64> = jacobian.transpose() * jacobian * (information_share / (noise_mm * noise_mm));
+    let precision = DMatrix::from_fn(n, n, |r, c| if r == c { prior[r].precision() } else { 0.0 });
+    let covariance = invert(&(&fisher + &precision));
+    let data_only = invert(&fisher);
+
+    let eigen = SymmetricEigen::new(fisher.clone());
+    let least = eigen.eigenvalues.imin();
+    let (lowest, highest) = (eigen.eigenvalues[least].max(0.0), eigen.eigenvalues.max());
+    let mut valley: Vec<f64> = eigen.eigenvectors.column(least).iter().copied().collect();
+    // An eigenvector has no sign: the first component that is not zero is positive, always.
+    if valley.iter().find(|v| v.abs() > 1e-9).is_some_and(|v| *v < 0.0) {
+        valley = valley.into_iter().map(|v| -v).collect();
+    }
+
+    let log_sd: Vec<f64> = (0..n).map(|p| covariance[(p, p)].max(0.0).sqrt()).collect();
+    let mode: Vec<f64> = descent.log_parameters.iter().map(|t| t.exp()).collect();
+    let interval = |p: usize| [mode[p] * (-Z_95 * log_sd[p]).exp(), mode[p] * (Z_95 * log_sd[p]).exp()];
+    let verdict = |p: usize| {
+        let sd = data_only[(p, p)].max(0.0).sqrt();
+        match prior[p].sd {
+            Some(prior_sd) if log_sd[p] > 0.7 * prior_sd => Verdict::PriorDominated,
+            Some(_) => Verdict::Identified,
+            // Written so that an infinite or NaN variance is not identifiable.
+            None if Z_95 * sd <= 10f64.ln() => Verdict::Identified,
+            None => Verdict::NotIdentifiable,
+        }
+    };
+    let correlation = |r: usize, c: usize| {
+        let scale = (fisher[(r, r)] * fisher[(c, c)]).sqrt();
+        if scale > 0.0 { fisher[(r, c)] / scale } else { 0.0 }
+    };
+    let rows = |f: &dyn Fn(usize, usize) -> f64| (0..n).map(|r| (0..n).map(|c| f(r, c)).collect()).collect();
+    Posterior {
+        names: prior.iter().map(|p| p.name.clone()).collect(),
+        interval_95: (0..n).map(interval).collect(),
+        log_covariance: rows(&|r, c| covariance[(r, c)]),
+        identifiability: Identifiability {
+            verdicts: (0..n).map(verdict).collect(),
+            sensitivity_correlation: rows(&correlation),
+            condition: if lowest > 0.0 { highest / lowest } else { f64::MAX },
+            valley,
+            valley_log_sd: if lowest > 0.0 { lowest.sqrt().recip() } else { f64::MAX },
+        },
+        mode,
+        log_sd,
+    }
+}
+
+/// Inverse of a symmetric positive matrix; a flat direction gets a variance of 1e12 instead of infinity (JSON has none).
+fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = SymmetricEigen::new(matrix.clone());
+    let inverse = eigen.eigenvalues.map(|l| if l > 1e-12 { 1.0 / l } else { 1e12 });
+    &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::estimate::{Convergence, Linearisation};
+    use nalgebra::DVector;
+
+    fn descent(jacobian: DMatrix<f64>) -> Descent {
+        let residuals_mm = DVector::zeros(jacobian.nrows());
+        Descent {
+            log_parameters: vec![7.0; jacobian.ncols()],
+            linearisation: Linearisation { residuals_mm, jacobian_mm: jacobian },
+            costs: vec![0.0],
+            evaluations: 1,
+            convergence: Convergence::StepBelowTolerance,
+        }
+    }
+
+    fn prior(sd: Option<f64>) -> LogPrior {
+        LogPrior { name: "mu".to_owned(), mean: 7.0, sd }
+    }
+
+    #[test]
+    fn one_parameter_has_the_textbook_standard_deviation() {
+        let d = descent(DMatrix::from_element(25, 1, 2.0));
+        let posterior = laplace(&d, &[prior(None)], 0.5, 1.0);
+        // sd = noise / (|J|) = 0.5 / (2 sqrt 25).
+        assert!((posterior.log_sd[0] - 0.05).abs() < 1e-12);
+        assert_eq!(posterior.identifiability.verdicts, [Verdict::Identified]);
+        assert!((posterior.interval_95[0][1] / posterior.mode[0] - (0.05 * Z_95).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_the_sum_is_seen_so_the_difference_is_the_valley() {
+        let d = descent(DMatrix::from_element(25, 2, 1.0));
+        let posterior = laplace(&d, &[prior(None), prior(None)], 0.5, 1.0);
+        assert_eq!(posterior.identifiability.verdicts, [Verdict::NotIdentifiable; 2]);
+        assert!((posterior.identifiability.sensitivity_correlation[0][1] - 1.0).abs() < 1e-12);
+        let valley = &posterior.identifiability.valley;
+        assert!((valley[0] + valley[1]).abs() < 1e-9 && valley[0] > 0.0);
+    }
+
+    #[test]
+    fn without_sensitivity_the_prior_is_returned_and_said_to_be() {
+        let d = descent(DMatrix::zeros(25, 1));
+        let posterior = laplace(&d, &[prior(Some(0.4))], 0.5, 1.0);
+        assert!((posterior.log_sd[0] - 0.4).abs() < 1e-9);
+        assert_eq!(posterior.identifiability.verdicts, [Verdict::PriorDominated]);
+    }
+}
