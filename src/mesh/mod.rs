@@ -2,6 +2,7 @@
 
 mod closest_point;
 mod isosurface;
+pub mod format;
 mod tet_mesh;
 mod tri_mesh;
 

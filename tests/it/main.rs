@@ -1,3 +1,5 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
+mod mesh_files;
+mod python;
 mod rooms;

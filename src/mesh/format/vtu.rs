@@ -1,0 +1,527 @@
+//! VTU, the unstructured grid of VTK's XML formats: what ParaView, pyvista and meshio open.
+//!
+//! Labels are the integer cell array `label`; every node set is a `UInt8` point array of 0 and 1 under its name,
+//! since VTU has no sets. A facet set is the `UInt8` cell array `facets:NAME`: bit `f` of a tetrahedron is set when
+//! its local face `f` (the one opposite corner `f`, see [`TET_FACES`]) belongs to the set. Fields are `Float64`.
+//! Reading takes text, base64 and raw bytes, inline or appended, plain or zlib, either byte order and header width.
+
+use super::vtk_array::{NumberType, Source, Storage, base64_zlib, numbers_from_bytes, numbers_from_text};
+use super::{Field, MeshWithFields, ReadError, WriteError, check_fields, facet_owners};
+use crate::mesh::{TET_FACES, TetMesh};
+use quick_xml::escape::escape;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
+
+/// VTK's number of the linear tetrahedron.
+const VTK_TETRA: u8 = 10;
+const FACETS: &str = "facets:";
+
+/// The bytes of a VTU file: `mesh` with labels, sets and the given fields on nodes and tetrahedra.
+///
+/// # Errors
+/// [`WriteError`] for a field of the wrong length or a name that occurs twice.
+pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> Result<Vec<u8>, WriteError> {
+    let (points, cells) = (mesh.nodes_mm().len(), mesh.tets().len());
+    check_fields(point_fields, points, &mesh.node_sets.keys().map(String::as_str).collect::<Vec<_>>())?;
+    let facet_names: Vec<String> = mesh.facet_sets.keys().map(|name| format!("{FACETS}{name}")).collect();
+    let taken: Vec<&str> = facet_names.iter().map(String::as_str).chain(["label"]).collect();
+    check_fields(cell_fields, cells, &taken)?;
+
+    let mut xml = format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n\
+         <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n<Points>\n"
+    );
+    xml += &array("Float64", "Points", 3, &float_bytes(mesh.nodes_mm().as_flattened()));
+    xml += "</Points>\n<Cells>\n";
+    let corners = mesh.tets().as_flattened();
+    xml += &array("Int64", "connectivity", 1, &bytes_of(corners.iter().map(|&n| i64::from(n).to_le_bytes())));
+    xml += &array("Int64", "offsets", 1, &bytes_of((1..=cells as i64).map(|n| (4 * n).to_le_bytes())));
+    xml += &array("UInt8", "types", 1, &vec![VTK_TETRA; cells]);
+    xml += "</Cells>\n<PointData>\n";
+    for (name, nodes) in &mesh.node_sets {
+        let mut member = vec![0u8; points];
+        for &n in nodes {
+            member[n as usize] = 1;
+        }
+        xml += &array("UInt8", name, 1, &member);
+    }
+    for field in point_fields {
+        xml += &array("Float64", &field.name, field.components, &float_bytes(&field.values));
+    }
+    xml += "</PointData>\n<CellData Scalars=\"label\">\n";
+    xml += &array("Int32", "label", 1, &bytes_of(mesh.labels().iter().map(|&l| i32::from(l).to_le_bytes())));
+    for (name, facets) in facet_names.iter().zip(mesh.facet_sets.values()) {
+        let mut faces = vec![0u8; cells];
+        for (tet, face) in facet_owners(mesh, facets) {
+            faces[tet] |= 1 << face;
+        }
+        xml += &array("UInt8", name, 1, &faces);
+    }
+    for field in cell_fields {
+        xml += &array("Float64", &field.name, field.components, &float_bytes(&field.values));
+    }
+    xml += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+    Ok(xml.into_bytes())
+}
+
+fn array(number: &str, name: &str, components: usize, bytes: &[u8]) -> String {
+    let name = escape(name);
+    // Only where there are several: meshio makes a table of one column of a scalar that says `1`.
+    let width = if components == 1 { String::new() } else { format!(" NumberOfComponents=\"{components}\"") };
+    let payload = base64_zlib(bytes);
+    format!("<DataArray type=\"{number}\" Name=\"{name}\"{width} format=\"binary\">\n{payload}\n</DataArray>\n")
+}
+
+fn float_bytes(values: &[f64]) -> Vec<u8> {
+    bytes_of(values.iter().map(|v| v.to_le_bytes()))
+}
+
+fn bytes_of<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+    words.flatten().collect()
+}
+
+/// A mesh from the bytes of a VTU file; `name` is what messages call the file.
+///
+/// The cell array `label` (or gmsh's `gmsh:physical`) gives the labels. A point array of one component that holds
+/// only 0 and 1 becomes a node set (a float array only if it holds a 1); all others are returned as fields, those
+/// of cells for the tetrahedra only. Vertices, lines and polygons are passed over; nodes keep the file's order, so
+/// nodes of no tetrahedron stay.
+///
+/// # Errors
+/// [`ReadError`] for a damaged file, a cell that is neither a linear tetrahedron nor of lower dimension, a missing
+/// or unusable label, and whatever [`TetMesh::new`] refuses.
+pub fn decode(bytes: &[u8], name: &str) -> Result<MeshWithFields, ReadError> {
+    let file = File::parse(bytes, name)?;
+    let nodes_mm = file.numbers("Points", None, 3, file.points)?.as_chunks::<3>().0.to_vec();
+    let (tets, cell_numbers) = file.tets()?;
+    let labels = file.labels(&cell_numbers)?;
+    let mut mesh =
+        TetMesh::new(nodes_mm, tets, labels).map_err(|source| ReadError::Mesh { file: name.to_owned(), source })?;
+
+    let mut point_fields = Vec::new();
+    for raw in file.arrays.iter().filter(|a| a.section == "PointData") {
+        let Some(field) = file.field(raw, file.points)? else { continue };
+        let binary = field.components == 1 && field.values.iter().all(|&v| v == 0.0 || v == 1.0);
+        if binary && (raw.is_integer() || field.values.contains(&1.0)) {
+            let nodes = (0..file.points).filter(|&n| field.values[n] == 1.0).map(|n| n as u32).collect();
+            mesh.node_sets.insert(field.name, nodes);
+        } else {
+            point_fields.push(field);
+        }
+    }
+    let mut cell_fields = Vec::new();
+    for raw in file.arrays.iter().filter(|a| a.section == "CellData" && a.name != "label") {
+        let Some(mut field) = file.field(raw, file.cells)? else { continue };
+        let width = field.components;
+        field.values = cell_numbers.iter().flat_map(|&c| &field.values[c * width..(c + 1) * width]).copied().collect();
+        if let Some(set) = field.name.strip_prefix(FACETS)
+            && raw.is_integer()
+            && width == 1
+        {
+            let faces = field
+                .values
+                .iter()
+                .enumerate()
+                .flat_map(|(t, &bits)| (0..4).filter(move |f| bits as u8 >> f & 1 == 1).map(move |f| (t, f)));
+            let facets = faces.map(|(t, f): (usize, usize)| TET_FACES[f].map(|c| mesh.tets()[t][c])).collect();
+            mesh.facet_sets.insert(set.to_owned(), facets);
+        } else {
+            cell_fields.push(field);
+        }
+    }
+    Ok(MeshWithFields { mesh, point_fields, cell_fields })
+}
+
+/// A `DataArray` as it stands in the file.
+#[derive(Debug, Default)]
+struct RawArray {
+    section: String,
+    name: String,
+    number: String,
+    components: usize,
+    format: String,
+    offset: usize,
+    text: String,
+}
+
+impl RawArray {
+    fn is_integer(&self) -> bool {
+        matches!(NumberType::from_name(&self.number), Some(NumberType::Int(_) | NumberType::UInt(_)))
+    }
+}
+
+struct File<'a> {
+    name: &'a str,
+    storage: Storage,
+    points: usize,
+    cells: usize,
+    arrays: Vec<RawArray>,
+    /// Bytes after the underscore of `AppendedData`, and whether they are base64.
+    appended: Option<(&'a [u8], bool)>,
+}
+
+impl<'a> File<'a> {
+    fn damaged(&self, field: &str, problem: impl Into<String>) -> ReadError {
+        ReadError::Damaged { file: self.name.to_owned(), field: field.to_owned(), problem: problem.into() }
+    }
+
+    fn unsupported(&self, field: &str, problem: impl Into<String>) -> ReadError {
+        ReadError::Unsupported { file: self.name.to_owned(), field: field.to_owned(), problem: problem.into() }
+    }
+
+    fn parse(bytes: &'a [u8], name: &'a str) -> Result<Self, ReadError> {
+        let storage = Storage { big_endian: false, header_bytes: 4, zlib: false };
+        let mut file = Self { name, storage, points: 0, cells: 0, arrays: Vec::new(), appended: None };
+        // What is appended need not be text, so the XML ends there for us.
+        let marker = b"<AppendedData";
+        let split = bytes.windows(marker.len()).position(|w| w == marker);
+        let text = std::str::from_utf8(&bytes[..split.unwrap_or(bytes.len())])
+            .map_err(|e| file.damaged("XML", format!("byte {} is not UTF-8", e.valid_up_to())))?;
+        if let Some(start) = split {
+            file.appended = Some(file.appended_data(&bytes[start..])?);
+        }
+
+        let mut reader = Reader::from_str(text);
+        reader.config_mut().expand_empty_elements = true;
+        let (mut section, mut open, mut pieces, mut closed) = (String::new(), None::<RawArray>, 0, split.is_some());
+        let mut inside = 0usize;
+        loop {
+            match reader.read_event().map_err(|e| file.damaged("XML", e.to_string()))? {
+                Event::Start(element) => match element.local_name().as_ref() {
+                    "VTKFile" => file.read_root(&element)?,
+                    "Piece" => {
+                        pieces += 1;
+                        file.points = file.count(&element, "NumberOfPoints")?;
+                        file.cells = file.count(&element, "NumberOfCells")?;
+                    }
+                    "DataArray" => open = Some(file.raw_array(&element, &section)?),
+                    _ if open.is_some() => inside += 1,
+                    other => other.clone_into(&mut section),
+                },
+                Event::Text(text) => {
+                    // VTK nests `InformationKey` into arrays; its text is not the array's.
+                    if let Some(raw) = open.as_mut().filter(|_| inside == 0) {
+                        raw.text += &text.into_inner();
+                    }
+                }
+                Event::End(element) => match element.local_name().as_ref() {
+                    "DataArray" => file.arrays.extend(open.take()),
+                    "VTKFile" => closed = true,
+                    _ if open.is_some() => inside = inside.saturating_sub(1),
+                    _ => {}
+                },
+                Event::Eof => break,
+                _ => {}
+            }
+        }
+        if !closed {
+            return Err(file.damaged("XML", "the file ends before `</VTKFile>`"));
+        }
+        match pieces {
+            1 => Ok(file),
+            0 => Err(file.damaged("Piece", "there is none")),
+            n => Err(file.unsupported(
+                "Piece",
+                format!(
+                    "there are {n}, and nodes at their seams may be doubled; merge them into one (ParaView: Clean)"
+                ),
+            )),
+        }
+    }
+
+    fn attribute(&self, element: &BytesStart<'_>, key: &str) -> Result<Option<String>, ReadError> {
+        let wrong = |e: String| self.damaged(element.local_name().as_ref(), e);
+        let Some(attribute) = element.try_get_attribute(key).map_err(|e| wrong(e.to_string()))? else {
+            return Ok(None);
+        };
+        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|e| wrong(e.to_string()))?;
+        Ok(Some(value.into_owned()))
+    }
+
+    fn count(&self, element: &BytesStart<'_>, key: &str) -> Result<usize, ReadError> {
+        let text = self.attribute(element, key)?.ok_or_else(|| self.damaged("Piece", format!("`{key}` is missing")))?;
+        text.trim().parse().map_err(|_| self.damaged("Piece", format!("`{key}` is `{text}`, not a count")))
+    }
+
+    fn read_root(&mut self, element: &BytesStart<'_>) -> Result<(), ReadError> {
+        let get = |key| self.attribute(element, key);
+        let kind = get("type")?.unwrap_or_default();
+        if kind != "UnstructuredGrid" {
+            return Err(self.unsupported("VTKFile", format!("type `{kind}`: only UnstructuredGrid holds tetrahedra")));
+        }
+        self.storage = Storage {
+            big_endian: get("byte_order")?.as_deref() == Some("BigEndian"),
+            header_bytes: if get("header_type")?.as_deref() == Some("UInt64") { 8 } else { 4 },
+            zlib: match get("compressor")?.as_deref() {
+                None | Some("") => false,
+                Some("vtkZLibDataCompressor") => true,
+                Some(other) => {
+                    return Err(self.unsupported("VTKFile", format!("compressor `{other}`: write with zlib or none")));
+                }
+            },
+        };
+        Ok(())
+    }
+
+    fn raw_array(&self, element: &BytesStart<'_>, section: &str) -> Result<RawArray, ReadError> {
+        let get = |key| self.attribute(element, key);
+        let name = get("Name")?.unwrap_or_else(|| section.to_owned());
+        let number = |key: &str, otherwise: usize| match self.attribute(element, key)? {
+            None => Ok(otherwise),
+            Some(text) => {
+                text.trim().parse().map_err(|_| self.damaged(&name, format!("`{key}` is `{text}`, not a number")))
+            }
+        };
+        Ok(RawArray {
+            section: section.to_owned(),
+            number: get("type")?.unwrap_or_default(),
+            // VTK writes 0 or nothing for one component.
+            components: number("NumberOfComponents", 1)?.max(1),
+            format: get("format")?.unwrap_or_else(|| "ascii".to_owned()),
+            offset: number("offset", 0)?,
+            text: String::new(),
+            name,
+        })
+    }
+
+    /// The payload behind `<AppendedData encoding="...">` and the underscore that opens it.
+    fn appended_data(&self, bytes: &'a [u8]) -> Result<(&'a [u8], bool), ReadError> {
+        let cut = || self.damaged("AppendedData", "the file ends before its data");
+        let tag_end = bytes.iter().position(|&b| b == b'>').ok_or_else(cut)?;
+        let tag = String::from_utf8_lossy(&bytes[..tag_end]);
+        let underscore = bytes[tag_end..].iter().position(|&b| b == b'_').ok_or_else(cut)?;
+        Ok((&bytes[tag_end + underscore + 1..], tag.contains("base64")))
+    }
+
+    fn decode_array(&self, raw: &RawArray) -> Result<Vec<f64>, ReadError> {
+        let number = NumberType::from_name(&raw.number)
+            .ok_or_else(|| self.unsupported(&raw.name, format!("type `{}` is not a type of numbers", raw.number)))?;
+        let decoded = match raw.format.as_str() {
+            "ascii" => numbers_from_text(&raw.text),
+            "binary" => numbers_from_bytes(Source::base64(raw.text.as_bytes()), self.storage, number),
+            "appended" => {
+                let (payload, base64) =
+                    self.appended.ok_or_else(|| self.damaged(&raw.name, "`AppendedData` is missing"))?;
+                let payload = payload.get(raw.offset..).ok_or_else(|| {
+                    self.damaged(&raw.name, format!("offset {} is beyond the appended data", raw.offset))
+                })?;
+                let source = if base64 { Source::base64(payload) } else { Source::Raw(payload) };
+                numbers_from_bytes(source, self.storage, number)
+            }
+            other => return Err(self.unsupported(&raw.name, format!("format `{other}` is not one of VTK's"))),
+        };
+        decoded.map_err(|problem| self.damaged(&raw.name, problem))
+    }
+
+    /// The numbers of a required array: `components` for each of `places`.
+    fn numbers(
+        &self,
+        section: &str,
+        name: Option<&str>,
+        components: usize,
+        places: usize,
+    ) -> Result<Vec<f64>, ReadError> {
+        let field = name.unwrap_or(section);
+        let raw = self
+            .arrays
+            .iter()
+            .find(|a| a.section == section && name.is_none_or(|n| a.name == n))
+            .ok_or_else(|| self.damaged(field, "the array is missing"))?;
+        let numbers = self.decode_array(raw)?;
+        if numbers.len() != components * places {
+            return Err(self.damaged(field, format!("{} numbers, not {}", numbers.len(), components * places)));
+        }
+        Ok(numbers)
+    }
+
+    /// A point or cell array; `None` when it does not hold numbers.
+    fn field(&self, raw: &RawArray, places: usize) -> Result<Option<Field>, ReadError> {
+        if NumberType::from_name(&raw.number).is_none() {
+            return Ok(None);
+        }
+        let values = self.decode_array(raw)?;
+        if values.len() != raw.components * places {
+            let wanted = format!("{} numbers, not {} x {places}", values.len(), raw.components);
+            return Err(self.damaged(&raw.name, wanted));
+        }
+        Ok(Some(Field { name: raw.name.clone(), components: raw.components, values }))
+    }
+
+    /// The tetrahedra and, for each, its number among all cells of the file.
+    fn tets(&self) -> Result<(Vec<[u32; 4]>, Vec<usize>), ReadError> {
+        let types = self.numbers("Cells", Some("types"), 1, self.cells)?;
+        let offsets = self.numbers("Cells", Some("offsets"), 1, self.cells)?;
+        let corners = self.numbers("Cells", Some("connectivity"), 1, offsets.last().map_or(0, |&n| n as usize))?;
+        let (mut tets, mut cell_numbers) = (Vec::new(), Vec::new());
+        let mut start = 0;
+        for (cell, (&kind, &end)) in types.iter().zip(&offsets).enumerate() {
+            let nodes = corners.get(start..end as usize).ok_or_else(|| {
+                self.damaged("offsets", format!("cell {cell} goes from {start} to {end} of {}", corners.len()))
+            })?;
+            start = end as usize;
+            let kind = kind as u8;
+            if kind == VTK_TETRA {
+                let node = |n: f64| Some(n as u32).filter(|&index| f64::from(index) == n);
+                let tet = match *nodes {
+                    [a, b, c, d] => [a, b, c, d].map(node),
+                    _ => return Err(self.damaged("offsets", format!("tetrahedron {cell} has {} nodes", nodes.len()))),
+                };
+                let [Some(a), Some(b), Some(c), Some(d)] = tet else {
+                    return Err(self.damaged("connectivity", format!("cell {cell} names nodes {nodes:?}")));
+                };
+                tets.push([a, b, c, d]);
+                cell_numbers.push(cell);
+            } else if !is_flat(kind) {
+                return Err(self.unsupported(
+                    "types",
+                    format!("cell {cell} has VTK type {kind}; only linear tetrahedra (10) are taken: split or convert"),
+                ));
+            }
+        }
+        Ok((tets, cell_numbers))
+    }
+
+    fn labels(&self, cell_numbers: &[usize]) -> Result<Vec<u8>, ReadError> {
+        let cell_arrays = || self.arrays.iter().filter(|a| a.section == "CellData");
+        let raw = ["label", "gmsh:physical"]
+            .iter()
+            .find_map(|name| cell_arrays().find(|a| a.name == *name))
+            .ok_or_else(|| {
+                let there: Vec<&str> = cell_arrays().map(|a| a.name.as_str()).collect();
+                let there = if there.is_empty() { "none".to_owned() } else { there.join(", ") };
+                self.unsupported(
+                    "label",
+                    format!(
+                        "the cells carry no label (cell arrays: {there}); \
+                         add an integer cell array `label`, such as 2 for grey and 3 for white matter"
+                    ),
+                )
+            })?;
+        let values = self.decode_array(raw)?;
+        if values.len() != self.cells {
+            return Err(self.damaged(&raw.name, format!("{} numbers for {} cells", values.len(), self.cells)));
+        }
+        let label = |&cell: &usize| {
+            let value = values[cell];
+            let label = value as u8;
+            if f64::from(label) == value {
+                return Ok(label);
+            }
+            Err(self.unsupported(&raw.name, format!("cell {cell} has label {value}; labels are whole, 0 to 255")))
+        };
+        cell_numbers.iter().map(label).collect()
+    }
+}
+
+/// VTK cell types of dimension 0, 1 and 2, linear and quadratic.
+fn is_flat(kind: u8) -> bool {
+    matches!(kind, 0..=9 | 21..=23 | 28 | 30 | 34..=36 | 68..=70 | 75..=77)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_tets() -> TetMesh {
+        let nodes =
+            vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [7.0, 0.1, 0.2]];
+        let mut mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3], [1, 2, 3, 4]], vec![2, 3]).unwrap();
+        mesh.set_nodes("base & <cut>", vec![0, 4]).unwrap();
+        mesh.set_nodes("nothing", vec![]).unwrap();
+        mesh.facet_sets.insert("falx".into(), vec![[1, 2, 3]]);
+        mesh
+    }
+
+    fn ascii(cells: &str, label: &str) -> String {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+             <Piece NumberOfPoints=\"4\" NumberOfCells=\"2\"><Points>\
+             <DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray>\
+             </Points><Cells>{cells}</Cells><CellData>{label}</CellData>\
+             <PointData><DataArray type=\"Float64\" Name=\"w\" format=\"ascii\">0 0.5 1 nan</DataArray></PointData>\
+             </Piece></UnstructuredGrid></VTKFile>"
+        )
+    }
+
+    const CELLS: &str = "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 0 1 2 3</DataArray>\
+         <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">3 7</DataArray>\
+         <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">5 10</DataArray>";
+    const LABEL: &str = "<DataArray type=\"Int32\" Name=\"label\" format=\"ascii\">9 3</DataArray>";
+
+    #[test]
+    fn what_is_written_is_read_back_equal() {
+        let mesh = two_tets();
+        let u = Field::vector("displacement", &[[0.1, -0.2, 1e-300]; 6]);
+        let (j, e) = (Field::scalar("jacobian", vec![1.0, f64::MAX]), Field::scalar("rmse_mm", vec![0.0; 6]));
+        let bytes = encode(&mesh, &[u.clone(), e.clone()], std::slice::from_ref(&j)).unwrap();
+        let back = decode(&bytes, "a.vtu").unwrap();
+        // A facet inside is stored on one side; which nodes it has is what survives here.
+        let facet = |m: &TetMesh| {
+            let mut f = m.facet_sets["falx"][0];
+            f.sort_unstable();
+            f
+        };
+        assert_eq!(facet(&back.mesh), facet(&mesh));
+        assert_eq!(back.mesh.node_sets, mesh.node_sets);
+        assert_eq!(
+            (back.mesh.nodes_mm(), back.mesh.tets(), back.mesh.labels()),
+            (mesh.nodes_mm(), mesh.tets(), mesh.labels())
+        );
+        assert_eq!((back.point_fields, back.cell_fields), (vec![u, e], vec![j]));
+        assert_eq!(encode(&mesh, &[], &[]), encode(&mesh, &[], &[]));
+    }
+
+    #[test]
+    fn triangles_beside_tetrahedra_are_passed_over() {
+        let read = decode(ascii(CELLS, LABEL).as_bytes(), "a.vtu").unwrap();
+        assert_eq!((read.mesh.tets(), read.mesh.labels()), ([[0, 1, 2, 3]].as_slice(), [3].as_slice()));
+        assert_eq!(read.point_field("w").unwrap().values[1], 0.5);
+        assert!(read.mesh.node_sets.is_empty());
+    }
+
+    #[test]
+    fn every_refusal_names_file_and_field() {
+        let refuse = |text: String| decode(text.as_bytes(), "bad.vtu").unwrap_err().to_string();
+        let says = |text: String, words: &[&str]| {
+            let message = refuse(text);
+            assert!(words.iter().all(|w| message.contains(w)) && message.starts_with("bad.vtu: "), "{message}");
+        };
+        let good = ascii(CELLS, LABEL);
+        says(ascii(CELLS, ""), &["label", "cell arrays: none", "add an integer cell array"]);
+        says(ascii(CELLS, &LABEL.replace("label", "mat")), &["label", "cell arrays: mat"]);
+        says(ascii(CELLS, &LABEL.replace("9 3", "9 300")), &["cell 1 has label 300"]);
+        says(ascii(CELLS, &LABEL.replace("9 3", "9 nan")), &["cell 1 has label NaN"]);
+        says(ascii(CELLS, &LABEL.replace("9 3", "3")), &["label", "1 numbers for 2 cells"]);
+        says(ascii(&CELLS.replace("5 10", "5 24"), LABEL), &["types", "cell 1 has VTK type 24"]);
+        says(ascii(&CELLS.replace("0 1 2 3", "0 2 1 3"), LABEL), &["tetrahedron 0", "inverted or flat"]);
+        says(ascii(&CELLS.replace("0 1 2 3", "0 1 1 3"), LABEL), &["tetrahedron 0", "inverted or flat"]);
+        says(ascii(&CELLS.replace("0 1 2 3", "0 1 2 8"), LABEL), &["names node 8"]);
+        says(ascii(&CELLS.replace("0 1 2 3", "0 1 2 -3"), LABEL), &["connectivity", "cell 1"]);
+        says(ascii(&CELLS.replace("3 7", "7 3"), LABEL), &["connectivity"]);
+        says(good.replace("0 0 1</", "0 0 nan</"), &["node 3", "not a finite number"]);
+        says(good.replace("0 0 1</", "0 0 x</"), &["Points", "`x` is not a number"]);
+        says(good.replace("0 0 1</", "0 0</"), &["Points", "11 numbers, not 12"]);
+        says(good.replace("UnstructuredGrid\" byte", "PolyData\" byte"), &["VTKFile", "PolyData"]);
+        says(good.replace("\"LittleEndian\"", "\"LittleEndian\" compressor=\"vtkLZ4DataCompressor\""), &["zlib"]);
+        says(good.replace("NumberOfCells=\"2\"", "NumberOfCells=\"two\""), &["Piece", "`two`"]);
+        says(String::new(), &["XML", "ends before"]);
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_refused() {
+        let whole = encode(&two_tets(), &[Field::scalar("w", vec![0.5; 6])], &[]).unwrap();
+        let end = whole.len() - "</VTKFile>\n".len();
+        for length in (0..=end).step_by(7) {
+            assert!(decode(&whole[..length], "cut.vtu").is_err(), "cut at {length} of {}", whole.len());
+        }
+    }
+
+    #[test]
+    fn fields_that_do_not_fit_are_not_written() {
+        let short = Field::scalar("w", vec![0.0; 5]);
+        assert!(matches!(encode(&two_tets(), &[short], &[]), Err(WriteError::FieldLength { found: 5, .. })));
+        let twice = Field::scalar("label", vec![0.0; 2]);
+        assert!(matches!(encode(&two_tets(), &[], &[twice]), Err(WriteError::Duplicate { .. })));
+    }
+}
