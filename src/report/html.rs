@@ -1,0 +1,95 @@
+//! Text that is safe inside HTML, SVG and inline scripts.
+
+/// Text for element content and quoted attributes.
+///
+/// ```
+/// assert_eq!(hgm::report::html::escape("<b>\"5 & 6\"</b>"), "&lt;b&gt;&quot;5 &amp; 6&quot;&lt;/b&gt;");
+/// ```
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            // Control characters are not allowed in HTML, whatever a header or a warning brings along.
+            c if c.is_control() && c != '\n' && c != '\t' => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// JSON for a `<script type="application/json">`: `<`, `>`, `&` as escapes, so that neither `</script` nor `<!--`
+/// can end or hide the element (HTML standard, "restrictions for contents of script elements").
+pub fn script_json(value: &serde_json::Value) -> String {
+    let text = value.to_string();
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '<' => safe.push_str("\\u003c"),
+            '>' => safe.push_str("\\u003e"),
+            '&' => safe.push_str("\\u0026"),
+            '\u{2028}' => safe.push_str("\\u2028"),
+            '\u{2029}' => safe.push_str("\\u2029"),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// A `data:` address holding a PNG.
+pub fn png_address(png: &[u8]) -> String {
+    use base64::Engine;
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+}
+
+/// A number for a reader: `digits` significant digits, thousands apart with a thin space, no exponent.
+pub fn number(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    let decimals = (digits as i32 - 1 - magnitude).clamp(0, 9) as usize;
+    let text = format!("{:.*}", decimals, value.abs());
+    let (whole, fraction) = text.split_once('.').map_or((text.as_str(), None), |(w, f)| (w, Some(f)));
+    let mut grouped = String::new();
+    for (n, c) in whole.chars().enumerate() {
+        if n > 0 && (whole.len() - n) % 3 == 0 && whole.len() > 4 {
+            grouped.push('\u{2009}');
+        }
+        grouped.push(c);
+    }
+    let sign = if value < 0.0 && text.chars().any(|c| c.is_ascii_digit() && c != '0') { "\u{2212}" } else { "" };
+    fraction.map_or_else(|| format!("{sign}{grouped}"), |f| format!("{sign}{grouped}.{f}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn script_json_cannot_close_its_element() {
+        let value = serde_json::json!({"note": "</script><!-- & \u{2028}"});
+        let text = script_json(&value);
+        assert!(!text.contains('<') && !text.contains('\u{2028}'));
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
+    }
+
+    #[test]
+    fn control_characters_never_pass() {
+        assert_eq!(escape("a\u{0}b\u{1b}c\nd"), "a\u{fffd}b\u{fffd}c\nd");
+    }
+
+    #[test]
+    fn numbers_keep_their_significant_digits() {
+        assert_eq!(number(0.012345, 3), "0.0123");
+        assert_eq!(number(333.28, 4), "333.3");
+        assert_eq!(number(61234.0, 3), "61\u{2009}234");
+        assert_eq!(number(-2.5, 2), "\u{2212}2.5");
+        assert_eq!(number(f64::NAN, 3), "–");
+        assert_eq!(number(0.0, 3), "0.00");
+    }
+}
