@@ -8,17 +8,18 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Which experiment was run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExperimentKind {
     /// A reference simulated with known moduli, looked for again among the samples.
     Phantom,
+    #[default]
     /// A patient: the rest mesh without the resected tissue against the post-operative surfaces.
     Resection,
 }
 
 /// One experiment: settings' worth of samples against one reference.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentOutcome {
     /// Which experiment.
@@ -34,6 +35,9 @@ pub struct ExperimentOutcome {
     /// RMSE of the undeformed mesh per node set, mm: what a sample must beat.
     #[serde(default)]
     pub rest_rmse_mm: BTreeMap<String, f64>,
+    /// The moduli behind the reference where they are known (a phantom's truth), Pa per tissue.
+    #[serde(default)]
+    pub reference_shear_modulus_pa: BTreeMap<String, f64>,
     /// Measurement errors below which differences mean nothing.
     #[serde(default)]
     pub noise_floor: Option<NoiseFloor>,
@@ -58,7 +62,7 @@ pub struct ExperimentOutcome {
 }
 
 /// One simulation of a sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SampleOutcome {
     /// Name of the sample, part of its file's name: `sample-05`.
@@ -91,7 +95,7 @@ pub struct SampleOutcome {
 }
 
 /// A law and its parameters, as a scenario writes them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawOutcome {
     /// `neo-hookean`, `mooney-rivlin`, `ogden`.
@@ -146,7 +150,7 @@ pub struct ResectionVolumes {
 }
 
 /// One boundary set of the mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SetOutcome {
     /// Name: `ventricle`, `margin`, `base`, `falx`, `superior`.
@@ -162,7 +166,7 @@ pub struct SetOutcome {
 }
 
 /// One rigid registration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegistrationOutcome {
     /// Frame of the moving image: `post`.
@@ -184,7 +188,7 @@ pub struct RegistrationOutcome {
 }
 
 /// A mesh in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshOutcome {
     /// The meshing engine: `lattice`, `cgal`, `gmsh`, `tetgen`.
@@ -202,6 +206,12 @@ pub struct MeshOutcome {
     /// Tetrahedra with a dihedral angle below 10 degrees, percent.
     #[serde(default)]
     pub dihedral_below_10_percent: Option<f64>,
+    /// Dihedral angles in 18 parts of 10 degrees.
+    #[serde(default)]
+    pub dihedral_counts: Vec<usize>,
+    /// Smallest radius ratio (1 is regular).
+    #[serde(default)]
+    pub radius_ratio_min: Option<f64>,
     /// Mean radius ratio (1 is regular).
     #[serde(default)]
     pub radius_ratio_mean: Option<f64>,
@@ -281,14 +291,7 @@ mod tests {
             tissues: vec!["grey_matter".to_owned()],
             samples: vec![sample(0, 2.0), sample(1, 0.5)],
             best_sample: Some("sample-01".to_owned()),
-            rest_rmse_mm: BTreeMap::new(),
-            noise_floor: None,
-            volumes: None,
-            sets: vec![],
-            registrations: vec![],
-            mesh: None,
-            loads: vec![],
-            warnings: vec![],
+            ..ExperimentOutcome::default()
         }
     }
 

@@ -83,7 +83,7 @@ impl ColourScale {
 
 /// Round numbers that divide `low..=high` into about `count` parts.
 pub fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
-    if !(high > low) || !(high - low).is_finite() {
+    if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) || !(high - low).is_finite() {
         return vec![low];
     }
     let raw = (high - low) / count.max(1) as f64;
