@@ -1,8 +1,8 @@
 //! Surfaces, tetrahedral meshes, quality, mesh formats, meshing engines.
 
 mod closest_point;
-mod isosurface;
 pub mod format;
+mod isosurface;
 mod tet_mesh;
 mod tri_mesh;
 

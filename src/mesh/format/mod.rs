@@ -2,11 +2,20 @@
 //!
 //! Labels and boundary sets survive every format in the way its common readers keep them: see each file.
 
+pub mod feb;
+pub mod gifti;
+pub mod inp;
+pub mod msh;
+pub mod ply;
+pub mod pvd;
+pub mod stl;
 mod vtk_array;
 pub mod vtu;
 
 use super::{MeshError, TET_FACES, TetMesh};
+use crate::segment::label;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::{Arguments, Write};
 use thiserror::Error;
 
 /// Numbers on nodes or on cells, `components` each, in order of node or tetrahedron.
@@ -84,6 +93,22 @@ pub enum WriteError {
     TooMany { what: String, count: usize },
 }
 
+/// Adds one line of text.
+fn line(text: &mut String, words: Arguments<'_>) {
+    writeln!(text, "{words}").expect("writing to memory does not fail");
+}
+
+/// What formats with names call a label: `grey_matter`, or `label_17` for one without a name.
+fn label_name(label: u8) -> String {
+    label::name(label).map_or_else(|| format!("label_{label}"), str::to_owned)
+}
+
+/// A name of letters, digits and underscores that starts with a letter, for formats that take no others.
+fn plain_name(name: &str) -> String {
+    let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    if plain.starts_with(|c: char| c.is_ascii_alphabetic()) { plain } else { format!("set_{plain}") }
+}
+
 /// Refuses fields of the wrong length and names that occur twice (`taken` are names the format itself uses).
 fn check_fields(fields: &[Field], places: usize, taken: &[&str]) -> Result<(), WriteError> {
     let mut names: BTreeSet<&str> = taken.iter().copied().collect();
@@ -105,8 +130,9 @@ fn check_fields(fields: &[Field], places: usize, taken: &[&str]) -> Result<(), W
     Ok(())
 }
 
-/// For every facet of `facets`, the tetrahedron and local face it belongs to; the one that sees the facet outward
-/// is preferred, so that a facet inside the mesh keeps its side. Facets of no tetrahedron are left out.
+/// For every facet of `facets`, the tetrahedron and local face it belongs to (see [`TET_FACES`]); the one that sees
+/// the facet outward is preferred, so that a facet inside the mesh keeps its side. Facets of no tetrahedron are left
+/// out.
 fn facet_owners(mesh: &TetMesh, facets: &[[u32; 3]]) -> Vec<(usize, usize)> {
     let sorted = |mut f: [u32; 3]| {
         f.sort_unstable();
