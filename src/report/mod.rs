@@ -2,7 +2,10 @@
 
 pub mod chart;
 pub mod colour;
+pub mod figure;
 pub mod html;
+pub mod page;
 pub mod picture;
 pub mod render;
 pub mod slice;
+pub mod viewer;

@@ -1,0 +1,159 @@
+//! The methods paragraph, what to cite, and BibTeX.
+
+use super::super::html::{escape, number};
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use std::fmt::Write;
+
+/// A work to cite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reference {
+    /// Key in BibTeX.
+    pub key: &'static str,
+    /// The citation as text.
+    pub text: &'static str,
+    /// The BibTeX entry.
+    pub bibtex: &'static str,
+}
+
+const GENERATIVE_MODEL: Reference = Reference {
+    key: "Granados2021",
+    text: "A. Granados, F. Pérez-García, M. Schweiger, V. Vakharia, S. B. Vos, A. Miserocchi, A. W. McEvoy, J. S. Duncan, \
+           R. Sparks, S. Ourselin. A generative model of hyperelastic strain energy density functions for multiple tissue \
+           brain deformation. International Journal of Computer Assisted Radiology and Surgery 16, 141–150, 2021. \
+           doi:10.1007/s11548-020-02284-y",
+    bibtex: "@article{Granados2021,\n  author  = {Granados, Alejandro and P{\\'e}rez-Garc{\\'i}a, Fernando and Schweiger, Martin and \
+             Vakharia, Vejay and Vos, Sjoerd B. and Miserocchi, Anna and McEvoy, Andrew W. and Duncan, John S. and \
+             Sparks, Rachel and Ourselin, S{\\'e}bastien},\n  title   = {A generative model of hyperelastic strain energy \
+             density functions for multiple tissue brain deformation},\n  journal = {International Journal of Computer \
+             Assisted Radiology and Surgery},\n  volume  = {16},\n  pages   = {141--150},\n  year    = {2021},\n  doi     = \
+             {10.1007/s11548-020-02284-y}\n}",
+};
+
+const MUTUAL_INFORMATION: Reference = Reference {
+    key: "Mattes2003",
+    text: "D. Mattes, D. R. Haynor, H. Vesselle, T. K. Lewellen, W. Eubank. PET-CT image registration in the chest using \
+           free-form deformations. IEEE Transactions on Medical Imaging 22, 120–128, 2003. doi:10.1109/TMI.2003.809072",
+    bibtex: "@article{Mattes2003,\n  author  = {Mattes, David and Haynor, David R. and Vesselle, Hubert and Lewellen, Thomas K. \
+             and Eubank, William},\n  title   = {{PET-CT} image registration in the chest using free-form \
+             deformations},\n  journal = {IEEE Transactions on Medical Imaging},\n  volume  = {22},\n  number  = {1},\n  pages   = \
+             {120--128},\n  year    = {2003},\n  doi     = {10.1109/TMI.2003.809072}\n}",
+};
+
+const TEMPLATE: Reference = Reference {
+    key: "Fonov2011",
+    text: "V. Fonov, A. C. Evans, K. Botteron, C. R. Almli, R. C. McKinstry, D. L. Collins, Brain Development Cooperative \
+           Group. Unbiased average age-appropriate atlases for pediatric studies. NeuroImage 54, 313–327, 2011. \
+           doi:10.1016/j.neuroimage.2010.07.033",
+    bibtex: "@article{Fonov2011,\n  author  = {Fonov, Vladimir and Evans, Alan C. and Botteron, Kelly and Almli, C. Robert and \
+             McKinstry, Robert C. and Collins, D. Louis and {Brain Development Cooperative Group}},\n  title   = {Unbiased \
+             average age-appropriate atlases for pediatric studies},\n  journal = {NeuroImage},\n  volume  = {54},\n  number  = \
+             {1},\n  pages   = {313--327},\n  year    = {2011},\n  doi     = {10.1016/j.neuroimage.2010.07.033}\n}",
+};
+
+const CGAL: Reference = Reference {
+    key: "CGAL",
+    text: "The CGAL Project. CGAL User and Reference Manual. CGAL Editorial Board. https://www.cgal.org",
+    bibtex: "@manual{CGAL,\n  author = {{The CGAL Project}},\n  title  = {{CGAL} User and Reference Manual},\n  organization = \
+             {{CGAL Editorial Board}},\n  url    = {https://www.cgal.org}\n}",
+};
+
+/// What a reader of this outcome should cite, in the order of the text.
+pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
+    let mut all = vec![GENERATIVE_MODEL, TEMPLATE];
+    if !outcome.registrations.is_empty() {
+        all.push(MUTUAL_INFORMATION);
+    }
+    if outcome.mesh.as_ref().is_some_and(|m| m.engine == "cgal") {
+        all.push(CGAL);
+    }
+    all
+}
+
+/// The paragraph, the references and their BibTeX.
+pub fn section(outcome: &ExperimentOutcome) -> String {
+    let references = references(outcome);
+    let mut html =
+        format!("<p>Text that may be used as it stands:</p><blockquote>{}</blockquote>\n", paragraph(outcome));
+    html += "<h3>References</h3><ol class=\"references\">";
+    for r in &references {
+        let _ = write!(html, "<li id=\"ref-{}\">{}</li>", r.key, escape(r.text));
+    }
+    let bibtex: Vec<&str> = references.iter().map(|r| r.bibtex).collect();
+    let _ = write!(
+        html,
+        "</ol><details><summary>BibTeX</summary><pre tabindex=\"0\" aria-label=\"BibTeX\">{}</pre></details>\n",
+        escape(&bibtex.join("\n\n"))
+    );
+    html
+}
+
+fn list(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+fn paragraph(outcome: &ExperimentOutcome) -> String {
+    let references = references(outcome);
+    let cite = |r: Reference| {
+        let number = references.iter().position(|other| *other == r).map_or(0, |n| n + 1);
+        format!("<a href=\"#ref-{}\">[{number}]</a>", r.key)
+    };
+    let mut text = format!("Simulations were made with hgm {}, research software", env!("CARGO_PKG_VERSION"));
+    text += &match outcome.kind {
+        ExperimentKind::Phantom => {
+            format!(", on the MNI152NLin2009aSym template {}. ", cite(TEMPLATE))
+        }
+        ExperimentKind::Resection => format!(
+            ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
+             MNI152NLin2009aSym template {}{}, so that sizes stay the patient&#39;s. Resected tissue was removed from the \
+             mesh. ",
+            cite(TEMPLATE),
+            if outcome.registrations.is_empty() {
+                String::new()
+            } else {
+                format!(", maximising Mattes mutual information {}", cite(MUTUAL_INFORMATION))
+            }
+        ),
+    };
+    if let Some(mesh) = &outcome.mesh {
+        let engine = if mesh.engine == "cgal" {
+            format!("CGAL {}", cite(CGAL))
+        } else {
+            format!("its engine {}", escape(&mesh.engine))
+        };
+        let _ = write!(
+            text,
+            "The brain was meshed with {engine} into {} tetrahedra and {} nodes. ",
+            number(mesh.tets as f64, 9),
+            number(mesh.nodes as f64, 9)
+        );
+    }
+    let tissues: Vec<String> = outcome.tissues.iter().map(|t| escape(&t.replace('_', " "))).collect();
+    let mut laws: Vec<String> = outcome.samples.iter().flat_map(|s| s.laws.values().map(|l| escape(&l.law))).collect();
+    laws.sort();
+    laws.dedup();
+    if !tissues.is_empty() {
+        let law = if laws.is_empty() { String::new() } else { format!(" through {} meta-models", list(&laws)) };
+        let _ = write!(
+            text,
+            "Material parameters of {} were sampled at {} points of a Gaussian-process model of the literature{law} {}. ",
+            list(&tissues),
+            outcome.samples.len(),
+            cite(GENERATIVE_MODEL)
+        );
+    }
+    if !outcome.loads.is_empty() {
+        let loads: Vec<String> = outcome.loads.iter().map(|l| escape(l)).collect();
+        let _ = write!(text, "Loads: {}. ", list(&loads));
+    }
+    let _ = write!(
+        text,
+        "Each static equilibrium was compared with {} by the root mean square over nodes of the distance, \
+         RMSE = √(Σ|u − u<sub>ref</sub>|² / S).",
+        escape(&outcome.reference)
+    );
+    text
+}

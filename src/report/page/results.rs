@@ -1,0 +1,477 @@
+//! Summary, tables and charts of an outcome, as HTML.
+
+use super::super::chart::{DataPoint, HeatMap, LineChart, Rule, Series, colour_bar};
+use super::super::colour::ColourScale;
+use super::super::html::{escape, number};
+use super::parts::quantity;
+use crate::experiment::outcome::{
+    ExperimentKind, ExperimentOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
+};
+use std::fmt::Write;
+
+/// A set's name for readers.
+pub fn set_name(set: &str) -> String {
+    match set {
+        "all" => "all nodes".to_owned(),
+        "ventricle" => "the ventricle wall".to_owned(),
+        "margin" => "the resection margin".to_owned(),
+        other => other.replace('_', " "),
+    }
+}
+
+fn tissue_name(tissue: &str) -> String {
+    tissue.replace('_', " ")
+}
+
+/// Median and spread in words.
+pub fn spread(values: &[f64]) -> String {
+    let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    finite.sort_unstable_by(f64::total_cmp);
+    let Some(last) = finite.len().checked_sub(1) else { return "no values".to_owned() };
+    let at = |q: f64| number(finite[(q * last as f64).round() as usize], 3);
+    format!("{} nodes: median {} mm, 95 % below {} mm, largest {} mm", finite.len(), at(0.5), at(0.95), at(1.0))
+}
+
+/// A table that scrolls on its own when the page is narrow. Cells are HTML.
+fn table(caption: &str, head: &[String], rows: &[(bool, Vec<String>)]) -> String {
+    let mut html = format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
+        escape(caption)
+    );
+    for cell in head {
+        let _ = write!(html, "<th scope=\"col\">{cell}</th>");
+    }
+    html.push_str("</tr></thead><tbody>");
+    for (chosen, row) in rows {
+        html.push_str(if *chosen { "<tr class=\"best\">" } else { "<tr>" });
+        for (n, cell) in row.iter().enumerate() {
+            let _ =
+                if n == 0 { write!(html, "<th scope=\"row\">{cell}</th>") } else { write!(html, "<td>{cell}</td>") };
+        }
+        html.push_str("</tr>");
+    }
+    html + "</tbody></table></div>\n"
+}
+
+fn tile(name: &str, value: &str, note: &str) -> String {
+    let note = if note.is_empty() { String::new() } else { format!("<span class=\"note\">{note}</span>") };
+    format!("<div><dt>{name}</dt><dd>{value}{note}</dd></div>")
+}
+
+/// Key figures and one sentence on what they say.
+pub fn summary(outcome: &ExperimentOutcome) -> String {
+    let mut html = format!("<p class=\"lead\">{}</p>\n<dl class=\"figures\">", sentence(outcome));
+    if let Some(best) = outcome.best() {
+        for set in outcome.rmse_sets() {
+            let Some(&rmse) = best.rmse_mm.get(&set) else { continue };
+            let note = outcome
+                .rest_rmse_mm
+                .get(&set)
+                .map_or_else(String::new, |rest| format!("undeformed: {} mm", number(*rest, 3)));
+            html += &tile(&format!("RMSE, {}", escape(&set_name(&set))), &quantity(Some(rmse), 3, "mm"), &note);
+        }
+        for (tissue, modulus) in &best.shear_modulus_pa {
+            let truth = outcome.reference_shear_modulus_pa.get(tissue);
+            let truth = truth.map(|t| format!("reference: {} Pa", number(*t, 5)));
+            let level = best.sd_levels.get(tissue).map(|level| format!("{} SD of the prior", signed(*level)));
+            let note = truth.or(level).unwrap_or_default();
+            let name = format!("Shear modulus, {}", escape(&tissue_name(tissue)));
+            html += &tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note);
+        }
+    }
+    if let Some(v) = &outcome.volumes {
+        html += &volume_tiles(v);
+    }
+    if let Some(floor) = outcome.noise_floor {
+        let part = |name: &str, mm: Option<f64>| mm.map(|mm| format!("{name} {} mm", number(mm, 2)));
+        let parts: Vec<String> = [
+            part("registration", floor.registration_mm),
+            part("voxel", floor.voxel_mm),
+            part("segmentation", floor.segmentation_mm),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        html += &tile("Measurement error", &quantity(floor.combined_mm(), 2, "mm"), &parts.join(", "));
+    }
+    if let Some(mesh) = &outcome.mesh {
+        let note = format!("{} nodes, engine {}", number(mesh.nodes as f64, 9), escape(&mesh.engine));
+        html += &tile("Tetrahedra", &number(mesh.tets as f64, 9), &note);
+    }
+    html + "</dl>\n"
+}
+
+fn volume_tiles(v: &ResectionVolumes) -> String {
+    let mut html = String::new();
+    if v.resected_cc.is_some() {
+        html += &tile("Resected tissue", &quantity(v.resected_cc, 3, "cc"), "on the image before surgery");
+    }
+    if v.cavity_cc.is_some() {
+        html += &tile("Cavity", &quantity(v.cavity_cc, 3, "cc"), "on the image after surgery");
+    }
+    if v.ventricle_before_cc.is_some() {
+        let note = v.ventricle_after_cc.map_or_else(String::new, |after| format!("after: {} cc", number(after, 3)));
+        html += &tile("Ventricles before surgery", &quantity(v.ventricle_before_cc, 3, "cc"), &note);
+    }
+    if v.brain_cc.is_some() {
+        html += &tile("Brain before surgery", &quantity(v.brain_cc, 4, "cc"), "");
+    }
+    html
+}
+
+fn signed(level: f64) -> String {
+    if level > 0.0 { format!("+{level}") } else { format!("{}", level + 0.0).replace('-', "\u{2212}") }
+}
+
+fn sentence(outcome: &ExperimentOutcome) -> String {
+    let converged = outcome.samples.iter().filter(|s| s.converged).count();
+    let count = format!("{converged} of {} simulations converged.", outcome.samples.len());
+    let Some(best) = outcome.best() else {
+        return format!("{count} There is no best sample. Compared with: {}.", escape(&outcome.reference));
+    };
+    let best_id = escape(&best.id);
+    let verdict = match outcome.kind {
+        ExperimentKind::Phantom => format!("The sample nearest to the reference is {best_id}."),
+        ExperimentKind::Resection => {
+            let sets = outcome.rmse_sets();
+            let gain = sets.iter().find_map(|set| Some((set, outcome.rest_rmse_mm.get(set)?, best.rmse_mm.get(set)?)));
+            gain.map_or_else(String::new, |(set, rest, rmse)| {
+                let percent = number((100.0 * (rest - rmse) / rest).abs(), 2);
+                let set = escape(&set_name(set));
+                if rmse < rest {
+                    format!("The best sample, {best_id}, takes away {percent} % of the error at {set}.")
+                } else {
+                    format!("The best sample, {best_id}, does not come nearer than no deformation at {set}.")
+                }
+            })
+        }
+    };
+    format!("{count} {verdict} Compared with: {}.", escape(&outcome.reference))
+}
+
+/// Registrations in numbers.
+pub fn registrations(all: &[RegistrationOutcome]) -> Option<String> {
+    if all.is_empty() {
+        return None;
+    }
+    let head = ["registration", "rotation (°)", "translation x, y, z (mm)", "similarity", "before", "after"];
+    let rows: Vec<(bool, Vec<String>)> = all
+        .iter()
+        .map(|r| {
+            let shift: Vec<String> = r.translation_mm.iter().map(|t| number(*t, 3)).collect();
+            let similarity = |s: Option<f64>| s.map_or_else(|| "–".to_owned(), |s| number(s, 4));
+            let cells = vec![
+                format!("{} to {}", escape(&r.moving), escape(&r.fixed)),
+                number(r.rotation_deg, 3),
+                shift.join(", "),
+                escape(&r.similarity),
+                similarity(r.similarity_before),
+                similarity(r.similarity_after),
+            ];
+            (false, cells)
+        })
+        .collect();
+    Some(table("Rigid registrations", &head.map(str::to_owned), &rows))
+}
+
+/// Mesh quality and boundary sets.
+pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
+    let mut html = String::new();
+    if let Some(m) = &outcome.mesh {
+        let optional = |v: Option<f64>, digits, unit: &str| {
+            v.map_or_else(|| "–".to_owned(), |v| format!("{} {unit}", number(v, digits)))
+        };
+        let mut rows = vec![
+            ("engine".to_owned(), escape(&m.engine)),
+            ("nodes".to_owned(), number(m.nodes as f64, 9)),
+            ("tetrahedra".to_owned(), number(m.tets as f64, 9)),
+            ("smallest dihedral angle".to_owned(), optional(m.dihedral_min_deg, 3, "°")),
+            ("tetrahedra below 10°".to_owned(), optional(m.dihedral_below_10_percent, 2, "%")),
+            ("radius ratio, mean".to_owned(), optional(m.radius_ratio_mean, 3, "")),
+            ("radius ratio, smallest".to_owned(), optional(m.radius_ratio_min, 3, "")),
+            ("scaled Jacobian, smallest".to_owned(), optional(m.scaled_jacobian_min, 3, "")),
+        ];
+        for (name, cc) in &m.volume_cc {
+            rows.push((format!("volume, {}", escape(&tissue_name(name))), format!("{} cc", number(*cc, 4))));
+        }
+        let rows: Vec<_> = rows.into_iter().map(|(name, value)| (false, vec![name, value])).collect();
+        let quality = table("Mesh", &["".to_owned(), "value".to_owned()], &rows);
+        html += "<div class=\"columns\">";
+        html += &quality;
+        if !m.dihedral_counts.is_empty() {
+            html += &format!("<figure>{}</figure>", dihedral_chart(&m.dihedral_counts));
+        }
+        html += "</div>";
+    }
+    if !outcome.sets.is_empty() {
+        let head = ["set", "nodes", "area (mm²)", "centre x, y, z (mm)"].map(str::to_owned);
+        let rows: Vec<_> = outcome
+            .sets
+            .iter()
+            .map(|s| {
+                let centre = s.centroid_mm.map(|c| c.map(|x| number(x, 3)).join(", "));
+                let area = s.area_mm2.map(|a| number(a, 4));
+                let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
+                let cells = vec![escape(&s.name), number(s.nodes as f64, 9), or_dash(area), or_dash(centre)];
+                (false, cells)
+            })
+            .collect();
+        html += &table("Boundary sets", &head, &rows);
+    }
+    (!html.is_empty()).then_some(html)
+}
+
+fn dihedral_chart(counts: &[usize]) -> String {
+    let width = 180.0 / counts.len() as f64;
+    let points = counts.iter().enumerate().map(|(n, &count)| DataPoint {
+        x: (n as f64 + 0.5) * width,
+        y: count as f64,
+        y_error: None,
+        note: format!("{:.0} to {:.0}°: {count}", n as f64 * width, (n + 1) as f64 * width),
+        chosen: false,
+    });
+    let chart = LineChart {
+        description: "Dihedral angles of the mesh: number of angles over the angle in degrees".to_owned(),
+        x_label: "dihedral angle (°)".to_owned(),
+        y_label: "angles".to_owned(),
+        y_from_zero: true,
+        series: vec![Series { name: "angles".to_owned(), points: points.collect() }],
+        ..LineChart::default()
+    };
+    chart.to_svg()
+}
+
+/// Table and curves of the samples.
+pub fn samples(outcome: &ExperimentOutcome) -> String {
+    let mut html = String::from("<div class=\"charts\">");
+    let grid = Grid::of(outcome);
+    if let Some(grid) = &grid {
+        for set in outcome.rmse_sets() {
+            html += &grid.figure(outcome, &set);
+        }
+    } else {
+        html += &format!("<figure>{}<figcaption>{}</figcaption></figure>", curve(outcome), curve_caption(outcome));
+    }
+    html += "</div>\n";
+    let table = sample_table(outcome);
+    if outcome.samples.len() > 20 {
+        html += &format!("<details><summary>All {} samples</summary>{table}</details>\n", outcome.samples.len());
+    } else {
+        html += &table;
+    }
+    html
+}
+
+fn curve_caption(outcome: &ExperimentOutcome) -> String {
+    let floor = outcome.noise_floor.and_then(|f| f.combined_mm());
+    let floor = floor.map_or("", |_| " Differences below the measurement error mean nothing.");
+    format!("RMSE of every sample; the ring marks the best one.{floor}")
+}
+
+/// RMSE over the modulus (one tissue) or over the SD level (several tissues that move together).
+fn curve(outcome: &ExperimentOutcome) -> String {
+    let one = outcome.tissues.len() == 1;
+    let tissue = outcome.tissues.first().cloned().unwrap_or_default();
+    let abscissa =
+        |s: &SampleOutcome| if one { s.shear_modulus_pa.get(&tissue) } else { s.sd_levels.get(&tissue) }.copied();
+    let mut series = Vec::new();
+    for set in outcome.rmse_sets() {
+        let mut points: Vec<DataPoint> = outcome
+            .samples
+            .iter()
+            .filter_map(|s| {
+                let moduli: Vec<String> = s
+                    .shear_modulus_pa
+                    .iter()
+                    .map(|(t, mu)| format!("{} {} Pa", tissue_name(t), number(*mu, 4)))
+                    .collect();
+                let y = s.rmse_mm.get(&set).copied().unwrap_or(f64::NAN);
+                let note = format!("{}: {} mm; {}", s.id, number(y, 3), moduli.join(", "));
+                let chosen = outcome.best_sample.as_deref() == Some(s.id.as_str());
+                Some(DataPoint { x: abscissa(s)?, y, y_error: None, note, chosen })
+            })
+            .collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        if points.iter().any(|p| p.y.is_finite()) {
+            series.push(Series { name: set_name(&set), points });
+        }
+    }
+    let mut y_rules: Vec<Rule> = outcome
+        .rest_rmse_mm
+        .iter()
+        .map(|(set, mm)| Rule { at: *mm, name: format!("undeformed, {}", set_name(set)) })
+        .collect();
+    let floor = outcome.noise_floor.and_then(|f| f.combined_mm());
+    y_rules.extend(floor.map(|mm| Rule { at: mm, name: "measurement error".to_owned() }));
+    let truth = outcome.reference_shear_modulus_pa.get(&tissue).filter(|_| one);
+    let x_label = if one {
+        format!("shear modulus of {} (Pa)", tissue_name(&tissue))
+    } else {
+        "level of the prior (SD from its mean, all tissues)".to_owned()
+    };
+    let chart = LineChart {
+        description: format!("RMSE of the samples over the {x_label}"),
+        x_label,
+        y_label: "RMSE (mm)".to_owned(),
+        x_log: one,
+        y_from_zero: true,
+        series,
+        y_rules,
+        x_rules: truth.map(|t| Rule { at: *t, name: "reference".to_owned() }).into_iter().collect(),
+        ..LineChart::default()
+    };
+    chart.to_svg()
+}
+
+/// Samples of two tissues on a full grid.
+struct Grid {
+    /// Tissue of the columns and of the rows.
+    tissues: [String; 2],
+    /// Moduli of the columns and of the rows, ascending.
+    moduli_pa: [Vec<f64>; 2],
+    /// Sample number at [row][column].
+    samples: Vec<Vec<usize>>,
+}
+
+impl Grid {
+    fn of(outcome: &ExperimentOutcome) -> Option<Self> {
+        let [a, b] = <[String; 2]>::try_from(outcome.tissues.clone()).ok()?;
+        let distinct = |tissue: &String| {
+            let mut values: Vec<f64> =
+                outcome.samples.iter().filter_map(|s| s.shear_modulus_pa.get(tissue).copied()).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            values.dedup();
+            values
+        };
+        let moduli_pa = [distinct(&a), distinct(&b)];
+        if moduli_pa.iter().any(|m| m.len() < 2) {
+            return None;
+        }
+        let find = |x: f64, y: f64| {
+            outcome
+                .samples
+                .iter()
+                .position(|s| s.shear_modulus_pa.get(&a) == Some(&x) && s.shear_modulus_pa.get(&b) == Some(&y))
+        };
+        let row = |y: &f64| moduli_pa[0].iter().map(|x| find(*x, *y)).collect::<Option<Vec<usize>>>();
+        let samples = moduli_pa[1].iter().map(row).collect::<Option<Vec<_>>>()?;
+        Some(Self { tissues: [a, b], moduli_pa, samples })
+    }
+
+    fn figure(&self, outcome: &ExperimentOutcome, set: &str) -> String {
+        let rmse = |n: usize| outcome.samples[n].rmse_mm.get(set).copied().unwrap_or(f64::NAN);
+        let values: Vec<Vec<f64>> = self.samples.iter().map(|row| row.iter().map(|n| rmse(*n)).collect()).collect();
+        let title = format!("RMSE, {} (mm)", set_name(set));
+        let Some(scale) = ColourScale::over(values.iter().flatten().copied(), &title) else { return String::new() };
+        let names = |axis: usize| self.moduli_pa[axis].iter().map(|m| number(*m, 4)).collect::<Vec<_>>();
+        let place = |id: &String| {
+            let at = |n: &usize| &outcome.samples[*n].id == id;
+            let row = self.samples.iter().position(|row| row.iter().any(at))?;
+            Some((row, self.samples[row].iter().position(at)?))
+        };
+        let [a, b] = self.tissues.each_ref().map(|t| tissue_name(t));
+        let map = HeatMap {
+            description: format!("{title} over the shear moduli of {a} and {b}, smallest {}", number(scale.low, 3)),
+            x_label: format!("shear modulus of {a} (Pa)"),
+            y_label: format!("shear modulus of {b} (Pa)"),
+            columns: names(0),
+            rows: names(1),
+            values,
+            chosen: outcome.best_sample.as_ref().and_then(place),
+            scale,
+        };
+        format!(
+            "<figure>{}<figcaption><div class=\"bar-row\">{}</div>The frame marks the best sample.</figcaption></figure>",
+            map.to_svg(),
+            colour_bar(&map.scale)
+        )
+    }
+}
+
+fn sample_table(outcome: &ExperimentOutcome) -> String {
+    let sets = outcome.rmse_sets();
+    let mut head = vec!["sample".to_owned()];
+    let with_levels = outcome.samples.iter().any(|s| !s.sd_levels.is_empty());
+    for tissue in &outcome.tissues {
+        let name = escape(&tissue_name(tissue));
+        if with_levels {
+            head.push(format!("{name}: level (SD)"));
+        }
+        head.push(format!("{name}: shear modulus (Pa)"));
+    }
+    head.extend(sets.iter().map(|set| format!("RMSE, {} (mm)", escape(&set_name(set)))));
+    head.extend(["largest displacement (mm)", "Newton steps", "converged"].map(str::to_owned));
+    let mut rows: Vec<(bool, Vec<String>)> = Vec::new();
+    let dash = || "–".to_owned();
+    if !outcome.rest_rmse_mm.is_empty() {
+        let mut row = vec!["undeformed".to_owned()];
+        row.extend(outcome.tissues.iter().flat_map(|_| if with_levels { vec![dash(), dash()] } else { vec![dash()] }));
+        row.extend(sets.iter().map(|set| outcome.rest_rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
+        row.extend([number(0.0, 1), dash(), dash()]);
+        rows.push((false, row));
+    }
+    for s in &outcome.samples {
+        let best = outcome.best_sample.as_deref() == Some(s.id.as_str());
+        let mut row = vec![if best { format!("{} · best", escape(&s.id)) } else { escape(&s.id) }];
+        for tissue in &outcome.tissues {
+            if with_levels {
+                row.push(s.sd_levels.get(tissue).map_or_else(dash, |level| signed(*level)));
+            }
+            row.push(s.shear_modulus_pa.get(tissue).map_or_else(dash, |mu| number(*mu, 4)));
+        }
+        row.extend(sets.iter().map(|set| s.rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
+        row.push(s.displacement_max_mm.map_or_else(dash, |mm| number(mm, 3)));
+        row.push(s.newton_iterations.to_string());
+        row.push(if s.converged { "yes" } else { "no" }.to_owned());
+        rows.push((best, row));
+    }
+    table("Samples", &head, &rows)
+}
+
+/// Residuals over Newton steps.
+pub fn convergence(outcome: &ExperimentOutcome) -> Option<String> {
+    let mut shown: Vec<&SampleOutcome> = outcome.samples.iter().filter(|s| s.relative_residuals.len() > 1).collect();
+    // Six lines can be told apart: the best sample, then evenly through the grid.
+    let best = outcome.best_sample.as_deref();
+    if shown.len() > 6 {
+        let last = shown.len() - 1;
+        let mut picked: Vec<usize> = (0..5).map(|n| n * last / 4).collect();
+        picked.extend(shown.iter().position(|s| Some(s.id.as_str()) == best));
+        picked.sort_unstable();
+        picked.dedup();
+        shown = picked.into_iter().map(|n| shown[n]).collect();
+    }
+    if shown.is_empty() {
+        return None;
+    }
+    let series = shown.iter().map(|s| Series {
+        name: s.id.clone(),
+        points: s
+            .relative_residuals
+            .iter()
+            .enumerate()
+            .map(|(n, r)| DataPoint {
+                x: n as f64,
+                y: *r,
+                y_error: None,
+                note: format!("{}: step {n}, {r:.1e}", s.id),
+                chosen: false,
+            })
+            .collect(),
+    });
+    let chart = LineChart {
+        description: "Relative residual of the solver over Newton steps, one line per sample".to_owned(),
+        x_label: "Newton step".to_owned(),
+        y_label: "relative residual".to_owned(),
+        y_log: true,
+        series: series.collect(),
+        ..LineChart::default()
+    };
+    let unfinished: Vec<String> = outcome.samples.iter().filter(|s| !s.converged).map(|s| escape(&s.id)).collect();
+    let verdict = if unfinished.is_empty() {
+        "Every simulation reached its tolerance.".to_owned()
+    } else {
+        format!("Without a result: {}.", unfinished.join(", "))
+    };
+    Some(format!("<p>{verdict}</p><div class=\"charts\"><figure>{}</figure></div>\n", chart.to_svg()))
+}

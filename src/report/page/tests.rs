@@ -1,0 +1,133 @@
+use super::*;
+use crate::experiment::outcome::{LawOutcome, NoiseFloor, RegistrationOutcome, SampleOutcome, SetOutcome};
+use std::collections::BTreeMap;
+
+fn map<T>(pairs: Vec<(&str, T)>) -> BTreeMap<String, T> {
+    pairs.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+}
+
+fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
+    let sample = |n: usize| {
+        let level = n as f64 * 0.5 - 2.0;
+        let rmse = (0.3 + 0.2 * level.abs()).hypot(0.1);
+        SampleOutcome {
+            id: format!("sample-{n:02}"),
+            sd_levels: map(vec![("grey_matter", level)]),
+            shear_modulus_pa: map(vec![("grey_matter", 900.0 * (0.4 * level).exp())]),
+            laws: map(vec![("grey_matter", LawOutcome { law: "neo-hookean".to_owned(), parameters: BTreeMap::new() })]),
+            rmse_mm: map(vec![("ventricle", rmse), ("margin", 2.0 * rmse)]),
+            converged: true,
+            newton_iterations: 4,
+            relative_residuals: vec![1.0, 1e-2, 1e-5, 1e-10],
+            displacement_max_mm: Some(5.0),
+            file: None,
+        }
+    };
+    ExperimentOutcome {
+        kind,
+        reference: "the surfaces <after> surgery".to_owned(),
+        tissues: vec!["grey_matter".to_owned()],
+        samples: (0..9).map(sample).collect(),
+        best_sample: Some("sample-04".to_owned()),
+        rest_rmse_mm: map(vec![("ventricle", 1.2), ("margin", 4.0)]),
+        noise_floor: Some(NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), segmentation_mm: None }),
+        sets: vec![SetOutcome { name: "margin".to_owned(), nodes: 12, area_mm2: Some(345.6), centroid_mm: None }],
+        registrations: vec![RegistrationOutcome {
+            moving: "post".to_owned(),
+            fixed: "pre".to_owned(),
+            rotation_deg: 12.4,
+            similarity: "Mattes mutual information".to_owned(),
+            ..RegistrationOutcome::default()
+        }],
+        loads: vec!["gravity 9.81 m/s² towards −z".to_owned()],
+        warnings: vec!["</script><img src=x>: the cavity touches the brain's edge".to_owned()],
+        ..ExperimentOutcome::default()
+    }
+}
+
+fn page(outcome: ExperimentOutcome) -> CasePage {
+    CasePage {
+        title: title_of(Some(outcome.kind)).to_owned(),
+        version: "0.1.0".to_owned(),
+        outcome: Some(outcome),
+        settings_toml: Some("a = \"</pre><script>alert(1)</script>\"".to_owned()),
+        ..CasePage::default()
+    }
+}
+
+#[test]
+fn warnings_come_before_the_summary_and_markup_in_them_is_text() {
+    let html = page(outcome(ExperimentKind::Resection)).to_html();
+    let (warnings, summary) = (html.find("id=\"warnings\"").unwrap(), html.find("id=\"summary\"").unwrap());
+    assert!(warnings < summary);
+    assert!(!html.contains("<img src=x>") && html.contains("&lt;img src=x&gt;"));
+    assert!(!html.contains("<script>alert") && html.contains("surfaces &lt;after&gt; surgery"));
+    assert!(html.contains("1 warning<"));
+}
+
+#[test]
+fn the_page_names_no_other_place_to_load_from() {
+    let html = page(outcome(ExperimentKind::Phantom)).to_html();
+    for attribute in ["src=\"http", "href=\"http", "url(", "@import", "<link rel=\"stylesheet\""] {
+        assert!(!html.contains(attribute), "{attribute}");
+    }
+    assert!(html.contains("default-src 'none'"));
+    assert!(html.contains("Research software, not a medical device"));
+}
+
+#[test]
+fn every_sample_and_the_rest_state_are_in_the_table() {
+    let html = page(outcome(ExperimentKind::Resection)).to_html();
+    for n in 0..9 {
+        assert!(html.contains(&format!("sample-{n:02}")));
+    }
+    assert!(html.contains("undeformed") && html.contains("sample-04 · best"));
+    assert!(html.contains("takes away") && html.contains("10.1007/s11548-020-02284-y"));
+}
+
+#[test]
+fn a_worse_best_sample_is_not_praised() {
+    let mut outcome = outcome(ExperimentKind::Resection);
+    outcome.rest_rmse_mm = map(vec![("margin", 0.1), ("ventricle", 0.1)]);
+    let html = page(outcome).to_html();
+    assert!(html.contains("does not come nearer than no deformation") && !html.contains("takes away"));
+}
+
+#[test]
+fn two_tissues_on_a_grid_become_a_valley() {
+    let mut outcome = outcome(ExperimentKind::Phantom);
+    outcome.tissues = vec!["grey_matter".to_owned(), "white_matter".to_owned()];
+    for (n, s) in outcome.samples.iter_mut().enumerate() {
+        let moduli = [(n % 3) as f64 * 100.0 + 300.0, (n / 3) as f64 * 50.0 + 200.0];
+        s.shear_modulus_pa = map(vec![("grey_matter", moduli[0]), ("white_matter", moduli[1])]);
+    }
+    let html = page(outcome.clone()).to_html();
+    assert!(html.contains("shear modulus of white matter (Pa)") && html.contains("The frame marks the best sample"));
+    // One cell missing: no grid, the curve instead.
+    outcome.samples.pop();
+    assert!(!page(outcome).to_html().contains("The frame marks the best sample"));
+}
+
+#[test]
+fn the_same_case_gives_the_same_bytes_and_every_id_once() {
+    let page = page(outcome(ExperimentKind::Resection));
+    let html = page.to_html();
+    assert_eq!(html, page.to_html());
+    let mut ids: Vec<&str> = html.split(" id=\"").skip(1).map(|s| s.split('"').next().unwrap()).collect();
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count);
+}
+
+#[test]
+fn an_empty_case_still_gives_a_page_that_says_what_is_absent() {
+    let page = CasePage {
+        title: title_of(None).to_owned(),
+        absent: vec!["samples: sim/outcome.json is not there".to_owned()],
+        ..CasePage::default()
+    };
+    let html = page.to_html();
+    assert!(html.contains("Not shown: samples: sim/outcome.json is not there."));
+    assert!(!html.contains("id=\"samples\""));
+}
