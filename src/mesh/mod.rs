@@ -1,6 +1,7 @@
 //! Surfaces, tetrahedral meshes, quality, mesh formats, meshing engines.
 
 mod closest_point;
+mod facets;
 pub mod format;
 mod isosurface;
 mod tet_mesh;
