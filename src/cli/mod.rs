@@ -8,6 +8,7 @@ mod completions;
 mod doctor;
 mod failure;
 mod man;
+mod report;
 mod session;
 
 pub use failure::{Failure, Reject};
@@ -31,6 +32,7 @@ enum Command {
     Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
+    Report(report::Args),
 }
 
 /// Entry point of the program: parses, runs, turns failures into exit codes.
@@ -41,6 +43,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),
+        Command::Report(args) => report::run(&args, &session),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

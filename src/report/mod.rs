@@ -1,9 +1,12 @@
 //! HTML page, figures, tables, VTK series.
 
+pub mod case;
 pub mod chart;
 pub mod colour;
 pub mod figure;
 pub mod html;
+pub mod lettering;
+pub mod mesh_figure;
 pub mod page;
 pub mod picture;
 pub mod render;

@@ -69,9 +69,9 @@ impl Viewer {
              </canvas></div>\n",
         );
         if let Some(scale) = &self.scale {
-            let _ = write!(
+            let _ = writeln!(
                 html,
-                "<div class=\"bar-row\" id=\"view-bar\" data-low=\"{}\" data-high=\"{}\">{}</div>\n",
+                "<div class=\"bar-row\" id=\"view-bar\" data-low=\"{}\" data-high=\"{}\">{}</div>",
                 scale.low,
                 scale.high,
                 chart::colour_bar(scale)

@@ -79,9 +79,9 @@ pub fn section(outcome: &ExperimentOutcome) -> String {
         let _ = write!(html, "<li id=\"ref-{}\">{}</li>", r.key, escape(r.text));
     }
     let bibtex: Vec<&str> = references.iter().map(|r| r.bibtex).collect();
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "</ol><details><summary>BibTeX</summary><pre tabindex=\"0\" aria-label=\"BibTeX\">{}</pre></details>\n",
+        "</ol><details><summary>BibTeX</summary><pre tabindex=\"0\" aria-label=\"BibTeX\">{}</pre></details>",
         escape(&bibtex.join("\n\n"))
     );
     html
@@ -102,7 +102,7 @@ fn paragraph(outcome: &ExperimentOutcome) -> String {
         format!("<a href=\"#ref-{}\">[{number}]</a>", r.key)
     };
     let mut text = format!("Simulations were made with hgm {}, research software", env!("CARGO_PKG_VERSION"));
-    text += &match outcome.kind {
+    let images = match outcome.kind {
         ExperimentKind::Phantom => {
             format!(", on the MNI152NLin2009aSym template {}. ", cite(TEMPLATE))
         }
@@ -118,6 +118,7 @@ fn paragraph(outcome: &ExperimentOutcome) -> String {
             }
         ),
     };
+    text += &images;
     if let Some(mesh) = &outcome.mesh {
         let engine = if mesh.engine == "cgal" {
             format!("CGAL {}", cite(CGAL))

@@ -5,6 +5,7 @@ mod parts;
 mod results;
 
 pub use methods::{Reference, references};
+pub use results::set_name;
 
 use super::chart;
 use super::colour::ColourScale;
@@ -232,7 +233,7 @@ fn error_section(map: &ErrorMap) -> String {
     html += &pictures(&map.pictures);
     let _ = write!(html, "<div class=\"bar-row\">{}</div>\n<div class=\"charts\">", chart::colour_bar(&map.scale));
     for (set, errors) in &map.errors_mm {
-        let label = format!("error at {} (mm)", results::set_name(set));
+        let label = format!("error at {} (mm)", set_name(set));
         let chart = chart::histogram(errors, &label, "nodes", Some(&map.scale));
         let _ = write!(html, "<figure>{chart}<figcaption>{}</figcaption></figure>", escape(&results::spread(errors)));
     }

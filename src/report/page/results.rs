@@ -195,11 +195,11 @@ pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
             rows.push((format!("volume, {}", escape(&tissue_name(name))), format!("{} cc", number(*cc, 4))));
         }
         let rows: Vec<_> = rows.into_iter().map(|(name, value)| (false, vec![name, value])).collect();
-        let quality = table("Mesh", &["".to_owned(), "value".to_owned()], &rows);
+        let quality = table("Mesh", &["measure".to_owned(), "value".to_owned()], &rows);
         html += "<div class=\"columns\">";
         html += &quality;
         if !m.dihedral_counts.is_empty() {
-            html += &format!("<figure>{}</figure>", dihedral_chart(&m.dihedral_counts));
+            let _ = write!(html, "<figure>{}</figure>", dihedral_chart(&m.dihedral_counts));
         }
         html += "</div>";
     }
@@ -250,12 +250,13 @@ pub fn samples(outcome: &ExperimentOutcome) -> String {
             html += &grid.figure(outcome, &set);
         }
     } else {
-        html += &format!("<figure>{}<figcaption>{}</figcaption></figure>", curve(outcome), curve_caption(outcome));
+        let (curve, caption) = (curve(outcome), curve_caption(outcome));
+        let _ = write!(html, "<figure>{curve}<figcaption>{caption}</figcaption></figure>");
     }
     html += "</div>\n";
     let table = sample_table(outcome);
     if outcome.samples.len() > 20 {
-        html += &format!("<details><summary>All {} samples</summary>{table}</details>\n", outcome.samples.len());
+        let _ = write!(html, "<details><summary>All {} samples</summary>{table}</details>", outcome.samples.len());
     } else {
         html += &table;
     }

@@ -1,0 +1,309 @@
+//! A case directory to a page: reads what is there, says what is not.
+
+use super::colour::ColourScale;
+use super::figure::CaseImages;
+use super::mesh_figure::{cut_views, middle_mm, value_views};
+use super::page::{CasePage, ErrorMap, title_of};
+use super::viewer::{ViewedSurface, Viewer};
+use crate::artefact::{WriteError, write_whole};
+use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
+use crate::mesh::format::{MeshWithFields, ReadError, gifti, vtu};
+use crate::mesh::{TetMesh, TriMesh};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Pixels of the mesh pictures on the page.
+const PICTURE: [usize; 2] = [560, 460];
+
+/// Why a report could not be made.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum ReportError {
+    #[error("{}: not a case directory: none of its files is there; name a folder made by `hgm run` or `hgm phantom`", folder.display())]
+    NoCase { folder: PathBuf },
+    #[error("{}: cannot be read ({source}); check its permissions", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{file}: not UTF-8 text; the file is damaged: run the experiment again")]
+    Text { file: String },
+    #[error("{file}: point array `{array}` has {found} numbers for {nodes} nodes; write the file again")]
+    Array { file: String, array: String, found: usize, nodes: usize },
+    #[error(transparent)]
+    Mesh(#[from] ReadError),
+    #[error(transparent)]
+    Outcome(#[from] OutcomeError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// A case directory; files are named relative to it.
+struct Case<'a> {
+    folder: &'a Path,
+}
+
+impl Case<'_> {
+    /// The bytes of a file, or `None` when it is not there.
+    fn bytes(&self, file: &str) -> Result<Option<Vec<u8>>, ReportError> {
+        let path = self.folder.join(file);
+        match std::fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(ReportError::Read { path, source }),
+        }
+    }
+
+    fn text(&self, file: &str) -> Result<Option<String>, ReportError> {
+        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
+        String::from_utf8(bytes).map(Some).map_err(|_| ReportError::Text { file: file.to_owned() })
+    }
+
+    fn mesh(&self, file: &str) -> Result<Option<MeshWithFields>, ReportError> {
+        Ok(self.bytes(file)?.map(|bytes| vtu::decode(&bytes, file)).transpose()?)
+    }
+
+    /// `mesh/reference_*.surf.gii`, by name.
+    fn reference_surfaces(&self) -> Result<Vec<(String, TriMesh)>, ReportError> {
+        let mut names = Vec::new();
+        for entry in std::fs::read_dir(self.folder.join("mesh")).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.starts_with("reference_") && name.ends_with(".surf.gii") {
+                names.push(name);
+            }
+        }
+        names.sort();
+        let mut surfaces = Vec::new();
+        for name in names {
+            let file = format!("mesh/{name}");
+            if let Some(bytes) = self.bytes(&file)? {
+                let what = name.trim_start_matches("reference_").trim_end_matches(".surf.gii").replace('_', " ");
+                surfaces.push((what, gifti::decode_surface(&bytes, &file)?));
+            }
+        }
+        Ok(surfaces)
+    }
+}
+
+/// The page of a case directory.
+///
+/// # Errors
+/// [`ReportError`] for a file that is there but cannot be used; what is not there is named on the page.
+pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
+    let case = Case { folder };
+    let outcome = match case.text("sim/outcome.json")? {
+        Some(text) => Some(ExperimentOutcome::from_json(&text, "sim/outcome.json")?),
+        None => None,
+    };
+    let settings_toml = case.text("settings.toml")?;
+    let provenance_json = case.text("provenance.json")?;
+    let rest = case.mesh("mesh/rest.vtu")?;
+    let images = case.images()?;
+    if outcome.is_none() && rest.is_none() && images.is_none() {
+        return Err(ReportError::NoCase { folder: folder.to_path_buf() });
+    }
+    let mut page = CasePage {
+        title: title_of(outcome.as_ref().map(|o| o.kind)).to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        settings_toml,
+        provenance_json,
+        ..CasePage::default()
+    };
+    if let Some(images) = &images {
+        page.registration = images.registration();
+        page.mosaics = images.mosaics();
+    }
+    if let Some(rest) = &rest {
+        page.mesh_pictures = cut_views(&rest.mesh, focus_mm(&rest.mesh), PICTURE);
+    } else {
+        page.absent.push("the mesh (mesh/rest.vtu is not there)".to_owned());
+    }
+    match &outcome {
+        Some(outcome) => add_results(&case, outcome, rest.as_ref(), &mut page)?,
+        None => page.absent.push("samples and errors (sim/outcome.json is not there; run `hgm sweep`)".to_owned()),
+    }
+    page.outcome = outcome;
+    Ok(page)
+}
+
+/// Makes `report.html` of a case directory again. Returns its path.
+///
+/// # Errors
+/// [`ReportError`]; nothing is written then.
+pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
+    let path = folder.join("report.html");
+    write_whole(&path, read_case(folder)?.to_html().as_bytes())?;
+    Ok(path)
+}
+
+/// Where the mesh is cut: through the resection margin when there is one, else near the middle.
+fn focus_mm(mesh: &TetMesh) -> [f64; 3] {
+    let margin = mesh.node_sets.get("margin").filter(|nodes| !nodes.is_empty());
+    margin.map_or_else(
+        || middle_mm(mesh),
+        |nodes| {
+            let sum = |a: usize| nodes.iter().map(|&n| mesh.nodes_mm()[n as usize][a]).sum::<f64>();
+            [0, 1, 2].map(|a| sum(a) / nodes.len() as f64)
+        },
+    )
+}
+
+/// Nodes moved by the point array `displacement`; the nodes themselves when it is absent.
+fn displaced(file: &str, sample: &MeshWithFields) -> Result<Vec<[f64; 3]>, ReportError> {
+    let nodes = sample.mesh.nodes_mm();
+    let Some(field) = sample.point_field("displacement") else { return Ok(nodes.to_vec()) };
+    if field.values.len() != 3 * nodes.len() {
+        let (array, found) = (field.name.clone(), field.values.len());
+        return Err(ReportError::Array { file: file.to_owned(), array, found, nodes: nodes.len() });
+    }
+    let moved = |(p, u): (&[f64; 3], &[f64])| [p[0] + u[0], p[1] + u[1], p[2] + u[2]];
+    Ok(nodes.iter().zip(field.values.chunks_exact(3)).map(moved).collect())
+}
+
+/// Error map and 3-D view from the best sample and the reference.
+fn add_results(
+    case: &Case<'_>,
+    outcome: &ExperimentOutcome,
+    rest: Option<&MeshWithFields>,
+    page: &mut CasePage,
+) -> Result<(), ReportError> {
+    let Some(best) = outcome.best() else {
+        page.absent.push("the error per node (no sample is the best one)".to_owned());
+        return Ok(());
+    };
+    let file = best.file.clone().unwrap_or_else(|| format!("sim/{}.vtu", best.id));
+    let Some(sample) = case.mesh(&file)? else {
+        page.absent.push(format!("the error per node and the 3-D view ({file} is not there)"));
+        return Ok(());
+    };
+    let mesh = &sample.mesh;
+    let deformed = displaced(&file, &sample)?;
+    let errors = sample.point_field("rmse_mm").map(|f| f.values.clone()).filter(|v| v.len() == mesh.nodes_mm().len());
+    let scale = errors.as_ref().and_then(|e| ColourScale::over(e.iter().copied(), "error per node (mm)"));
+    if let (Some(errors), Some(scale)) = (&errors, &scale) {
+        let sets = outcome.rmse_sets();
+        let named: Vec<&str> = sets.iter().map(String::as_str).filter(|s| *s != "all").collect();
+        let of_set = |set: &String| {
+            let values = match mesh.node_sets.get(set) {
+                Some(nodes) => nodes.iter().map(|&n| errors[n as usize]).collect(),
+                None if set == "all" => errors.clone(),
+                None => Vec::new(),
+            };
+            let values: Vec<f64> = values.into_iter().filter(|v: &f64| v.is_finite()).collect();
+            (!values.is_empty()).then(|| (set.clone(), values))
+        };
+        page.error_map = Some(ErrorMap {
+            scale: scale.clone(),
+            pictures: value_views(mesh, &deformed, errors, scale, &named, PICTURE),
+            errors_mm: sets.iter().filter_map(of_set).collect(),
+        });
+    } else {
+        page.absent.push(format!("the error per node ({file} has no point array `rmse_mm`)"));
+    }
+    page.viewer = Some(viewer(case, rest, mesh, &deformed, errors, scale)?);
+    Ok(())
+}
+
+fn viewer(
+    case: &Case<'_>,
+    rest: Option<&MeshWithFields>,
+    mesh: &TetMesh,
+    deformed: &[[f64; 3]],
+    errors: Option<Vec<f64>>,
+    scale: Option<ColourScale>,
+) -> Result<Viewer, ReportError> {
+    let facets = mesh.boundary_facets(|_| true);
+    let (surface, old) = TriMesh::from_facets(deformed, &facets);
+    let values = errors.filter(|_| scale.is_some()).map(|e| old.iter().map(|&n| e[n as usize]).collect());
+    let undeformed = rest.map_or(mesh, |r| &r.mesh);
+    let rest_surface = TriMesh::from_facets(undeformed.nodes_mm(), &undeformed.boundary_facets(|_| true)).0;
+    let plain = |name: &str, surface| ViewedSurface { name: name.to_owned(), surface, values: Vec::new() };
+    let mut surfaces = vec![
+        plain("undeformed", rest_surface),
+        ViewedSurface { name: "deformed, with error".to_owned(), surface, values: values.unwrap_or_default() },
+    ];
+    if let Some(reference) = case.mesh("sim/reference.vtu")? {
+        let nodes = displaced("sim/reference.vtu", &reference)?;
+        surfaces.push(plain("reference", TriMesh::from_facets(&nodes, &reference.mesh.boundary_facets(|_| true)).0));
+    }
+    for (what, surface) in case.reference_surfaces()? {
+        surfaces.push(plain(&format!("reference: {what}"), surface));
+    }
+    Ok(Viewer { surfaces, scale })
+}
+
+impl Case<'_> {
+    /// The images in the MNI frame; `None` without the pre-operative image and its brain.
+    fn images(&self) -> Result<Option<CaseImages>, ReportError> {
+        let _ = self;
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::SampleOutcome;
+    use crate::mesh::format::Field;
+
+    fn mesh() -> TetMesh {
+        let nodes = vec![[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0], [50.0, 50.0, 50.0]];
+        let mut mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3], [1, 2, 3, 4]], vec![2, 3]).unwrap();
+        mesh.set_nodes("margin", vec![1, 2, 4]).unwrap();
+        mesh
+    }
+
+    fn write(folder: &Path, file: &str, bytes: &[u8]) {
+        write_whole(&folder.join(file), bytes).unwrap();
+    }
+
+    fn case(folder: &Path) {
+        let mesh = mesh();
+        write(folder, "mesh/rest.vtu", &vtu::encode(&mesh, &[], &[]).unwrap());
+        let fields = [
+            Field { name: "displacement".to_owned(), components: 3, values: vec![0.5; 15] },
+            Field::scalar("rmse_mm", vec![0.25, 1.0, 2.0, 0.5, 3.75]),
+        ];
+        write(folder, "sim/sample-00.vtu", &vtu::encode(&mesh, &fields, &[]).unwrap());
+        let sample = SampleOutcome {
+            id: "sample-00".to_owned(),
+            converged: true,
+            rmse_mm: [("margin".to_owned(), 2.5)].into(),
+            ..SampleOutcome::default()
+        };
+        let outcome = ExperimentOutcome {
+            samples: vec![sample],
+            best_sample: Some("sample-00".to_owned()),
+            ..ExperimentOutcome::default()
+        };
+        write(folder, "sim/outcome.json", outcome.to_json("x").unwrap().as_bytes());
+    }
+
+    #[test]
+    fn a_case_becomes_a_page_whose_colours_span_its_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        case(folder.path());
+        let page = read_case(folder.path()).unwrap();
+        assert_eq!(page.mesh_pictures.len(), 3);
+        let map = page.error_map.as_ref().unwrap();
+        assert_eq!((map.scale.low, map.scale.high), (0.25, 3.75));
+        assert_eq!(map.errors_mm, [("margin".to_owned(), vec![1.0, 2.0, 3.75])]);
+        let deformed = &page.viewer.as_ref().unwrap().surfaces[1];
+        assert_eq!(deformed.surface.nodes_mm[0], [0.5; 3]);
+        let path = write_report(folder.path()).unwrap();
+        let html = std::fs::read_to_string(path).unwrap();
+        assert!(html.contains("id=\"view\"") && !html.contains(&folder.path().display().to_string()));
+    }
+
+    #[test]
+    fn what_is_not_there_is_named_and_what_is_damaged_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(read_case(folder.path()), Err(ReportError::NoCase { .. })));
+        case(folder.path());
+        std::fs::remove_file(folder.path().join("sim/sample-00.vtu")).unwrap();
+        let page = read_case(folder.path()).unwrap();
+        assert!(page.absent.iter().any(|a| a.contains("sim/sample-00.vtu")), "{:?}", page.absent);
+        write(folder.path(), "sim/outcome.json", b"{\"kind\": 3}");
+        let message = read_case(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("sim/outcome.json"), "{message}");
+        write(folder.path(), "mesh/rest.vtu", b"<VTKFile");
+        assert!(read_case(folder.path()).is_err());
+    }
+}
