@@ -3,3 +3,4 @@
 mod mesh_files;
 mod python;
 mod rooms;
+mod transform_files;
