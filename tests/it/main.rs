@@ -1,5 +1,6 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
+mod fem;
 mod mesh_files;
 mod python;
 mod rooms;

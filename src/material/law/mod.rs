@@ -1,10 +1,21 @@
 //! Compressible hyperelastic laws in three dimensions, one file each, under one battery of laws of physics.
 
 mod battery;
+mod compression_resistance;
+mod material;
+mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
+mod stable_neo_hookean;
+mod volume;
 
 pub use battery::check_hyperelastic;
+pub use compression_resistance::CompressionResistance;
+pub use material::{Material, MaterialError, Parameter};
+pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
+pub use ogden::{Ogden, OgdenTerm};
+pub use stable_neo_hookean::StableNeoHookean;
 
 use nalgebra::{Matrix3, SMatrix};
 

@@ -1,5 +1,6 @@
 //! Compressible neo-Hookean law.
 
+use super::volume::{VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
 use super::{Hyperelastic, Tangent};
 use nalgebra::Matrix3;
 
@@ -11,55 +12,46 @@ pub struct NeoHookean {
     pub shear_modulus_pa: f64,
     /// lambda, Pa.
     pub lame_lambda_pa: f64,
+    /// Volume ratio below which ln J is continued by its Taylor polynomial, so that inverted elements have a finite
+    /// energy and are pushed back; 0: never, the energy is infinite there.
+    pub inversion_threshold: f64,
 }
 
 impl NeoHookean {
     /// From the shear modulus and Poisson's ratio: lambda = 2 mu nu / (1 - 2 nu).
     pub fn new(shear_modulus_pa: f64, poisson_ratio: f64) -> Self {
-        Self { shear_modulus_pa, lame_lambda_pa: 2.0 * shear_modulus_pa * poisson_ratio / (1.0 - 2.0 * poisson_ratio) }
+        Self {
+            shear_modulus_pa,
+            lame_lambda_pa: lame_lambda_pa(shear_modulus_pa, poisson_ratio),
+            inversion_threshold: 0.0,
+        }
     }
 }
 
-/// det(I + H) - 1 without the cancellation of forming F.
-fn volume_change(h: &Matrix3<f64>) -> f64 {
-    let minors = h[(0, 0)] * h[(1, 1)] - h[(0, 1)] * h[(1, 0)] + h[(1, 1)] * h[(2, 2)] - h[(1, 2)] * h[(2, 1)]
-        + h[(0, 0)] * h[(2, 2)]
-        - h[(0, 2)] * h[(2, 0)];
-    h.trace() + minors + h.determinant()
+impl NeoHookean {
+    fn logarithm(&self) -> VolumeLogarithm {
+        VolumeLogarithm { floor: self.inversion_threshold }
+    }
 }
 
 impl Hyperelastic for NeoHookean {
     fn energy_density_pa(&self, h: &Matrix3<f64>) -> f64 {
         let (mu, lambda) = (self.shear_modulus_pa, self.lame_lambda_pa);
-        let j_minus_1 = volume_change(h);
-        if j_minus_1 <= -1.0 {
-            return f64::INFINITY;
-        }
-        let ln_j = j_minus_1.ln_1p();
         // I1 - 3 = 2 tr H + |H|^2.
-        0.5 * mu * (2.0 * h.trace() + h.norm_squared()) - mu * ln_j + 0.5 * lambda * ln_j * ln_j
+        0.5 * mu * (2.0 * h.trace() + h.norm_squared()) + self.logarithm().energy(mu, lambda, volume_change(h)).value
     }
 
     fn first_piola_kirchhoff_pa(&self, h: &Matrix3<f64>) -> Matrix3<f64> {
-        let (mu, lambda) = (self.shear_modulus_pa, self.lame_lambda_pa);
         let f = Matrix3::identity() + h;
-        let ln_j = volume_change(h).ln_1p();
-        let f_inv_t = f.try_inverse().map_or(Matrix3::repeat(f64::NAN), |m| m.transpose());
-        // F - F^-T = H + (I - F^-T) and I - F^-T = F^-T H^T: no cancellation near rest.
-        (h + f_inv_t * h.transpose()) * mu + f_inv_t * (lambda * ln_j)
+        let of_volume = self.logarithm().energy(self.shear_modulus_pa, self.lame_lambda_pa, volume_change(h));
+        f * self.shear_modulus_pa + cofactors(&f) * of_volume.first
     }
 
     fn tangent_pa(&self, h: &Matrix3<f64>) -> Tangent {
-        let (mu, lambda) = (self.shear_modulus_pa, self.lame_lambda_pa);
-        let f = Matrix3::identity() + h;
-        let ln_j = volume_change(h).ln_1p();
-        let g = f.try_inverse().map_or(Matrix3::repeat(f64::NAN), |m| m.transpose());
-        // dF^-T_ab / dF_cd = -F^-T_ad F^-T_cb.
-        Tangent::from_fn(|row, col| {
-            let (a, b, c, d) = (row % 3, row / 3, col % 3, col / 3);
-            let identity = if row == col { mu } else { 0.0 };
-            identity + (mu - lambda * ln_j) * g[(a, d)] * g[(c, b)] + lambda * g[(a, b)] * g[(c, d)]
-        })
+        let of_volume = self.logarithm().energy(self.shear_modulus_pa, self.lame_lambda_pa, volume_change(h));
+        let mut tangent = Tangent::identity() * self.shear_modulus_pa;
+        add_tangent_of_volume(&mut tangent, of_volume, &(Matrix3::identity() + h));
+        tangent
     }
 
     fn small_strain_shear_modulus_pa(&self) -> f64 {
@@ -76,5 +68,7 @@ mod tests {
     fn neo_hookean_obeys_the_laws_of_hyperelasticity() {
         check_hyperelastic(&NeoHookean::new(1000.0, 0.45));
         check_hyperelastic(&NeoHookean::new(333.28, 0.3));
+        // Continued below J = 0.97, so that the battery's compressed states lie in the continuation.
+        check_hyperelastic(&NeoHookean { inversion_threshold: 0.97, ..NeoHookean::new(1000.0, 0.45) });
     }
 }

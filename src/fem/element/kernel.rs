@@ -1,0 +1,293 @@
+//! What a material does at one integration point: energy, stress, stiffness blocks.
+//!
+//! The neo-Hookean law has its own path: with g_a = F^-T G_a (the spatial gradients) its stiffness block is
+//! mu (G_a . G_b) I + (mu - lambda ln J) g_b (x) g_a + lambda g_a (x) g_b, a tenth of the work of a general tangent.
+
+use crate::material::Hyperelastic;
+use crate::material::law::{Material, Tangent};
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
+
+/// A material made ready for integration points.
+pub(in super::super) enum Kernel {
+    /// The paper's law without wrappers.
+    NeoHookean { mu: f64, lambda: f64 },
+    /// Any other law through its 9 x 9 tangent.
+    General(Box<dyn Hyperelastic>),
+}
+
+/// Row-major 3 x 3, as small as the hot loop likes it.
+type M3 = [[f64; 3]; 3];
+
+impl Kernel {
+    /// A material with the part `pointwise` of its lambda evaluated at the points.
+    pub(in super::super) fn new(material: &Material, pointwise: f64) -> Self {
+        let lambda = pointwise * material.lame_lambda_pa();
+        match material {
+            Material::NeoHookean { shear_modulus_pa, compression_resistance_pa, inversion_threshold, .. }
+                if *compression_resistance_pa == 0.0 && *inversion_threshold == 0.0 =>
+            {
+                Self::NeoHookean { mu: *shear_modulus_pa, lambda }
+            }
+            _ => Self::General(material.law_with_lambda(lambda)),
+        }
+    }
+
+    /// Energy density, Pa.
+    #[inline(always)]
+    pub(super) fn energy(&self, h: &M3) -> f64 {
+        match self {
+            Self::NeoHookean { mu, lambda } => {
+                let (_, j_minus_1) = cofactors(h);
+                if j_minus_1 <= -1.0 {
+                    return f64::INFINITY;
+                }
+                let ln_j = j_minus_1.ln_1p();
+                let trace = h[0][0] + h[1][1] + h[2][2];
+                let square: f64 = h.iter().flatten().map(|v| v * v).sum();
+                0.5 * mu * (2.0 * trace + square) - mu * ln_j + 0.5 * lambda * ln_j * ln_j
+            }
+            Self::General(law) => law.energy_density_pa(&matrix(h)),
+        }
+    }
+
+    /// First Piola-Kirchhoff stress, Pa, with `pressure` (Pa, positive in tension) added on the volume.
+    #[inline(always)]
+    pub(super) fn stress(&self, h: &M3, pressure: f64) -> M3 {
+        match self {
+            Self::NeoHookean { mu, lambda } => {
+                let (cof, j_minus_1) = cofactors(h);
+                neo_hookean_stress(*mu, lambda * j_minus_1.ln_1p(), pressure, h, &cof, 1.0 + j_minus_1)
+            }
+            Self::General(law) => {
+                let stress = law.first_piola_kirchhoff_pa(&matrix(h));
+                let (cof, _) = cofactors(h);
+                std::array::from_fn(|r| std::array::from_fn(|c| stress[(r, c)] + pressure * cof[r][c]))
+            }
+        }
+    }
+
+    /// Stress, and every stiffness block (a, b), a <= b, column-major, handed to `put` after multiplying by `weight`.
+    /// `project` makes the tangent positive semi-definite.
+    #[inline(always)]
+    pub(super) fn stiffness<const K: usize>(
+        &self,
+        h: &M3,
+        pressure: f64,
+        gradients: &[[f64; 3]; K],
+        weight: f64,
+        project: bool,
+        mut put: impl FnMut(usize, usize, &[f64; 9]),
+    ) -> M3 {
+        match self {
+            Self::NeoHookean { mu, lambda } => {
+                let (cof, j_minus_1) = cofactors(h);
+                let (j, volume_stress) = (1.0 + j_minus_1, lambda * j_minus_1.ln_1p());
+                let stress = neo_hookean_stress(*mu, volume_stress, pressure, h, &cof, j);
+                let mut exchange = mu - volume_stress - pressure * j;
+                if project {
+                    exchange = projected_exchange(exchange, *mu, h);
+                }
+                let outer = (lambda + pressure * j).max(if project { 0.0 } else { f64::NEG_INFINITY });
+                let inverse_j = 1.0 / j;
+                let spatial: [[f64; 3]; K] = std::array::from_fn(|a| {
+                    let g = &gradients[a];
+                    [0, 1, 2].map(|r| (cof[r][0] * g[0] + cof[r][1] * g[1] + cof[r][2] * g[2]) * inverse_j)
+                });
+                let (c1, c2, c3) = (weight * mu, weight * exchange, weight * outer);
+                for a in 0..K {
+                    let ga = &gradients[a];
+                    let (x, y) = (spatial[a].map(|v| c2 * v), spatial[a].map(|v| c3 * v));
+                    for b in a..K {
+                        let (gb, z) = (&gradients[b], &spatial[b]);
+                        let s = c1 * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
+                        let mut block = [0.0; 9];
+                        for c in 0..3 {
+                            for r in 0..3 {
+                                block[3 * c + r] = z[r] * x[c] + y[r] * z[c];
+                            }
+                        }
+                        block[0] += s;
+                        block[4] += s;
+                        block[8] += s;
+                        put(a, b, &block);
+                    }
+                }
+                stress
+            }
+            Self::General(law) => {
+                let h = matrix(h);
+                let f = Matrix3::identity() + h;
+                let mut tangent = law.tangent_pa(&h);
+                add_pressure_tangent(&mut tangent, pressure, &f);
+                if project {
+                    tangent = projected(&tangent);
+                }
+                for b in 0..K {
+                    // Columns of dP for a unit displacement of node b.
+                    let gb = gradients[b];
+                    let half = SMatrix::<f64, 9, 3>::from_fn(|row, k| {
+                        (tangent[(row, k)] * gb[0] + tangent[(row, k + 3)] * gb[1] + tangent[(row, k + 6)] * gb[2])
+                            * weight
+                    });
+                    for a in 0..=b {
+                        let ga = gradients[a];
+                        let mut block = [0.0; 9];
+                        for c in 0..3 {
+                            for r in 0..3 {
+                                block[3 * c + r] =
+                                    half[(r, c)] * ga[0] + half[(r + 3, c)] * ga[1] + half[(r + 6, c)] * ga[2];
+                            }
+                        }
+                        put(a, b, &block);
+                    }
+                }
+                let stress = law.first_piola_kirchhoff_pa(&h);
+                let (cof, _) = cofactors(&rows(&h));
+                std::array::from_fn(|r| std::array::from_fn(|c| stress[(r, c)] + pressure * cof[r][c]))
+            }
+        }
+    }
+}
+
+/// mu (F - F^-T) + (lambda ln J + p J) F^-T, the first bracket as H + F^-T H^T: nothing cancels near rest.
+#[inline(always)]
+fn neo_hookean_stress(mu: f64, volume_stress: f64, pressure: f64, h: &M3, cof: &M3, j: f64) -> M3 {
+    let inverse_j = 1.0 / j;
+    let g = cof.map(|row| row.map(|v| v * inverse_j));
+    let volume = volume_stress + pressure * j;
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| {
+            let turned = g[r][0] * h[c][0] + g[r][1] * h[c][1] + g[r][2] * h[c][2];
+            mu * (h[r][c] + turned) + volume * g[r][c]
+        })
+    })
+}
+
+/// Cofactors of F = I + H and det F - 1 without cancellation.
+#[inline(always)]
+pub(super) fn cofactors(h: &M3) -> (M3, f64) {
+    let f = [[1.0 + h[0][0], h[0][1], h[0][2]], [h[1][0], 1.0 + h[1][1], h[1][2]], [h[2][0], h[2][1], 1.0 + h[2][2]]];
+    let cof = cofactor_rows(&f);
+    // det(I + H) - 1 = H_00 (C_00) + (minor of the rest) with C_00 = det of the lower right block of I + H.
+    let lower = h[1][1] + h[2][2] + h[1][1] * h[2][2] - h[1][2] * h[2][1];
+    let j_minus_1 = h[0][0] * cof[0][0] + lower + h[0][1] * cof[0][1] + h[0][2] * cof[0][2];
+    (cof, j_minus_1)
+}
+
+#[inline(always)]
+fn cofactor_rows(f: &M3) -> M3 {
+    [
+        [
+            f[1][1] * f[2][2] - f[1][2] * f[2][1],
+            f[1][2] * f[2][0] - f[1][0] * f[2][2],
+            f[1][0] * f[2][1] - f[1][1] * f[2][0],
+        ],
+        [
+            f[2][1] * f[0][2] - f[2][2] * f[0][1],
+            f[2][2] * f[0][0] - f[2][0] * f[0][2],
+            f[2][0] * f[0][1] - f[2][1] * f[0][0],
+        ],
+        [
+            f[0][1] * f[1][2] - f[0][2] * f[1][1],
+            f[0][2] * f[1][0] - f[0][0] * f[1][2],
+            f[0][0] * f[1][1] - f[0][1] * f[1][0],
+        ],
+    ]
+}
+
+/// The largest coefficient of the exchange term X -> g X^T g that keeps mu I + c (exchange) positive semi-definite:
+/// its eigenvalues are c / (s_i s_j) on diagonals and +-c / (s_i s_j) on pairs of principal stretches.
+fn projected_exchange(exchange: f64, mu: f64, h: &M3) -> f64 {
+    let mut f = *h;
+    (0..3).for_each(|i| f[i][i] += 1.0);
+    let f = matrix(&f);
+    let mut stretches: Vec<f64> = SymmetricEigen::new(f.transpose() * f).eigenvalues.iter().copied().collect();
+    stretches.sort_by(f64::total_cmp);
+    let s = [stretches[0].max(0.0).sqrt(), stretches[1].max(0.0).sqrt()];
+    exchange.clamp(-mu * s[0] * s[0], mu * s[0] * s[1])
+}
+
+/// Eigenvalues below zero become zero (Teran, Sifakis, Irving and Fedkiw, SCA 2005).
+fn projected(tangent: &Tangent) -> Tangent {
+    let eigen = SymmetricEigen::new(*tangent);
+    if eigen.eigenvalues.iter().all(|&v| v >= 0.0) {
+        return *tangent;
+    }
+    let q = eigen.eigenvectors;
+    q * Tangent::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0))) * q.transpose()
+}
+
+/// Adds p d2J/dF2; entry (a b, c d) is p e_acm e_bdn F_mn.
+fn add_pressure_tangent(tangent: &mut Tangent, pressure: f64, f: &Matrix3<f64>) {
+    if pressure == 0.0 {
+        return;
+    }
+    let even = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
+    for (a, c, m) in even {
+        for (b, d, n) in even {
+            let v = pressure * f[(m, n)];
+            tangent[(a + 3 * b, c + 3 * d)] += v;
+            tangent[(c + 3 * d, a + 3 * b)] += v;
+            tangent[(a + 3 * d, c + 3 * b)] -= v;
+            tangent[(c + 3 * b, a + 3 * d)] -= v;
+        }
+    }
+}
+
+fn matrix(h: &M3) -> Matrix3<f64> {
+    Matrix3::from_fn(|r, c| h[r][c])
+}
+
+fn rows(h: &Matrix3<f64>) -> M3 {
+    std::array::from_fn(|r| std::array::from_fn(|c| h[(r, c)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::law::NeoHookean;
+
+    const H: M3 = [[0.12, -0.05, 0.08], [0.03, -0.09, 0.06], [-0.07, 0.1, 0.05]];
+    const GRADIENTS: [[f64; 3]; 4] = [[-1.1, -0.4, -1.0], [0.7, 0.1, 0.2], [0.3, 0.9, -0.2], [0.1, -0.6, 1.0]];
+
+    fn blocks(kernel: &Kernel, pressure: f64, project: bool) -> (M3, Vec<[f64; 9]>) {
+        let mut all = vec![[0.0; 9]; 16];
+        let stress = kernel.stiffness(&H, pressure, &GRADIENTS, 2.0, project, |a, b, block| all[4 * a + b] = *block);
+        (stress, all)
+    }
+
+    #[test]
+    fn the_fast_path_is_the_general_path() {
+        let fast = Kernel::NeoHookean { mu: 1000.0, lambda: 9000.0 };
+        let general = Kernel::General(Box::new(NeoHookean::new(1000.0, 0.45)));
+        for pressure in [0.0, -350.0] {
+            let (f, g) = (blocks(&fast, pressure, false), blocks(&general, pressure, false));
+            for (a, b) in f.1.iter().flatten().zip(g.1.iter().flatten()) {
+                assert!((a - b).abs() < 1e-8, "{a} {b}");
+            }
+            for (a, b) in f.0.iter().flatten().zip(g.0.iter().flatten()) {
+                assert!((a - b).abs() < 1e-9, "{a} {b}");
+            }
+            assert_eq!(fast.stress(&H, pressure), f.0);
+        }
+        assert!((fast.energy(&H) - general.energy(&H)).abs() < 1e-10);
+    }
+
+    #[test]
+    fn projection_leaves_no_negative_curvature() {
+        for pressure in [-9000.0, 9000.0] {
+            for kernel in [
+                Kernel::NeoHookean { mu: 1000.0, lambda: 9000.0 },
+                Kernel::General(Box::new(NeoHookean::new(1000.0, 0.45))),
+            ] {
+                let (_, blocks) = blocks(&kernel, pressure, true);
+                let dense = SMatrix::<f64, 12, 12>::from_fn(|row, col| {
+                    let (a, b, r, c) = (row / 3, col / 3, row % 3, col % 3);
+                    if a <= b { blocks[4 * a + b][3 * c + r] } else { blocks[4 * b + a][3 * r + c] }
+                });
+                let smallest = SymmetricEigen::new(dense).eigenvalues.min();
+                assert!(smallest > -1e-9 * dense.abs().max(), "{smallest}");
+            }
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The quadratic tetrahedron with straight edges: linear gradients, four points of degree 2
+//! (Zienkiewicz and Taylor, "The Finite Element Method", vol. 1, table 5.3).
+
+use super::{Point, barycentric_gradients};
+
+/// Corner pairs of the six mid-edge nodes, in VTK order.
+pub(in super::super) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
+
+/// Quadratic connectivity over linear tets: corners keep their numbers, mid-edge nodes follow in order of first use.
+/// Also returns the two ends of every mid-edge node.
+pub(in super::super) fn with_mid_edge_nodes(nodes: usize, tets: &[[u32; 4]]) -> (Vec<[u32; 10]>, Vec<[u32; 2]>) {
+    let edge_of = |tet: &[u32; 4], e: [usize; 2]| {
+        let (a, b) = (tet[e[0]], tet[e[1]]);
+        [a.min(b), a.max(b)]
+    };
+    let mut edges: Vec<[u32; 2]> = tets.iter().flat_map(|tet| EDGES.map(|e| edge_of(tet, e))).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let number = |edge: [u32; 2]| (nodes + edges.binary_search(&edge).unwrap_or(0)) as u32;
+    let quadratic = tets
+        .iter()
+        .map(|tet| {
+            let middle = EDGES.map(|e| number(edge_of(tet, e)));
+            std::array::from_fn(|n| if n < 4 { tet[n] } else { middle[n - 4] })
+        })
+        .collect();
+    (quadratic, edges)
+}
+
+/// The four points of every tetrahedron; corner nodes in m.
+pub(in super::super) fn tet10(nodes_m: &[[f64; 3]], tets: &[[u32; 10]]) -> Vec<[Point<10>; 4]> {
+    let (near, far) = (0.585_410_196_624_968_5, 0.138_196_601_125_010_5);
+    tets.iter()
+        .map(|tet| {
+            let (g, volume) = barycentric_gradients(std::array::from_fn(|c| nodes_m[tet[c] as usize]));
+            std::array::from_fn(|q| {
+                let l: [f64; 4] = std::array::from_fn(|c| if c == q { near } else { far });
+                let gradients = std::array::from_fn(|n| {
+                    if n < 4 {
+                        // N = l (2 l - 1)
+                        g[n].map(|v| (4.0 * l[n] - 1.0) * v)
+                    } else {
+                        // N = 4 l_a l_b
+                        let [a, b] = EDGES[n - 4];
+                        std::array::from_fn(|i| 4.0 * (l[a] * g[b][i] + l[b] * g[a][i]))
+                    }
+                });
+                Point { weight_m3: volume / 4.0, gradients }
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,311 @@
+//! Static equilibrium: inexact Newton with a line search on the potential energy and adaptive load steps.
+//!
+//! The potential is Pi(u) = sum V Psi(F(u)) - f . u. Newton's linear systems are solved only as well as the outer
+//! iteration can use (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2); steps are halved until Pi falls
+//! enough (Armijo; Nocedal and Wright, "Numerical Optimization", ch. 3). Where the tangent is not positive definite its
+//! elements are projected, so that the step still goes down. A load step that fails is halved; one that succeeds lets
+//! the next be longer.
+
+use super::linear::{LinearReport, LinearSolver};
+use super::model::{Laws, Materials, Model};
+use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, linear, reduce};
+
+/// A displacement field to start from: the solution of a neighbouring problem on the same model.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Solver numbering, m.
+    pub(super) u: Vec<[f64; 3]>,
+}
+
+/// Why a load step was given up.
+enum Stuck {
+    Iterations,
+    LineSearch,
+    NotFinite,
+}
+
+impl Stuck {
+    fn words(&self) -> &'static str {
+        match self {
+            Self::Iterations => "Newton's method ran out of iterations",
+            Self::LineSearch => "no step lowers the energy",
+            Self::NotFinite => "the deformation turns an element inside out",
+        }
+    }
+}
+
+/// Sufficient decrease of the line search.
+const ARMIJO: f64 = 1e-4;
+
+impl Model {
+    /// Equilibrium of the model with these materials, from rest or from a state of an earlier solve.
+    ///
+    /// # Errors
+    /// [`FemError::NoEquilibrium`] with the load reached, the reason and the worst element.
+    pub fn solve(
+        &self,
+        materials: &Materials,
+        warm_start: Option<&State>,
+        progress: &dyn Fn(&Progress),
+    ) -> Result<(Outcome, State), FemError> {
+        let laws = self.laws(materials)?;
+        let mut record = ConvergenceRecord::default();
+        let mut solver = linear::automatic(self);
+        let nodes = self.nodes_m.len();
+        let mut forces = vec![[0.0; 3]; nodes];
+        let load_scale = reduce::norm(&self.free_part(&self.load_n));
+
+        if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
+            let mut u = state.u.clone();
+            self.move_prescribed(&mut u, 1.0);
+            if self.body.energy(&u, &laws).is_finite() {
+                let stage = Stage { laws: &laws, factor: 1.0, load_scale, progress };
+                if self.newton(&stage, &mut u, &mut forces, solver.as_mut(), &mut record).is_ok() {
+                    record.load_steps.push(1.0);
+                    return Ok((self.outcome(&u, &forces, &laws, record), State { u }));
+                }
+            }
+        }
+
+        let mut u = vec![[0.0; 3]; nodes];
+        let mut before: Option<(f64, Vec<[f64; 3]>)> = None;
+        let (mut reached, mut step) = (0.0_f64, 1.0_f64);
+        while reached < 1.0 {
+            let factor = (reached + step).min(1.0);
+            let stage = Stage { laws: &laws, factor, load_scale, progress };
+            let start = self.predicted(&u, reached, before.as_ref(), factor, &laws, solver.as_mut());
+            let mut trial = start;
+            match self.newton(&stage, &mut trial, &mut forces, solver.as_mut(), &mut record) {
+                Ok(()) => {
+                    before = Some((reached, std::mem::replace(&mut u, trial)));
+                    reached = factor;
+                    record.load_steps.push(factor);
+                    step *= 2.0;
+                }
+                Err(stuck) => {
+                    step *= 0.5;
+                    if step < self.scenario.solver.smallest_load_step {
+                        let state = self.body.state(&trial, &laws);
+                        let worst = (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0);
+                        return Err(FemError::NoEquilibrium {
+                            percent: 100.0 * reached,
+                            reason: stuck.words().to_owned(),
+                            cell: worst,
+                            jacobian: state[worst][1],
+                        });
+                    }
+                }
+            }
+        }
+        Ok((self.outcome(&u, &forces, &laws, record), State { u }))
+    }
+
+    /// Puts prescribed components where they belong at a part of the load.
+    pub(super) fn move_prescribed(&self, u: &mut [[f64; 3]], factor: f64) {
+        for (node, components, to) in &self.prescribed {
+            for i in (0..3).filter(|&i| components[i]) {
+                u[*node as usize][i] = factor * to[i];
+            }
+        }
+    }
+
+    /// Where to start a load step: along the last step, or, when nodes are moved, along the elastic answer to their
+    /// movement; the old state when those are not finite.
+    fn predicted(
+        &self,
+        u: &[[f64; 3]],
+        reached: f64,
+        before: Option<&(f64, Vec<[f64; 3]>)>,
+        factor: f64,
+        laws: &Laws,
+        solver: &mut dyn LinearSolver,
+    ) -> Vec<[f64; 3]> {
+        let mut candidates: Vec<Vec<[f64; 3]>> = Vec::new();
+        if let Some((earlier, old)) = before {
+            let ahead = (factor - reached) / (reached - earlier);
+            candidates.push(u.iter().zip(old).map(|(u, o)| [0, 1, 2].map(|i| u[i] + ahead * (u[i] - o[i]))).collect());
+        }
+        if !self.prescribed.is_empty() {
+            candidates.push(self.elastic_answer(u, reached, factor, laws, solver));
+        }
+        for mut candidate in candidates {
+            self.move_prescribed(&mut candidate, factor);
+            if self.body.energy(&candidate, laws).is_finite() {
+                return candidate;
+            }
+        }
+        let mut same = u.to_vec();
+        self.move_prescribed(&mut same, factor);
+        same
+    }
+
+    /// The linear answer of the free nodes to a movement of the prescribed ones, by a difference of forces.
+    fn elastic_answer(
+        &self,
+        u: &[[f64; 3]],
+        reached: f64,
+        factor: f64,
+        laws: &Laws,
+        solver: &mut dyn LinearSolver,
+    ) -> Vec<[f64; 3]> {
+        let small = 1e-4;
+        let mut moved = u.to_vec();
+        self.move_prescribed(&mut moved, reached + small * (factor - reached));
+        let (mut here, mut there) = (vec![[0.0; 3]; u.len()], vec![[0.0; 3]; u.len()]);
+        let tangent = self.tangent(u, laws, &mut here, true);
+        self.body.assemble(&moved, laws, &self.partition, &mut there, None, false);
+        let difference: Vec<[f64; 3]> =
+            there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
+        let rhs = self.free_part(&difference);
+        let mut answer = vec![[0.0; 3]; rhs.len()];
+        solver.solve(&tangent, &rhs, &mut answer, 1e-3);
+        let mut predicted = u.to_vec();
+        self.add_free(&mut predicted, 1.0, &answer);
+        predicted
+    }
+
+    /// u += factor step on the free nodes.
+    pub(super) fn add_free(&self, u: &mut [[f64; 3]], factor: f64, step: &[[f64; 3]]) {
+        for (&node, s) in self.node_of_row.iter().zip(step) {
+            (0..3).for_each(|i| u[node as usize][i] += factor * s[i]);
+        }
+    }
+
+    /// Newton's method at one load; on success `u` is the equilibrium and `forces` its internal forces.
+    fn newton(
+        &self,
+        stage: &Stage,
+        u: &mut Vec<[f64; 3]>,
+        forces: &mut [[f64; 3]],
+        solver: &mut dyn LinearSolver,
+        record: &mut ConvergenceRecord,
+    ) -> Result<(), Stuck> {
+        let settings = &self.scenario.solver;
+        let (laws, factor) = (stage.laws, stage.factor);
+        let work = |u: &[[f64; 3]]| factor * reduce::dot(&self.load_n, u);
+        let stored = self.body.energy(u, laws);
+        if !stored.is_finite() {
+            return Err(Stuck::NotFinite);
+        }
+        let mut potential = stored - work(u);
+        let mut energy_scale = stored.abs() + work(u).abs();
+        let (mut last_size, mut last_forcing) = (f64::INFINITY, 0.0);
+        let mut reference = stage.load_scale;
+        let mut project = false;
+        for iteration in 0..=settings.newton_iterations {
+            let mut tangent = self.tangent(u, laws, forces, project);
+            let rhs = self.out_of_balance(forces, factor);
+            let size = reduce::norm(&rhs);
+            if !size.is_finite() {
+                return Err(Stuck::NotFinite);
+            }
+            // Loads may be nothing but moved nodes: then what they cause first is the measure.
+            if reference == 0.0 {
+                reference = self.force_scale(forces).max(size);
+            }
+            let relative = if reference > 0.0 { size / reference } else { 0.0 };
+            record.relative_residual = relative;
+            (stage.progress)(&Progress {
+                fraction: factor,
+                iteration: record.iterations.len(),
+                relative_residual: relative,
+                goal: settings.relative_residual,
+            });
+            if relative <= settings.relative_residual {
+                return Ok(());
+            }
+            if iteration == settings.newton_iterations {
+                return Err(Stuck::Iterations);
+            }
+            let forcing = forcing_term(size, last_size, last_forcing, settings.relative_residual / relative);
+            (last_size, last_forcing) = (size, forcing);
+            let mut step = vec![[0.0; 3]; rhs.len()];
+            let mut report = solver.solve(&tangent, &rhs, &mut step, forcing);
+            if report.negative_curvature && !project {
+                // Not a minimum's neighbourhood: with projected elements the step certainly goes down.
+                tangent = self.tangent(u, laws, forces, true);
+                let again = solver.solve(&tangent, &rhs, &mut step, forcing);
+                report = LinearReport { iterations: report.iterations + again.iterations, ..again };
+                project = true;
+            } else {
+                project = false;
+            }
+            let mut slope = -reduce::dot(&rhs, &step);
+            if slope.is_nan() || slope >= 0.0 {
+                // The linear solver lost its way: straight downhill, scaled by the diagonal.
+                for (row, (s, r)) in step.iter_mut().zip(&rhs).enumerate() {
+                    let d = tangent.diagonal_block(row);
+                    *s = [0, 1, 2].map(|i| r[i] / d[4 * i].abs().max(f64::MIN_POSITIVE));
+                }
+                slope = -reduce::dot(&rhs, &step);
+            }
+            let mut length = 1.0;
+            let (trial, next) = loop {
+                let mut trial = u.clone();
+                self.add_free(&mut trial, length, &step);
+                let stored = self.body.energy(&trial, laws);
+                let next = stored - work(&trial);
+                // Close to the solution the fall of energy drowns in rounding: any finite step is taken.
+                let noise = 1e-11 * energy_scale;
+                if next <= potential + ARMIJO * length * slope + noise {
+                    energy_scale = stored.abs() + work(&trial).abs();
+                    break (trial, next);
+                }
+                length *= 0.5;
+                if length < 1e-9 {
+                    return Err(if next.is_finite() { Stuck::LineSearch } else { Stuck::NotFinite });
+                }
+            };
+            record.iterations.push(NewtonIteration {
+                load_factor: factor,
+                relative_residual: relative,
+                linear_iterations: report.iterations,
+                step_length: length,
+                projected: project,
+            });
+            *u = trial;
+            potential = next;
+        }
+        Err(Stuck::Iterations)
+    }
+
+    /// Applied minus internal forces on the free rows.
+    pub(super) fn out_of_balance(&self, forces: &[[f64; 3]], factor: f64) -> Vec<[f64; 3]> {
+        let all: Vec<[f64; 3]> =
+            forces.iter().zip(&self.load_n).map(|(f, l)| [0, 1, 2].map(|i| factor * l[i] - f[i])).collect();
+        self.free_part(&all)
+    }
+
+    /// Size of the internal forces on held nodes: what the supports carry.
+    fn force_scale(&self, forces: &[[f64; 3]]) -> f64 {
+        let held: f64 = forces
+            .iter()
+            .zip(&self.row_of)
+            .filter(|(_, row)| **row == super::sparse::HELD)
+            .map(|(f, _)| f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+            .sum();
+        held.sqrt()
+    }
+}
+
+/// What stays the same during one load step.
+struct Stage<'a> {
+    laws: &'a Laws,
+    factor: f64,
+    load_scale: f64,
+    progress: &'a dyn Fn(&Progress),
+}
+
+/// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.
+fn forcing_term(size: f64, last_size: f64, last: f64, needed: f64) -> f64 {
+    if last_size == f64::INFINITY {
+        return 1e-2_f64.max(0.3 * needed).min(0.5);
+    }
+    let ratio = size / last_size;
+    let mut forcing = 0.9 * ratio * ratio;
+    let guard = 0.9 * last * last;
+    if guard > 0.1 {
+        forcing = forcing.max(guard);
+    }
+    forcing.clamp(1e-4, 0.1).max(0.3 * needed).min(0.5)
+}

@@ -1,0 +1,53 @@
+//! Why a simulation was refused or ended without an answer.
+
+use crate::material::law::MaterialError;
+use crate::mesh::TetMesh;
+use thiserror::Error;
+
+/// Why a simulation was refused or ended without an answer. All but [`FemError::NoEquilibrium`] are input errors.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum FemError {
+    #[error("there is no set `{set}` in the mesh; it has: {known}. Rename it in the scenario or tag the mesh")]
+    UnknownSet { set: String, known: String },
+    #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
+    NothingHeld,
+    #[error("set `{set}` is empty: nothing can be held by it")]
+    EmptySet { set: String },
+    #[error("every node is held: there is nothing to compute")]
+    AllHeld,
+    #[error(
+        "cell {cell} has label {label}, which has no name: give it one in the scenario's `[labels]` table \
+         (`grey_matter = {label}`)"
+    )]
+    UnnamedLabel { cell: usize, label: u8 },
+    #[error("cell {cell} has label {label} (`{name}`), but the scenario has no `[materials.{name}]`")]
+    NoMaterial { cell: usize, label: u8, name: String },
+    #[error("`[materials.{name}]`: `{name}` is no label: name its number in `[labels]` (`{name} = 1`)")]
+    UnknownLabel { name: String },
+    #[error("labels `{first}` and `{second}` have the same number {number} in `[labels]`")]
+    SameLabel { first: String, second: String, number: u8 },
+    #[error("`[materials.{name}]`: {source}")]
+    Material { name: String, source: MaterialError },
+    #[error("set `{set}` has no boundary facet: a force or pressure needs an area")]
+    NoFacets { set: String },
+    #[error("`{key}` is {value}: it must be {rule}")]
+    Setting { key: String, value: f64, rule: &'static str },
+    #[error("part of the mesh ({nodes} nodes, among them node {node}) is held nowhere: fix a set there or remove it")]
+    Loose { nodes: usize, node: usize },
+    #[error(
+        "no equilibrium beyond {percent:.1} % of the load: {reason}; the worst element is cell {cell} \
+         (volume ratio {jacobian:.3}). Lower the load, raise the shear modulus or repair the mesh there"
+    )]
+    NoEquilibrium { percent: f64, reason: String, cell: usize, jacobian: f64 },
+}
+
+impl FemError {
+    pub(super) fn unknown_set(mesh: &TetMesh, set: &str) -> Self {
+        let mut known: Vec<&str> = mesh.node_sets.keys().chain(mesh.facet_sets.keys()).map(String::as_str).collect();
+        known.sort_unstable();
+        known.dedup();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        Self::UnknownSet { set: set.to_owned(), known }
+    }
+}

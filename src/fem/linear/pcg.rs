@@ -1,0 +1,176 @@
+//! Preconditioned conjugate gradients (Hestenes and Stiefel, 1952), in single precision inside a double-precision
+//! refinement: the matrix is read in half the bytes, and the residual that decides is the double-precision one.
+
+use super::super::reduce;
+use super::block_jacobi::BlockJacobi;
+use super::operator::{Lanes, Operator, Real};
+use super::{LinearReport, LinearSolver, Tangent};
+
+/// Conjugate gradients with a Jacobi or block-Jacobi preconditioner.
+pub(in super::super) struct Pcg {
+    /// 3 x 3 blocks of the diagonal, or its entries only.
+    pub blocks: bool,
+    /// Give up after this many iterations.
+    pub most_iterations: usize,
+}
+
+/// One inner run that solves A x = b to `tolerance` |b|.
+struct Inner {
+    iterations: usize,
+    reached: bool,
+    negative_curvature: bool,
+}
+
+fn dot<T: Real>(a: &[Lanes<T>], b: &[Lanes<T>]) -> f64 {
+    reduce::chunked(a.len(), |range| {
+        let mut sum = [0.0; 4];
+        for (x, y) in a[range.clone()].iter().zip(&b[range]) {
+            for lane in 0..4 {
+                sum[lane] += x[lane].wide() * y[lane].wide();
+            }
+        }
+        sum[0] + sum[1] + sum[2]
+    })
+}
+
+/// a += factor b
+fn add<T: Real>(a: &mut [Lanes<T>], factor: T, b: &[Lanes<T>]) {
+    super::operator::by_rows(a, |first, rows| {
+        for (x, y) in rows.iter_mut().zip(&b[first..]) {
+            for lane in 0..4 {
+                x[lane] += factor * y[lane];
+            }
+        }
+    });
+}
+
+fn conjugate_gradients<T: Real>(
+    operator: &mut Operator<T>,
+    preconditioner: &BlockJacobi<T>,
+    b: &[Lanes<T>],
+    x: &mut [Lanes<T>],
+    tolerance: f64,
+    most_iterations: usize,
+) -> Inner {
+    let n = operator.rows();
+    let zero = vec![[T::default(); 4]; n];
+    let (mut r, mut z, mut q) = (b.to_vec(), zero.clone(), zero);
+    let goal = tolerance * tolerance * dot(b, b);
+    preconditioner.apply(&r, &mut z);
+    let mut p = z.clone();
+    let mut rho = dot(&r, &z);
+    let mut best = f64::INFINITY;
+    let mut since_best = 0;
+    for iteration in 0..most_iterations {
+        operator.apply(&p, &mut q);
+        let curvature = dot(&p, &q);
+        if curvature.is_nan() || curvature <= 0.0 {
+            if iteration == 0 {
+                // The preconditioned residual is still a descent direction.
+                x.copy_from_slice(&p);
+            }
+            return Inner { iterations: iteration + 1, reached: false, negative_curvature: true };
+        }
+        let alpha = rho / curvature;
+        add(x, T::of(alpha), &p);
+        add(&mut r, T::of(-alpha), &q);
+        let square = dot(&r, &r);
+        if square <= goal {
+            return Inner { iterations: iteration + 1, reached: true, negative_curvature: false };
+        }
+        // Rounding has eaten the iteration when the residual has not fallen for long.
+        if square < 0.81 * best {
+            best = square;
+            since_best = 0;
+        } else {
+            since_best += 1;
+            if since_best > 400 + n / 20 {
+                return Inner { iterations: iteration + 1, reached: false, negative_curvature: false };
+            }
+        }
+        preconditioner.apply(&r, &mut z);
+        let next = dot(&r, &z);
+        let beta = T::of(next / rho);
+        rho = next;
+        super::operator::by_rows(&mut p, |first, rows| {
+            for (p, z) in rows.iter_mut().zip(&z[first..]) {
+                for lane in 0..4 {
+                    p[lane] = z[lane] + beta * p[lane];
+                }
+            }
+        });
+    }
+    Inner { iterations: most_iterations, reached: false, negative_curvature: false }
+}
+
+impl Pcg {
+    fn refine<T: Real>(
+        &self,
+        tangent: &Tangent,
+        rhs: &[[f64; 3]],
+        x: &mut [[f64; 3]],
+        tolerance: f64,
+        finest: f64,
+    ) -> LinearReport {
+        let mut operator = Operator::<T>::new(tangent);
+        let preconditioner = BlockJacobi::<T>::new(tangent, self.blocks);
+        let mut report = LinearReport::default();
+        let whole = reduce::norm(rhs);
+        let mut residual = rhs.to_vec();
+        let mut product = vec![[0.0; 3]; rhs.len()];
+        x.fill([0.0; 3]);
+        let mut size = whole;
+        while size > 0.0 && report.iterations < self.most_iterations {
+            // Scaled to one, so that single precision keeps its range.
+            let scale = 1.0 / size;
+            let b: Vec<Lanes<T>> = residual
+                .iter()
+                .map(|v| [T::of(v[0] * scale), T::of(v[1] * scale), T::of(v[2] * scale), T::default()])
+                .collect();
+            let mut step = vec![[T::default(); 4]; rhs.len()];
+            let wanted = (tolerance * whole / size).max(finest);
+            let most = self.most_iterations - report.iterations;
+            let inner = conjugate_gradients(&mut operator, &preconditioner, &b, &mut step, wanted, most);
+            report.iterations += inner.iterations;
+            for (x, s) in x.iter_mut().zip(&step) {
+                (0..3).for_each(|i| x[i] += size * s[i].wide());
+            }
+            if inner.negative_curvature {
+                report.negative_curvature = true;
+                return report;
+            }
+            if inner.reached && wanted * size <= tolerance * whole && wanted > 50.0 * finest {
+                report.reached = true;
+                return report;
+            }
+            tangent.product(x, &mut product);
+            for ((r, b), ax) in residual.iter_mut().zip(rhs).zip(&product) {
+                *r = [b[0] - ax[0], b[1] - ax[1], b[2] - ax[2]];
+            }
+            let next = reduce::norm(&residual);
+            if next <= tolerance * whole {
+                report.reached = true;
+                return report;
+            }
+            if next.is_nan() || next >= 0.5 * size {
+                return report;
+            }
+            size = next;
+        }
+        report.reached = size == 0.0;
+        report
+    }
+}
+
+impl LinearSolver for Pcg {
+    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
+        let single = self.refine::<f32>(tangent, rhs, x, tolerance, 1e-5);
+        if single.reached {
+            return single;
+        }
+        // Too ill-conditioned for single precision, or truly indefinite: double precision decides.
+        let mut double = self.refine::<f64>(tangent, rhs, x, tolerance, 1e-13);
+        double.iterations += single.iterations;
+        double
+    }
+}

@@ -1,0 +1,134 @@
+//! Loads as forces on nodes (N). All are dead loads: found on the undeformed shape, constant in size and direction.
+
+use super::scenario::{CsfLevel, Loads};
+use super::units::{METRES_PER_MM, metres};
+use super::{FemError, element::cross};
+use crate::mesh::TetMesh;
+
+/// The nodes that loads are shared among: the corners, or corners and mid-edge nodes of quadratic tetrahedra.
+pub(super) struct Sharing<'a> {
+    pub mesh: &'a TetMesh,
+    pub quadratic: Option<Quadratic<'a>>,
+}
+
+/// Quadratic connectivity and the sorted ends of the mid-edge nodes.
+pub(super) type Quadratic<'a> = (&'a [[u32; 10]], &'a [[u32; 2]]);
+
+impl Sharing<'_> {
+    /// Integrals of the shape functions over a tetrahedron of volume 1: a quarter each, or -1/20 at corners and 1/5 at
+    /// mid-edges.
+    fn of_tet(&self, tet: usize) -> Vec<(u32, f64)> {
+        match self.quadratic {
+            None => self.mesh.tets()[tet].iter().map(|&n| (n, 0.25)).collect(),
+            Some((tets, _)) => {
+                tets[tet].iter().enumerate().map(|(k, &n)| (n, if k < 4 { -0.05 } else { 0.2 })).collect()
+            }
+        }
+    }
+
+    /// The same over a facet of area 1: a third at each corner, or at each mid-edge.
+    fn of_facet(&self, facet: [u32; 3]) -> [u32; 3] {
+        let Some((_, edges)) = self.quadratic else { return facet };
+        let corners = self.mesh.nodes_mm().len();
+        [[0, 1], [1, 2], [2, 0]].map(|[a, b]| {
+            let edge = [facet[a].min(facet[b]), facet[a].max(facet[b])];
+            (corners + edges.binary_search(&edge).unwrap_or(0)) as u32
+        })
+    }
+
+    fn position_mm(&self, node: u32) -> [f64; 3] {
+        let nodes = self.mesh.nodes_mm();
+        match self.quadratic {
+            Some((_, edges)) if node as usize >= nodes.len() => {
+                let [a, b] = edges[node as usize - nodes.len()].map(|n| nodes[n as usize]);
+                [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]))
+            }
+            _ => nodes[node as usize],
+        }
+    }
+
+    fn nodes(&self) -> usize {
+        self.mesh.nodes_mm().len() + self.quadratic.map_or(0, |(_, edges)| edges.len())
+    }
+}
+
+/// Weight of each tetrahedron shared by its nodes (equally by the four corners of a linear one); with a fluid level,
+/// nodes below it share the buoyant weight instead.
+fn add_weight_n(sharing: &Sharing, loads: &Loads, forces: &mut [[f64; 3]]) {
+    let g = loads.gravity_m_per_s2;
+    let strength = g.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if strength == 0.0 {
+        return;
+    }
+    let up = g.map(|v| -v / strength);
+    let density = |node: u32| match loads.csf {
+        Some(CsfLevel { density_kg_per_m3, level_mm }) => {
+            let x = sharing.position_mm(node);
+            let height = (0..3).map(|i| x[i] * up[i]).sum::<f64>();
+            loads.density_kg_per_m3 - if height < level_mm { density_kg_per_m3 } else { 0.0 }
+        }
+        None => loads.density_kg_per_m3,
+    };
+    let cubic = METRES_PER_MM.powi(3);
+    for tet in 0..sharing.mesh.tets().len() {
+        let volume = sharing.mesh.volume_mm3(tet) * cubic;
+        for (n, share) in sharing.of_tet(tet) {
+            let mass = share * volume * density(n);
+            (0..3).for_each(|i| forces[n as usize][i] += mass * g[i]);
+        }
+    }
+}
+
+/// The facets of a set: the facet set of that name, else the boundary facets with all three nodes in the node set.
+/// Outward facets of the boundary keep their orientation.
+pub(super) fn facets_of(mesh: &TetMesh, set: &str) -> Result<Vec<[u32; 3]>, FemError> {
+    let facets = match (mesh.facet_sets.get(set), mesh.node_sets.get(set)) {
+        (Some(facets), _) => facets.clone(),
+        (None, Some(nodes)) => {
+            let inside = |n: &u32| nodes.binary_search(n).is_ok();
+            mesh.boundary_facets(|_| true).into_iter().filter(|f| f.iter().all(inside)).collect()
+        }
+        (None, None) => return Err(FemError::unknown_set(mesh, set)),
+    };
+    if facets.is_empty() {
+        return Err(FemError::NoFacets { set: set.to_owned() });
+    }
+    Ok(facets)
+}
+
+/// Area vector of a facet, m2, along its normal.
+fn area_m2(mesh: &TetMesh, facet: [u32; 3]) -> [f64; 3] {
+    let [a, b, c] = facet.map(|n| metres(mesh.nodes_mm()[n as usize]));
+    let d = |x: [f64; 3]| [x[0] - a[0], x[1] - a[1], x[2] - a[2]];
+    cross(d(b), d(c)).map(|v| 0.5 * v)
+}
+
+fn size(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// All loads as forces on the nodes, N.
+pub(super) fn nodal_forces_n(sharing: &Sharing, loads: &Loads) -> Result<Vec<[f64; 3]>, FemError> {
+    let mesh = sharing.mesh;
+    let mut forces = vec![[0.0; 3]; sharing.nodes()];
+    add_weight_n(sharing, loads, &mut forces);
+    for patch in &loads.patch {
+        let facets = facets_of(mesh, &patch.set)?;
+        let areas: Vec<f64> = facets.iter().map(|&f| size(area_m2(mesh, f))).collect();
+        let whole: f64 = areas.iter().sum();
+        for (facet, area) in facets.iter().zip(&areas) {
+            for n in sharing.of_facet(*facet) {
+                (0..3).for_each(|i| forces[n as usize][i] += patch.force_n[i] * area / (3.0 * whole));
+            }
+        }
+    }
+    for pressure in &loads.pressure {
+        for facet in facets_of(mesh, &pressure.set)? {
+            let area = area_m2(mesh, facet);
+            for n in sharing.of_facet(facet) {
+                (0..3).for_each(|i| forces[n as usize][i] -= pressure.pressure_pa * area[i] / 3.0);
+            }
+        }
+    }
+    Ok(forces)
+}

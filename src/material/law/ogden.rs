@@ -1,0 +1,222 @@
+//! Compressible Ogden law of any number of terms, in principal stretches.
+
+use super::volume::{OfVolume, VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
+use super::{Hyperelastic, Tangent};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// One term mu/alpha (l1^alpha + l2^alpha + l3^alpha - 3).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OgdenTerm {
+    /// Exponent, not 0.
+    pub alpha: f64,
+    /// mu of the term, Pa; mu alpha > 0 for a stable term.
+    pub mu_pa: f64,
+}
+
+/// Psi = sum_p mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) - (sum_p mu_p) ln J + lambda/2 ln^2 J
+/// (Ogden, Proc. R. Soc. A 328, 1972; compressible as in Holzapfel, "Nonlinear Solid Mechanics", eq. 6.137).
+/// mu = sum_p mu_p alpha_p / 2.
+///
+/// Equal and nearly equal stretches need no special case: divided differences of powers are formed by expm1/log1p.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ogden {
+    /// The terms.
+    pub terms: Vec<OgdenTerm>,
+    /// lambda, Pa.
+    pub lame_lambda_pa: f64,
+    /// Volume ratio below which ln J is continued by its Taylor polynomial; 0: never. With a threshold, powers are
+    /// continued the same way below its cube root.
+    pub inversion_threshold: f64,
+}
+
+/// F = U diag(stretch) V^T with rotations U, V; the smallest stretch is negative when det F < 0.
+struct Principal {
+    u: Matrix3<f64>,
+    v: Matrix3<f64>,
+    /// Stretches - 1.
+    extension: Vector3<f64>,
+}
+
+impl Principal {
+    fn of(h: &Matrix3<f64>) -> Self {
+        let f = Matrix3::identity() + h;
+        // C - I: its eigenvalues keep the small strains that C would round away.
+        let eigen = SymmetricEigen::new(h + h.transpose() + h.transpose() * h);
+        let mut ascending = [0, 1, 2];
+        ascending.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let mut v = Matrix3::from_fn(|r, c| eigen.eigenvectors[(r, ascending[c])]);
+        if v.determinant() < 0.0 {
+            v.column_mut(2).neg_mut();
+        }
+        let mut extension = Vector3::from_fn(|r, _| {
+            let e = eigen.eigenvalues[ascending[r]].max(-1.0);
+            if e > -0.9 { (0.5 * e.ln_1p()).exp_m1() } else { (1.0 + e).sqrt() - 1.0 }
+        });
+        let turned = f * v;
+        let u0 = turned.column(0).normalize();
+        let in_plane = turned.column(1) - u0 * u0.dot(&turned.column(1));
+        // A point- or line-shaped element has no second direction of its own: any will do.
+        let u1 = in_plane.try_normalize(1e-300).unwrap_or_else(|| {
+            let axis = if u0.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+            u0.cross(&axis).normalize()
+        });
+        let u2 = u0.cross(&u1);
+        if turned.column(2).dot(&u2) < 0.0 {
+            extension[2] = -extension[2] - 2.0;
+        }
+        Self { u: Matrix3::from_columns(&[u0, u1, u2]), v, extension }
+    }
+}
+
+/// x^power for x = 1 + e with derivative, Taylor-continued below `floor` when `floor` > 0.
+struct Power {
+    power: f64,
+    floor: f64,
+}
+
+impl Power {
+    fn value(&self, e: f64) -> f64 {
+        let x = 1.0 + e;
+        if x > self.floor {
+            return (self.power * e.ln_1p()).exp();
+        }
+        if self.floor <= 0.0 {
+            return f64::INFINITY;
+        }
+        self.floor.powf(self.power) + self.power * self.floor.powf(self.power - 1.0) * (x - self.floor)
+    }
+
+    fn slope(&self, e: f64) -> f64 {
+        let x = (1.0 + e).max(self.floor);
+        self.power * x.powf(self.power - 1.0)
+    }
+
+    /// (value(a) - value(b)) / (a - b), the slope when a = b.
+    fn divided_difference(&self, a: f64, b: f64) -> f64 {
+        if a == b {
+            return self.slope(a);
+        }
+        let smallest = (1.0 + a).min(1.0 + b);
+        if smallest > self.floor {
+            let relative = (a - b) / (1.0 + b);
+            return self.value(b) * (self.power * relative.ln_1p()).exp_m1() / (a - b);
+        }
+        (self.value(a) - self.value(b)) / (a - b)
+    }
+}
+
+impl Ogden {
+    /// From terms and Poisson's ratio.
+    pub fn new(terms: Vec<OgdenTerm>, poisson_ratio: f64) -> Self {
+        let shear: f64 = terms.iter().map(|t| 0.5 * t.mu_pa * t.alpha).sum();
+        Self { terms, lame_lambda_pa: lame_lambda_pa(shear, poisson_ratio), inversion_threshold: 0.0 }
+    }
+
+    fn of_volume(&self, h: &Matrix3<f64>) -> OfVolume {
+        let shear = self.terms.iter().map(|t| t.mu_pa).sum();
+        VolumeLogarithm { floor: self.inversion_threshold }.energy(shear, self.lame_lambda_pa, volume_change(h))
+    }
+
+    /// d Psi/d l of each term is mu l^(alpha - 1).
+    fn slopes(&self) -> impl Iterator<Item = (f64, Power)> + '_ {
+        let floor = self.inversion_threshold.cbrt();
+        self.terms.iter().map(move |t| (t.mu_pa, Power { power: t.alpha - 1.0, floor }))
+    }
+
+    /// Integral of the (continued) slope from 1: (l^alpha - 1) / alpha above the floor.
+    fn stretch_energy(&self, e: f64) -> f64 {
+        let floor = self.inversion_threshold.cbrt();
+        self.terms
+            .iter()
+            .map(|t| {
+                let x = (1.0 + e).max(floor) - 1.0;
+                let below = (1.0 + e - floor).min(0.0);
+                let regular = if x > -1.0 { (t.alpha * x.ln_1p()).exp_m1() / t.alpha } else { f64::INFINITY };
+                let p = Power { power: t.alpha - 1.0, floor };
+                let continued = if below < 0.0 {
+                    below * p.value(floor - 1.0) + 0.5 * below * below * p.slope(floor - 1.0)
+                } else {
+                    0.0
+                };
+                t.mu_pa * (regular + continued)
+            })
+            .sum()
+    }
+}
+
+impl Hyperelastic for Ogden {
+    fn energy_density_pa(&self, h: &Matrix3<f64>) -> f64 {
+        let volume = self.of_volume(h).value;
+        if volume == f64::INFINITY {
+            return volume;
+        }
+        let principal = Principal::of(h);
+        principal.extension.iter().map(|&e| self.stretch_energy(e)).sum::<f64>() + volume
+    }
+
+    fn first_piola_kirchhoff_pa(&self, h: &Matrix3<f64>) -> Matrix3<f64> {
+        let Principal { u, v, extension } = Principal::of(h);
+        let stress = extension.map(|e| self.slopes().map(|(mu, p)| mu * p.value(e)).sum());
+        let f = Matrix3::identity() + h;
+        u * Matrix3::from_diagonal(&stress) * v.transpose() + cofactors(&f) * self.of_volume(h).first
+    }
+
+    fn tangent_pa(&self, h: &Matrix3<f64>) -> Tangent {
+        let Principal { u, v, extension } = Principal::of(h);
+        let stress = extension.map(|e| self.slopes().map(|(mu, p)| mu * p.value(e)).sum::<f64>());
+        // In the frame U^T dF V: diagonal entries see their slope; each pair (i, j) splits into a symmetric part that
+        // sees the divided difference and a skew part that sees (s_i + s_j) / (l_i + l_j).
+        let mut principal = Tangent::zeros();
+        for i in 0..3 {
+            principal[(4 * i, 4 * i)] = self.slopes().map(|(mu, p)| mu * p.slope(extension[i])).sum();
+            for j in (0..3).filter(|&j| j != i) {
+                let (a, b) = (extension[i], extension[j]);
+                let symmetric: f64 = self.slopes().map(|(mu, p)| mu * p.divided_difference(a, b)).sum();
+                let sum = 2.0 + a + b;
+                // l_i + l_j -> 0 only for mirrored elements, where the limit is kept finite.
+                let skew = (stress[i] + stress[j]) / if sum.abs() < 1e-9 { 1e-9_f64.copysign(sum) } else { sum };
+                principal[(i + 3 * j, i + 3 * j)] = 0.5 * (symmetric + skew);
+                principal[(i + 3 * j, j + 3 * i)] = 0.5 * (symmetric - skew);
+            }
+        }
+        // vec(U X V^T) = (V kron U) vec(X), column-major.
+        let turn = Tangent::from_fn(|row, col| u[(row % 3, col % 3)] * v[(row / 3, col / 3)]);
+        let mut tangent = turn * principal * turn.transpose();
+        add_tangent_of_volume(&mut tangent, self.of_volume(h), &(Matrix3::identity() + h));
+        tangent
+    }
+
+    fn small_strain_shear_modulus_pa(&self) -> f64 {
+        self.terms.iter().map(|t| 0.5 * t.mu_pa * t.alpha).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::law::check_hyperelastic;
+
+    fn published() -> Ogden {
+        Ogden::new(vec![OgdenTerm { alpha: -4.0, mu_pa: -500.0 }], 0.45)
+    }
+
+    #[test]
+    fn ogden_obeys_the_laws_of_hyperelasticity() {
+        check_hyperelastic(&published());
+        let two = vec![OgdenTerm { alpha: -4.7, mu_pa: -300.0 }, OgdenTerm { alpha: 2.0, mu_pa: 200.0 }];
+        check_hyperelastic(&Ogden::new(two, 0.3));
+        check_hyperelastic(&Ogden { inversion_threshold: 0.97, ..published() });
+    }
+
+    #[test]
+    fn ogden_with_exponent_two_is_neo_hookean() {
+        let ogden = Ogden::new(vec![OgdenTerm { alpha: 2.0, mu_pa: 1000.0 }], 0.45);
+        let neo = crate::material::law::NeoHookean::new(1000.0, 0.45);
+        let h = Matrix3::new(0.12, -0.05, 0.08, 0.03, -0.09, 0.06, -0.07, 0.1, 0.05);
+        assert!((ogden.energy_density_pa(&h) - neo.energy_density_pa(&h)).abs() < 1e-11 * 1000.0);
+        assert!((ogden.first_piola_kirchhoff_pa(&h) - neo.first_piola_kirchhoff_pa(&h)).abs().max() < 1e-9);
+        assert!((ogden.tangent_pa(&h) - neo.tangent_pa(&h)).abs().max() < 1e-8);
+    }
+}

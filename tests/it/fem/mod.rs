@@ -1,0 +1,5 @@
+//! The solver against closed forms, identities and other people's figures.
+
+mod meshes;
+mod refusals;
+mod statics;
