@@ -1,0 +1,165 @@
+//! The MNI152 2009a symmetric template, embedded: T1, tissue probabilities, labels, and rough regions on it.
+//!
+//! V. Fonov et al., "Unbiased average age-appropriate atlases for pediatric studies", NeuroImage 54(1), 2011. Where each
+//! file came from is written in `atlases/mni152/PROVENANCE.md`.
+
+use super::atlas_labels::derive_labels;
+use crate::geometry::{Mni, Position};
+use crate::image::{Grid, LabelMap, Mask, Volume};
+use nalgebra::Matrix4;
+use std::io::Read;
+use std::sync::OnceLock;
+
+/// The template on its 1 mm grid of 197 x 233 x 189 voxels.
+#[derive(Clone, Debug)]
+pub struct Atlas {
+    /// T1 intensity, 0 outside the brain (the template comes without the skull).
+    pub t1: Volume<u8, Mni>,
+    /// Probability of grey matter, 0 to 255.
+    pub grey: Volume<u8, Mni>,
+    /// Probability of white matter, 0 to 255.
+    pub white: Volume<u8, Mni>,
+    /// The labels of [`super::label`] derived from the maps: CSF, grey matter, white matter, ventricle.
+    pub labels: LabelMap<Mni>,
+}
+
+/// A hemisphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// The patient's left, x < 0.
+    Left,
+    /// The patient's right, x > 0.
+    Right,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
+
+/// The embedded template, decoded once.
+///
+/// # Panics
+/// Never for the embedded files; a test decodes them.
+pub fn template() -> &'static Atlas {
+    static ATLAS: OnceLock<Atlas> = OnceLock::new();
+    ATLAS.get_or_init(|| Atlas {
+        t1: decode(include_bytes!("../../atlases/mni152/mni_icbm152_t1_tal_nlin_sym_09a_converted.nii.gz")),
+        grey: decode(include_bytes!("../../atlases/mni152/mni_icbm152_gm_tal_nlin_sym_09a_converted.nii.gz")),
+        white: decode(include_bytes!("../../atlases/mni152/mni_icbm152_wm_tal_nlin_sym_09a_converted.nii.gz")),
+        labels: decode(include_bytes!("../../atlases/mni152/labels.nii.gz")),
+    })
+}
+
+impl Atlas {
+    /// The grid all maps share.
+    pub fn grid(&self) -> Grid<Mni> {
+        self.t1.grid
+    }
+
+    /// The brain: everywhere the template has an intensity.
+    pub fn brain(&self) -> Mask<Mni> {
+        self.t1.map(|value| value > 0)
+    }
+
+    /// T1 intensity as floating point, for registration and resampling.
+    pub fn t1_f32(&self) -> Volume<f32, Mni> {
+        self.t1.map(f32::from)
+    }
+
+    /// The label map computed anew from the three maps: what `labels` was made by.
+    pub fn derived_labels(&self) -> LabelMap<Mni> {
+        derive_labels(&self.t1, &self.grey, &self.white)
+    }
+}
+
+/// The temporal lobe that holds a point, by planes placed by eye on the template: below the Sylvian fissure, above the
+/// tentorium, lateral of the brainstem. Rough: for naming and ranking, not for measuring.
+pub fn temporal_lobe(p: Position<Mni>) -> Option<Side> {
+    let [x, y, z] = [p.mm.x, p.mm.y, p.mm.z];
+    let sylvian_mm = -2.0 - 0.35 * (y - 10.0);
+    let tentorium_mm = if y < -30.0 { -22.0 + 0.35 * (-30.0 - y) } else { -50.0 };
+    let inside = x.abs() > 17.0 && (-64.0..26.0).contains(&y) && z < sylvian_mm && z > tentorium_mm;
+    inside.then_some(if x < 0.0 { Side::Left } else { Side::Right })
+}
+
+/// One embedded map. All of them are little-endian unsigned bytes in NIfTI-1 with an sform and no scaling, which the
+/// tests check; the general reader is `image::nifti`'s.
+fn decode(gzip: &[u8]) -> Volume<u8, Mni> {
+    let mut bytes = Vec::new();
+    flate2::read::GzDecoder::new(gzip).read_to_end(&mut bytes).expect("the embedded atlas is whole");
+    let dims = [42, 44, 46].map(|at| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]])));
+    let row = |r: usize| {
+        [0, 1, 2, 3].map(|c| {
+            let at = 280 + 16 * r + 4 * c;
+            f64::from(f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+        })
+    };
+    let mm_from_voxel = Matrix4::from_fn(|r, c| if r < 3 { row(r)[c] } else { f64::from(u8::from(c == 3)) });
+    let grid = Grid::new(dims, mm_from_voxel).expect("the embedded affine can be inverted");
+    Volume::from_data(grid, bytes[352..352 + grid.len()].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::segment::label;
+
+    #[test]
+    fn the_maps_lie_on_one_grid_with_the_origin_inside_the_brain() {
+        let atlas = template();
+        assert_eq!(atlas.grid().dims, [197, 233, 189]);
+        for grid in [atlas.grey.grid, atlas.white.grid, atlas.labels.grid] {
+            assert_eq!(grid, atlas.grid());
+        }
+        assert_eq!(atlas.grid().spacing_mm(), [1.0; 3]);
+        assert_eq!(atlas.t1.nearest(Position::new(0.0, -20.0, 0.0)).map(|v| v > 0), Some(true));
+        assert!((1850.0..1920.0).contains(&atlas.brain().volume_cc()), "{}", atlas.brain().volume_cc());
+    }
+
+    #[test]
+    fn the_committed_labels_are_the_derivation() {
+        let atlas = template();
+        let derived = atlas.derived_labels();
+        let differing = derived.data.iter().zip(&atlas.labels.data).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "run `cargo run --release --example derive_atlas_labels` and commit the file");
+    }
+
+    #[test]
+    fn the_labels_have_the_volumes_of_a_brain_and_are_nearly_symmetric() {
+        let labels = &template().labels;
+        let cc = |l: u8| labels.map(|v| v == l).volume_cc();
+        assert!((15.0..25.0).contains(&cc(label::VENTRICLE)), "{}", cc(label::VENTRICLE));
+        assert!(cc(label::GREY_MATTER) > 1.3 * cc(label::WHITE_MATTER));
+        assert!(cc(label::CSF) > 50.0);
+        let ventricle_in = |sign: f64| {
+            let grid = labels.grid;
+            let side = |n: usize| {
+                let [i, _, _] = grid.voxel(n);
+                sign * (i as f64 + grid.mm_from_voxel[(0, 3)]) > 0.0
+            };
+            (0..grid.len()).filter(|&n| labels.data[n] == label::VENTRICLE && side(n)).count() as f64
+        };
+        assert!((ventricle_in(1.0) / ventricle_in(-1.0) - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn anatomical_landmarks_have_their_labels() {
+        let at = |x, y, z| template().labels.nearest(Position::new(x, y, z));
+        assert_eq!(at(8.0, 20.0, 8.0), Some(label::VENTRICLE), "frontal horn");
+        assert_eq!(at(-26.0, -45.0, 10.0), Some(label::VENTRICLE), "atrium");
+        assert_eq!(at(0.0, -10.0, -4.0), Some(label::VENTRICLE), "third ventricle");
+        assert_eq!(at(0.0, -38.0, 0.0), Some(label::CSF), "quadrigeminal cistern is no ventricle");
+        assert_eq!(at(0.0, -45.0, -35.0), Some(label::CSF), "fourth ventricle is no part of the label");
+        assert_eq!(at(25.0, -20.0, 30.0), Some(label::WHITE_MATTER), "corona radiata");
+        assert_eq!(at(0.0, 0.0, 110.0), Some(label::BACKGROUND), "air");
+        assert_eq!(temporal_lobe(Position::new(-55.0, -10.0, -20.0)), Some(Side::Left));
+        assert_eq!(temporal_lobe(Position::new(45.0, 10.0, -30.0)), Some(Side::Right));
+        assert_eq!(temporal_lobe(Position::new(45.0, 30.0, 20.0)), None);
+    }
+}
