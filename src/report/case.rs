@@ -2,7 +2,7 @@
 
 use super::colour::ColourScale;
 use super::figure::CaseImages;
-use super::mesh_figure::{cut_views, middle_mm, value_views};
+use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
 use super::page::{CasePage, ErrorMap, title_of};
 use super::viewer::{ViewedSurface, Viewer};
 use crate::artefact::{WriteError, write_whole};
@@ -112,6 +112,7 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     }
     if let Some(rest) = &rest {
         page.mesh_pictures = cut_views(&rest.mesh, focus_mm(&rest.mesh), PICTURE);
+        page.mesh_legend = legend(&rest.mesh);
     } else {
         page.absent.push("the mesh (mesh/rest.vtu is not there)".to_owned());
     }

@@ -183,7 +183,7 @@ impl LineChart {
         let top = 14.0 + 22.0 * legend_rows;
         let points = || self.series.iter().flat_map(|s| &s.points).filter(|p| p.y.is_finite());
         let xs = points().map(|p| p.x).chain(self.x_rules.iter().map(|r| r.at));
-        let x_axis = Axis::over(xs, self.x_log, false, [64.0, width - 18.0]);
+        let x_axis = Axis::over(xs, self.x_log, false, [74.0, width - 18.0]);
         let ys = points()
             .flat_map(|p| [p.y - p.y_error.unwrap_or(0.0), p.y + p.y_error.unwrap_or(0.0)])
             .chain(self.y_rules.iter().map(|r| r.at));
@@ -261,7 +261,7 @@ impl LineChart {
     }
 
     fn legend(&self, svg: &mut String) {
-        let mut x = 70.0;
+        let mut x = 80.0;
         for (n, series) in self.series.iter().enumerate() {
             marker(svg, MARKERS[n % 3], x, 14.0, SERIES_COLOURS[n % SERIES_COLOURS.len()], "");
             let name = escape(&series.name);
@@ -464,7 +464,7 @@ pub fn histogram(values: &[f64], x_label: &str, y_label: &str, scale: Option<&Co
     let bins = 32;
     let counts = counts(&finite, low, high, bins);
     let (width, height) = (640.0, 260.0);
-    let mut x_axis = Axis::over([low, high].into_iter(), false, true, [64.0, width - 18.0]);
+    let mut x_axis = Axis::over([low, high].into_iter(), false, true, [74.0, width - 18.0]);
     (x_axis.low, x_axis.high) = (low, if high > low { high } else { low + 1.0 });
     let y_axis = Axis::over(counts.iter().map(|c| *c as f64), false, true, [height - 52.0, 14.0]);
     let description =

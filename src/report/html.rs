@@ -46,6 +46,18 @@ pub fn png_address(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
 
+/// A whole number, thousands apart with a thin space.
+pub fn count(n: usize) -> String {
+    number(n as f64, n.max(1).ilog10() as usize + 1)
+}
+
+/// A number with a fixed count of decimals and a true minus sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    if zero { text.replace('-', "") } else { text.replace('-', "\u{2212}") }
+}
+
 /// A number for a reader: `digits` significant digits, thousands apart with a thin space, no exponent.
 pub fn number(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -91,5 +103,7 @@ mod tests {
         assert_eq!(number(-2.5, 2), "\u{2212}2.5");
         assert_eq!(number(f64::NAN, 3), "–");
         assert_eq!(number(0.0, 3), "0.00");
+        assert_eq!((count(0), count(644), count(152052)), ("0".into(), "644".into(), "152\u{2009}052".into()));
+        assert_eq!((fixed(-0.04, 1), fixed(-1.25, 1)), ("0.0".into(), "\u{2212}1.2".into()));
     }
 }

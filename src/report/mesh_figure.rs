@@ -1,7 +1,7 @@
 //! Pictures of tetrahedral meshes: cut views by label, error maps, the preview that stands alone.
 
 use super::colour::{ColourScale, NO_VALUE, Rgb, of_label, tick_label, ticks, viridis};
-use super::html::number;
+use super::html::{fixed, number};
 use super::lettering;
 use super::page::CaptionedPicture;
 use super::picture::Picture;
@@ -60,7 +60,7 @@ pub fn cut_views(mesh: &TetMesh, at_mm: [f64; 3], size: [usize; 2]) -> Vec<Capti
             scene.add_surface(&surface, &colours, Some(&plane), false);
             scene.add_section(mesh, mesh.nodes_mm(), &plane, |tet, _, _| of_label(mesh.labels()[tet]));
             let (picture, _) = scene.render(&camera(view), size[0], size[1]);
-            let place = format!("{} = {} mm", axis_letter(view.axis), number(at_mm[view.axis], 2));
+            let place = format!("{} = {} mm", axis_letter(view.axis), fixed(at_mm[view.axis], 0));
             CaptionedPicture {
                 png: picture.to_png(),
                 size,
@@ -81,6 +81,11 @@ fn present_labels(mesh: &TetMesh) -> Vec<u8> {
     labels.sort_unstable();
     labels.dedup();
     labels
+}
+
+/// Colours and names of the labels in a mesh, ascending.
+pub fn legend(mesh: &TetMesh) -> Vec<(Rgb, String)> {
+    present_labels(mesh).into_iter().map(of_label).zip(label_names(mesh)).collect()
 }
 
 /// Names of the labels in a mesh, with underscores as spaces.
@@ -150,7 +155,7 @@ pub fn value_views(
         let mut scene = Scene::default();
         scene.add_surface(&surface, &colours_of(&on_surface, scale), Some(&plane), false);
         scene.add_section(mesh, nodes_mm, &plane, |_, [a, b], w| scale.colour(values[a] + w * (values[b] - values[a])));
-        shoot(&scene, &camera(view), format!("Coronal cut at y = {} mm", number(at, 2)), "The mesh cut open");
+        shoot(&scene, &camera(view), format!("Coronal cut at y = {} mm", fixed(at, 0)), "The mesh cut open");
     }
     for set in sets {
         let Some(facets) = set_facets(mesh, set, &facets) else { continue };
@@ -256,8 +261,7 @@ pub fn preview(mesh: &TetMesh, values: Option<(&[f64], &str)>, width: usize) -> 
 }
 
 fn draw_legend(sheet: &mut Picture, mesh: &TetMesh, [mut x, y]: [usize; 2]) {
-    for (l, name) in present_labels(mesh).into_iter().zip(label_names(mesh)) {
-        let [r, g, b] = of_label(l);
+    for ([r, g, b], name) in legend(mesh) {
         sheet.paste(&Picture::filled(18, 18, [r, g, b, 255]), x, y - 2);
         lettering::write(sheet, &name, [x + 26, y], 2, INK);
         x += 26 + lettering::width(&name, 2) + 28;
@@ -314,7 +318,7 @@ mod tests {
         let scale = ColourScale::over(values, "error (mm)").unwrap();
         let views = value_views(&mesh, mesh.nodes_mm(), &values, &scale, &["margin", "falx"], [40, 30]);
         let captions: Vec<&str> = views.iter().map(|v| v.caption.as_str()).collect();
-        assert_eq!(captions, ["Outer surface from the left", "Outer surface from the right", "The resection margin"]);
+        assert_eq!(captions, ["Outer surface from the left", "Outer surface from the right", "Resection margin"]);
         assert!(views[0].description.contains("from 1.00 to 3.00"));
         let all = [1.0; 5];
         let scale = ColourScale::over(all, "error (mm)").unwrap();

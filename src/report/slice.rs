@@ -130,7 +130,8 @@ pub fn positions_mm(plane: Plane, bounds_mm: [[f64; 3]; 2], count: usize, share:
     (0..count).map(|n| at(n).round()).collect()
 }
 
-/// Grey values shown as black and as white: the 0.5 and 99.5 % quantiles inside a mask.
+/// Grey values shown as black and as white, from the 0.5 and 99.5 % quantiles inside a mask; white matter stays below
+/// white, so that outlines can be seen on it.
 ///
 /// `None` when the mask is empty or the image is constant in it.
 pub fn window<F: Frame>(volume: &Volume<f32, F>, mask: &Mask<F>) -> Option<[f32; 2]> {
@@ -141,7 +142,7 @@ pub fn window<F: Frame>(volume: &Volume<f32, F>, mask: &Mask<F>) -> Option<[f32;
     let at = |q: f64| values[(q * last as f64).round() as usize];
     let [low, high] = [at(0.005), at(0.995)];
     // Black is kept for what lies outside the mask and for fluid near zero.
-    (high > low).then_some([low.min(0.25 * high), high])
+    (high > low).then_some([low.min(0.25 * high), high + 0.15 * (high - low)])
 }
 
 /// Grey bytes of a tile: the volume at `from_tile(position)`, black where the mask says no. The indirection lets a page

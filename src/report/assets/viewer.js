@@ -5,7 +5,7 @@
   const say = (text) => { message.textContent = text; message.hidden = !text; };
   const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
-  // The library lies in the page compressed; it is unpacked only when the view comes near.
+  // The library lies in the page compressed; it is unpacked once the page has been painted.
   async function library() {
     const packed = new Blob([bytes(document.getElementById("niivue").textContent)]);
     const text = await new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).text();
@@ -29,6 +29,7 @@
     meshes.forEach((mesh) => nv.addMesh(mesh));
     nv.setSliceType(SLICE_TYPE.RENDER);
     nv.setRenderAzimuthElevation(120, 15);
+    nv.setScale(1.3);
     nv.drawScene();
     say("");
     canvas.dataset.ready = "yes";
@@ -53,8 +54,7 @@
   }
 
   const begin = () => start().catch((error) => say("The 3-D view could not start (" + error.message + "). The pictures above show the same data."));
-  const near = new IntersectionObserver((entries) => {
-    if (entries.some((e) => e.isIntersecting)) { near.disconnect(); begin(); }
-  }, { rootMargin: "600px" });
-  near.observe(canvas);
+  // After the first paint, so that the summary is never kept waiting.
+  const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
+  requestAnimationFrame(() => idle(begin, { timeout: 500 }));
 })();

@@ -1,6 +1,6 @@
 //! The methods paragraph, what to cite, and BibTeX.
 
-use super::super::html::{escape, number};
+use super::super::html::{count, escape};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use std::fmt::Write;
 
@@ -128,8 +128,8 @@ fn paragraph(outcome: &ExperimentOutcome) -> String {
         let _ = write!(
             text,
             "The brain was meshed with {engine} into {} tetrahedra and {} nodes. ",
-            number(mesh.tets as f64, 9),
-            number(mesh.nodes as f64, 9)
+            count(mesh.tets),
+            count(mesh.nodes)
         );
     }
     let tissues: Vec<String> = outcome.tissues.iter().map(|t| escape(&t.replace('_', " "))).collect();

@@ -8,7 +8,7 @@ pub use methods::{Reference, references};
 pub use results::set_name;
 
 use super::chart;
-use super::colour::ColourScale;
+use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
 use super::html::{escape, png_address};
 use super::viewer::Viewer;
@@ -61,6 +61,8 @@ pub struct CasePage {
     pub mosaics: Vec<Mosaic>,
     /// Pictures of the mesh.
     pub mesh_pictures: Vec<CaptionedPicture>,
+    /// What the colours of the mesh pictures mean.
+    pub mesh_legend: Vec<(Rgb, String)>,
     /// Per-node error.
     pub error_map: Option<ErrorMap>,
     /// Surfaces for the 3-D view.
@@ -180,7 +182,20 @@ impl CasePage {
         if self.mesh_pictures.is_empty() && tables.is_none() {
             return None;
         }
-        Some(pictures(&self.mesh_pictures) + &tables.unwrap_or_default())
+        let mut html = pictures(&self.mesh_pictures);
+        if !self.mesh_legend.is_empty() {
+            html.push_str("<ul class=\"swatches\" aria-label=\"Colours of the cells\">");
+            for (colour, name) in &self.mesh_legend {
+                let _ = write!(
+                    html,
+                    "<li><svg viewBox=\"0 0 10 10\" aria-hidden=\"true\"><path fill=\"{}\" d=\"M0 0h10v10H0z\"/></svg>{}</li>",
+                    hex(*colour),
+                    escape(name)
+                );
+            }
+            html.push_str("</ul>\n");
+        }
+        Some(html + &tables.unwrap_or_default())
     }
 
     fn provenance_section(&self) -> Option<String> {
@@ -233,7 +248,7 @@ fn error_section(map: &ErrorMap) -> String {
     html += &pictures(&map.pictures);
     let _ = write!(html, "<div class=\"bar-row\">{}</div>\n<div class=\"charts\">", chart::colour_bar(&map.scale));
     for (set, errors) in &map.errors_mm {
-        let label = format!("error at {} (mm)", set_name(set));
+        let label = format!("error, {} (mm)", set_name(set));
         let chart = chart::histogram(errors, &label, "nodes", Some(&map.scale));
         let _ = write!(html, "<figure>{chart}<figcaption>{}</figcaption></figure>", escape(&results::spread(errors)));
     }

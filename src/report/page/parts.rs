@@ -119,7 +119,7 @@ pub fn registration(figure: &RegistrationFigure) -> String {
 pub fn rating() -> String {
     let mut html = String::from(
         "<form id=\"rating-form\"><p>Rate what you saw and keep the rating beside the report. Nothing is sent \
-         anywhere; saving needs JavaScript.</p>",
+         anywhere; saving needs JavaScript.</p><div class=\"grades\">",
     );
     for (id, what) in [
         ("registration", "Registration"),
@@ -139,7 +139,7 @@ pub fn rating() -> String {
         }
         html.push_str("</fieldset>");
     }
-    html + "<p><label for=\"rating-note\">Note (no names)</label><textarea id=\"rating-note\" rows=\"3\"></textarea></p>\
+    html + "</div><p><label for=\"rating-note\">Note (no names)</label><textarea id=\"rating-note\" rows=\"3\"></textarea></p>\
             <p><button type=\"submit\">Save rating (JSON)</button> <output id=\"rating-said\" for=\"rating-note\"></output></p></form>\n"
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::chart::{DataPoint, HeatMap, LineChart, Rule, Series, colour_bar};
 use super::super::colour::ColourScale;
-use super::super::html::{escape, number};
+use super::super::html::{count, escape, fixed, number};
 use super::parts::quantity;
 use crate::experiment::outcome::{
     ExperimentKind, ExperimentOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
@@ -13,8 +13,8 @@ use std::fmt::Write;
 pub fn set_name(set: &str) -> String {
     match set {
         "all" => "all nodes".to_owned(),
-        "ventricle" => "the ventricle wall".to_owned(),
-        "margin" => "the resection margin".to_owned(),
+        "ventricle" => "ventricle wall".to_owned(),
+        "margin" => "resection margin".to_owned(),
         other => other.replace('_', " "),
     }
 }
@@ -95,8 +95,8 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
         html += &tile("Measurement error", &quantity(floor.combined_mm(), 2, "mm"), &parts.join(", "));
     }
     if let Some(mesh) = &outcome.mesh {
-        let note = format!("{} nodes, engine {}", number(mesh.nodes as f64, 9), escape(&mesh.engine));
-        html += &tile("Tetrahedra", &number(mesh.tets as f64, 9), &note);
+        let note = format!("{} nodes, engine {}", count(mesh.nodes), escape(&mesh.engine));
+        html += &tile("Tetrahedra", &count(mesh.tets), &note);
     }
     html + "</dl>\n"
 }
@@ -125,9 +125,9 @@ fn signed(level: f64) -> String {
 
 fn sentence(outcome: &ExperimentOutcome) -> String {
     let converged = outcome.samples.iter().filter(|s| s.converged).count();
-    let count = format!("{converged} of {} simulations converged.", outcome.samples.len());
+    let tally = format!("{converged} of {} simulations converged.", outcome.samples.len());
     let Some(best) = outcome.best() else {
-        return format!("{count} There is no best sample. Compared with: {}.", escape(&outcome.reference));
+        return format!("{tally} There is no best sample. Compared with: {}.", escape(&outcome.reference));
     };
     let best_id = escape(&best.id);
     let verdict = match outcome.kind {
@@ -139,14 +139,14 @@ fn sentence(outcome: &ExperimentOutcome) -> String {
                 let percent = number((100.0 * (rest - rmse) / rest).abs(), 2);
                 let set = escape(&set_name(set));
                 if rmse < rest {
-                    format!("The best sample, {best_id}, takes away {percent} % of the error at {set}.")
+                    format!("The best sample, {best_id}, takes away {percent} % of the error at the {set}.")
                 } else {
-                    format!("The best sample, {best_id}, does not come nearer than no deformation at {set}.")
+                    format!("The best sample, {best_id}, does not come nearer than no deformation at the {set}.")
                 }
             })
         }
     };
-    format!("{count} {verdict} Compared with: {}.", escape(&outcome.reference))
+    format!("{tally} {verdict} Compared with: {}.", escape(&outcome.reference))
 }
 
 /// Registrations in numbers.
@@ -158,11 +158,11 @@ pub fn registrations(all: &[RegistrationOutcome]) -> Option<String> {
     let rows: Vec<(bool, Vec<String>)> = all
         .iter()
         .map(|r| {
-            let shift: Vec<String> = r.translation_mm.iter().map(|t| number(*t, 3)).collect();
+            let shift: Vec<String> = r.translation_mm.iter().map(|t| fixed(*t, 2)).collect();
             let similarity = |s: Option<f64>| s.map_or_else(|| "–".to_owned(), |s| number(s, 4));
             let cells = vec![
                 format!("{} to {}", escape(&r.moving), escape(&r.fixed)),
-                number(r.rotation_deg, 3),
+                fixed(r.rotation_deg, 2),
                 shift.join(", "),
                 escape(&r.similarity),
                 similarity(r.similarity_before),
@@ -183,8 +183,8 @@ pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
         };
         let mut rows = vec![
             ("engine".to_owned(), escape(&m.engine)),
-            ("nodes".to_owned(), number(m.nodes as f64, 9)),
-            ("tetrahedra".to_owned(), number(m.tets as f64, 9)),
+            ("nodes".to_owned(), count(m.nodes)),
+            ("tetrahedra".to_owned(), count(m.tets)),
             ("smallest dihedral angle".to_owned(), optional(m.dihedral_min_deg, 3, "°")),
             ("tetrahedra below 10°".to_owned(), optional(m.dihedral_below_10_percent, 2, "%")),
             ("radius ratio, mean".to_owned(), optional(m.radius_ratio_mean, 3, "")),
@@ -209,10 +209,10 @@ pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
             .sets
             .iter()
             .map(|s| {
-                let centre = s.centroid_mm.map(|c| c.map(|x| number(x, 3)).join(", "));
+                let centre = s.centroid_mm.map(|c| c.map(|x| fixed(x, 1)).join(", "));
                 let area = s.area_mm2.map(|a| number(a, 4));
                 let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
-                let cells = vec![escape(&s.name), number(s.nodes as f64, 9), or_dash(area), or_dash(centre)];
+                let cells = vec![escape(&s.name), count(s.nodes), or_dash(area), or_dash(centre)];
                 (false, cells)
             })
             .collect();
@@ -392,13 +392,22 @@ impl Grid {
 fn sample_table(outcome: &ExperimentOutcome) -> String {
     let sets = outcome.rmse_sets();
     let mut head = vec!["sample".to_owned()];
-    let with_levels = outcome.samples.iter().any(|s| !s.sd_levels.is_empty());
+    let level_of = |s: &SampleOutcome, tissue: &String| s.sd_levels.get(tissue).copied();
+    let together = |s: &SampleOutcome| outcome.tissues.windows(2).all(|t| level_of(s, &t[0]) == level_of(s, &t[1]));
+    // One column when all tissues move together, none without levels.
+    let levelled: &[String] = if outcome.samples.iter().all(|s| s.sd_levels.is_empty()) {
+        &[]
+    } else if outcome.samples.iter().all(together) {
+        outcome.tissues.get(..1).unwrap_or(&[])
+    } else {
+        &outcome.tissues
+    };
+    for tissue in levelled {
+        let whose = if levelled.len() == 1 { String::new() } else { format!(" of {}", escape(&tissue_name(tissue))) };
+        head.push(format!("level{whose} (SD)"));
+    }
     for tissue in &outcome.tissues {
-        let name = escape(&tissue_name(tissue));
-        if with_levels {
-            head.push(format!("{name}: level (SD)"));
-        }
-        head.push(format!("{name}: shear modulus (Pa)"));
+        head.push(format!("µ of {} (Pa)", escape(&tissue_name(tissue))));
     }
     head.extend(sets.iter().map(|set| format!("RMSE, {} (mm)", escape(&set_name(set)))));
     head.extend(["largest displacement (mm)", "Newton steps", "converged"].map(str::to_owned));
@@ -406,7 +415,7 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
     let dash = || "–".to_owned();
     if !outcome.rest_rmse_mm.is_empty() {
         let mut row = vec!["undeformed".to_owned()];
-        row.extend(outcome.tissues.iter().flat_map(|_| if with_levels { vec![dash(), dash()] } else { vec![dash()] }));
+        row.extend(levelled.iter().chain(&outcome.tissues).map(|_| dash()));
         row.extend(sets.iter().map(|set| outcome.rest_rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
         row.extend([number(0.0, 1), dash(), dash()]);
         rows.push((false, row));
@@ -414,19 +423,16 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
     for s in &outcome.samples {
         let best = outcome.best_sample.as_deref() == Some(s.id.as_str());
         let mut row = vec![if best { format!("{} · best", escape(&s.id)) } else { escape(&s.id) }];
-        for tissue in &outcome.tissues {
-            if with_levels {
-                row.push(s.sd_levels.get(tissue).map_or_else(dash, |level| signed(*level)));
-            }
-            row.push(s.shear_modulus_pa.get(tissue).map_or_else(dash, |mu| number(*mu, 4)));
-        }
+        row.extend(levelled.iter().map(|t| s.sd_levels.get(t).map_or_else(dash, |level| signed(*level))));
+        let modulus = |t: &String| s.shear_modulus_pa.get(t).map_or_else(dash, |mu| number(*mu, 4));
+        row.extend(outcome.tissues.iter().map(modulus));
         row.extend(sets.iter().map(|set| s.rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
         row.push(s.displacement_max_mm.map_or_else(dash, |mm| number(mm, 3)));
         row.push(s.newton_iterations.to_string());
         row.push(if s.converged { "yes" } else { "no" }.to_owned());
         rows.push((best, row));
     }
-    table("Samples", &head, &rows)
+    table("Samples (µ: shear modulus at rest)", &head, &rows)
 }
 
 /// Residuals over Newton steps.
