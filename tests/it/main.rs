@@ -2,6 +2,7 @@
 
 mod fem;
 mod mesh_files;
+mod pipelines;
 mod python;
 mod rooms;
 mod transform_files;

@@ -1,7 +1,7 @@
 //! Other people's readers: runs a Python script in the environment of `pipelines/requirements-test.txt`.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 /// `HGM_PYTHON`, else `.venv/bin/python` in the project root.
 fn interpreter() -> PathBuf {
@@ -11,19 +11,26 @@ fn interpreter() -> PathBuf {
 
 /// Runs `script` with `folder` as its working directory and returns what it printed; panics with its error output.
 pub fn python(folder: &Path, script: &str) -> String {
-    run(folder, &["-c", script])
+    let output = run(folder, &["-c", script]);
+    assert!(output.status.success(), "python failed:\n{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs Python with these arguments; see [`python`].
-pub fn run(folder: &Path, arguments: &[&str]) -> String {
+/// Runs a program of `pipelines/` in `folder`: its exit code, what it printed, what it said on standard error.
+pub fn pipeline(folder: &Path, program: &str, arguments: &[&str]) -> (i32, String, String) {
+    let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines").join(program);
+    let output = run(folder, &[&[program.to_str().unwrap()], arguments].concat());
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
     let interpreter = interpreter();
-    let output = Command::new(&interpreter)
+    Command::new(&interpreter)
         .args(arguments)
         .current_dir(folder)
         .env("PYVISTA_OFF_SCREEN", "true")
         .env("OMP_NUM_THREADS", "1")
         .output()
-        .unwrap_or_else(|e| panic!("{}: {e}; `./run test` provides it", interpreter.display()));
-    assert!(output.status.success(), "python failed:\n{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+        .unwrap_or_else(|e| panic!("{}: {e}; `./run test` provides it", interpreter.display()))
 }
