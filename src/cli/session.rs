@@ -91,6 +91,11 @@ impl Session {
         }
     }
 
+    /// Whether the settings file names this key of this room.
+    pub fn has_settings(&self, room: &str, key: &str) -> bool {
+        self.config.get(room).and_then(|table| table.get(key)).is_some()
+    }
+
     fn config_name(&self) -> String {
         self.options.config.as_ref().map_or_else(String::new, |path| path.display().to_string())
     }

@@ -1,5 +1,9 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
 pub mod estimate;
+pub mod observed;
 pub mod outcome;
+pub mod phantom;
 pub mod rmse;
+pub mod sample;
+pub mod sweep;

@@ -1,0 +1,111 @@
+//! What the post-operative scan shows: surfaces that parts of the deformed mesh should lie on.
+
+use super::rmse::{SurfaceDistance, closest_distances_mm, root_mean_square, symmetric_distance};
+use crate::geometry::Mni;
+use crate::image::Mask;
+use crate::image::gaussian::gaussian;
+use crate::mesh::{ClosestPoint, TetMesh, TriMesh, isosurface};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Node sets of the mesh with the surface each should lie on, by set name (`ventricle`, `margin`).
+#[derive(Clone, Debug)]
+pub struct ObservedSurfaces {
+    surfaces: BTreeMap<String, (TriMesh, ClosestPoint)>,
+}
+
+/// An observed surface cannot be used.
+#[derive(Debug, Error, PartialEq)]
+pub enum ObservedError {
+    /// The mask behind it is empty.
+    #[error("the post-operative {set} has no surface: its mask is empty; check the mask or give one")]
+    EmptySurface {
+        /// The set.
+        set: String,
+    },
+    /// The mesh has no such nodes.
+    #[error("the mesh has no nodes in the set `{set}`; check the masks the mesh was made from")]
+    EmptySet {
+        /// The set.
+        set: String,
+    },
+}
+
+/// Errors of one deformed (or rest) mesh against the observed surfaces.
+#[derive(Clone, Debug)]
+pub struct SurfaceErrors {
+    /// RMSE per set over its nodes, closest-point correspondence as published, mm.
+    pub rmse_mm: BTreeMap<String, f64>,
+    /// Distance per node of the mesh, mm; zero where the node is on no observed set.
+    pub node_error_mm: Vec<f64>,
+    /// Whether the node is on an observed set.
+    pub node_observed: Vec<bool>,
+    /// The symmetric distance per set, mesh surface against observed surface.
+    pub symmetric: BTreeMap<String, SurfaceDistance>,
+}
+
+/// The boundary of a mask as a smooth closed surface: a Gaussian of half a voxel takes the stairs off and hardly
+/// moves a wall (it shrinks a ball of radius R by sigma^2/R).
+pub fn mask_surface(mask: &Mask<Mni>) -> TriMesh {
+    let [x, y, z] = mask.grid.spacing_mm();
+    let smooth = gaussian(&mask.map(|inside| if inside { 1.0 } else { 0.0 }), 0.5 * x.max(y).max(z));
+    isosurface(&smooth, 0.5)
+}
+
+impl ObservedSurfaces {
+    /// Pairs of set name and observed surface; every surface must have triangles and every set nodes in `mesh`.
+    ///
+    /// # Errors
+    /// [`ObservedError`] names the set.
+    pub fn new(mesh: &TetMesh, surfaces: BTreeMap<String, TriMesh>) -> Result<Self, ObservedError> {
+        let mut prepared = BTreeMap::new();
+        for (set, surface) in surfaces {
+            if mesh.node_sets.get(&set).is_none_or(Vec::is_empty) {
+                return Err(ObservedError::EmptySet { set });
+            }
+            let Some(tree) = ClosestPoint::new(&surface) else {
+                return Err(ObservedError::EmptySurface { set });
+            };
+            prepared.insert(set, (surface, tree));
+        }
+        Ok(Self { surfaces: prepared })
+    }
+
+    /// The observed surfaces by set name.
+    pub fn surfaces(&self) -> impl Iterator<Item = (&str, &TriMesh, &ClosestPoint)> {
+        self.surfaces.iter().map(|(set, (surface, tree))| (set.as_str(), surface, tree))
+    }
+
+    /// Errors of the mesh displaced by `displacement_mm` (one vector per node; zeros for rest).
+    pub fn errors(&self, mesh: &TetMesh, displacement_mm: &[[f64; 3]]) -> SurfaceErrors {
+        let moved: Vec<[f64; 3]> =
+            mesh.nodes_mm().iter().zip(displacement_mm).map(|(x, u)| [x[0] + u[0], x[1] + u[1], x[2] + u[2]]).collect();
+        let mut errors = SurfaceErrors {
+            rmse_mm: BTreeMap::new(),
+            node_error_mm: vec![0.0; moved.len()],
+            node_observed: vec![false; moved.len()],
+            symmetric: BTreeMap::new(),
+        };
+        for (set, (surface, tree)) in &self.surfaces {
+            let nodes = &mesh.node_sets[set];
+            let points: Vec<[f64; 3]> = nodes.iter().map(|&n| moved[n as usize]).collect();
+            let distances = closest_distances_mm(&points, tree);
+            for (&n, &d) in nodes.iter().zip(&distances) {
+                let n = n as usize;
+                // A node on two sets (where margin and ventricle meet) keeps its smaller error.
+                errors.node_error_mm[n] = if errors.node_observed[n] { errors.node_error_mm[n].min(d) } else { d };
+                errors.node_observed[n] = true;
+            }
+            if let Some(rmse) = root_mean_square(&distances) {
+                errors.rmse_mm.insert(set.clone(), rmse);
+            }
+            if let Some(facets) = mesh.facet_sets.get(set) {
+                let (part, _) = TriMesh::from_facets(&moved, facets);
+                if let Some(distance) = symmetric_distance(&part, surface) {
+                    errors.symmetric.insert(set.clone(), distance);
+                }
+            }
+        }
+        errors
+    }
+}
