@@ -1,5 +1,15 @@
 //! Constitutive laws, published literature, the multi-task Gaussian process over it, meta-models.
 
+pub mod csv;
+pub mod form;
+pub mod generative;
+pub mod gp;
 pub mod law;
+pub mod literature;
+pub mod meta_model;
+pub mod task;
+pub mod training;
 
+pub use gp::TissuePrior;
 pub use law::Hyperelastic;
+pub use task::{Region, StudyKind, Task};

@@ -1,0 +1,165 @@
+//! The generative model in one call: literature, Gaussian process, meta-model; everything embedded, no file, no
+//! network, a few milliseconds.
+//!
+//! ```
+//! use hgm::material::{Task, generative::{SampleSettings, nine_levels, sample_shear_moduli}};
+//! let samples = sample_shear_moduli(Task::HYPERELASTIC_HEALTHY, &nine_levels(), &SampleSettings::default())?;
+//! assert_eq!(samples.len(), 9);
+//! assert!(samples.windows(2).all(|pair| pair[0].shear_modulus_pa < pair[1].shear_modulus_pa));
+//! # Ok::<(), hgm::material::meta_model::FitError>(())
+//! ```
+
+use super::gp::{Hyperparameters, TissuePrior, posterior};
+use super::literature::{Curves, table};
+use super::meta_model::{Fit, FitError, MetaModel, MetaModelSettings, Search, fit};
+use super::task::{Task, stretches};
+use super::training::TrainingData;
+use serde::Serialize;
+
+/// How samples are made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleSettings {
+    /// Curves of the two studies the published program coded differently.
+    pub curves: Curves,
+    /// Hyperparameters of the Gaussian process.
+    pub hyperparameters: Hyperparameters,
+    /// The law fitted to each sample.
+    pub model: MetaModel,
+    /// How it is fitted.
+    pub meta_model: MetaModelSettings,
+    /// Stretches over the task's window.
+    pub stretches: usize,
+}
+
+impl Default for SampleSettings {
+    /// The literature as its papers have it, the published hyperparameters, an exactly fitted neo-Hookean law.
+    fn default() -> Self {
+        Self {
+            curves: Curves::Corrected,
+            hyperparameters: Hyperparameters::published(),
+            model: MetaModel::NeoHookean,
+            meta_model: MetaModelSettings::default(),
+            stretches: 501,
+        }
+    }
+}
+
+impl SampleSettings {
+    /// All choices of the published program: its figures come out.
+    pub fn published() -> Self {
+        let meta_model = MetaModelSettings { search: Search::Published, ..MetaModelSettings::default() };
+        Self { curves: Curves::Published, meta_model, ..Self::default() }
+    }
+}
+
+/// A material for a simulation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SampledMaterial {
+    /// Standard deviations from the mean of ln W.
+    pub sd_level: f64,
+    /// Small-strain shear modulus, Pa.
+    pub shear_modulus_pa: f64,
+    /// The fitted law.
+    pub fit: Fit,
+}
+
+/// -2, -1.5 ... 2 standard deviations: the nine samples of the paper's sweeps.
+pub fn nine_levels() -> [f64; 9] {
+    std::array::from_fn(|i| -2.0 + 0.5 * i as f64)
+}
+
+/// What the Gaussian process says of one task, over its window.
+pub fn tissue_prior(task: Task, settings: &SampleSettings) -> TissuePrior {
+    let data = TrainingData::from_literature(&table(), settings.curves);
+    let [low, high] = task.stretch_window();
+    posterior(&settings.hyperparameters, &data, task, &stretches(low, high, settings.stretches))
+}
+
+/// Materials at these standard deviations of one task's Gaussian process, with the sd of a new observation as in the
+/// paper: each is a quantile envelope of ln W with the law fitted to it.
+///
+/// # Errors
+/// [`FitError`] when the settings leave fewer stretches than the law needs.
+pub fn sample_shear_moduli(
+    task: Task,
+    sd_levels: &[f64],
+    settings: &SampleSettings,
+) -> Result<Vec<SampledMaterial>, FitError> {
+    sample_prior(&tissue_prior(task, settings), sd_levels, settings)
+}
+
+/// Same, from a prior at hand.
+///
+/// # Errors
+/// As [`sample_shear_moduli`].
+pub fn sample_prior(
+    prior: &TissuePrior,
+    sd_levels: &[f64],
+    settings: &SampleSettings,
+) -> Result<Vec<SampledMaterial>, FitError> {
+    let sample = |sd_level: &f64| {
+        let fit = fit(settings.model, &prior.stretches, &prior.quantile(*sd_level), &settings.meta_model)?;
+        Ok(SampledMaterial { sd_level: *sd_level, shear_modulus_pa: fit.shear_modulus_pa, fit })
+    };
+    sd_levels.iter().map(sample).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moduli(task: Task, levels: &[f64], settings: &SampleSettings) -> Vec<f64> {
+        let samples = sample_shear_moduli(task, levels, settings).unwrap();
+        samples.into_iter().map(|sample| sample.shear_modulus_pa).collect()
+    }
+
+    #[test]
+    fn published_settings_reproduce_the_shear_moduli_of_the_papers_first_table() {
+        let settings = SampleSettings::published();
+        // Granados et al., IJCARS 2021, Table 1; the printed table lost the minus signs of its SDs.
+        let linear = |region| Task { kind: crate::material::StudyKind::Linear, region };
+        let cases: [(Task, &[f64], &[f64]); 5] = [
+            (
+                Task::HYPERELASTIC_GREY,
+                &[-2.0, -1.5, -1.0, -0.5, 0.5, 2.0],
+                &[525.0, 628.0, 754.0, 912.0, 1317.0, 2299.0],
+            ),
+            (
+                Task::HYPERELASTIC_WHITE,
+                &[-2.0, -1.5, -1.0, -0.5, 0.0, 2.0],
+                &[309.0, 365.0, 440.0, 519.0, 610.0, 1195.0],
+            ),
+            (Task::HYPERELASTIC_HEALTHY, &[-0.5], &[353.0]),
+            (linear(crate::material::Region::Healthy), &[-0.5], &[465.0]),
+            (linear(crate::material::Region::Grey), &[0.0], &[2746.0]),
+        ];
+        for (task, levels, table) in cases {
+            for (found, printed) in moduli(task, levels, &settings).into_iter().zip(table) {
+                assert!((found - printed).abs() < 1.0, "{task}: {found} against {printed}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_exact_jacobian_gives_the_moduli_that_the_published_search_stops_short_of() {
+        let mut settings = SampleSettings::published();
+        settings.meta_model = MetaModelSettings::default();
+        let grey = moduli(Task::HYPERELASTIC_GREY, &[-2.0, -1.5, -1.0, -0.5, 0.5, 2.0], &settings);
+        for (found, exact) in grey.iter().zip([528.7, 636.0, 765.0, 920.2, 1331.0, 2314.9]) {
+            assert!((found - exact).abs() < 0.06, "{found} against {exact}");
+        }
+        let white = moduli(Task::HYPERELASTIC_WHITE, &[-2.0, -1.5, -1.0, -0.5, 0.0, 2.0], &settings);
+        for (found, exact) in white.iter().zip([314.8, 372.4, 440.5, 521.0, 616.2, 1205.1]) {
+            assert!((found - exact).abs() < 0.06, "{found} against {exact}");
+        }
+    }
+
+    #[test]
+    fn default_samples_rise_with_the_level_and_are_stable_everywhere() {
+        for task in [Task::HYPERELASTIC_GREY, Task::HYPERELASTIC_WHITE, Task::HYPERELASTIC_HEALTHY] {
+            let samples = sample_shear_moduli(task, &nine_levels(), &SampleSettings::default()).unwrap();
+            assert!(samples.windows(2).all(|pair| pair[0].shear_modulus_pa < pair[1].shear_modulus_pa));
+            assert!(samples.iter().all(|sample| sample.fit.stability.everywhere() && sample.fit.converged));
+        }
+    }
+}

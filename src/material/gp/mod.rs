@@ -1,0 +1,13 @@
+//! Multi-task Gaussian process over the literature: intrinsic coregionalisation with a Matern 3/2 kernel, exact and in
+//! time linear in the number of studies.
+
+mod dense;
+mod filter;
+mod hyperparameters;
+mod matern;
+mod smoother;
+
+pub use dense::{dense_negative_log_likelihood, dense_posterior};
+pub use filter::negative_log_likelihood;
+pub use hyperparameters::{Hyperparameters, HyperparametersError, TaskMatrix};
+pub use smoother::{TissuePrior, posterior};

@@ -1,0 +1,275 @@
+//! Fitting a meta-model: bounds, starts, and what is reported.
+
+use super::least_squares::{Bounds, Residuals, Solution, Tolerances, minimise};
+use super::{MetaModel, Stability};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Added to W before the logarithm in the meta-model's residual, Pa, as in the paper.
+pub const META_MODEL_LOG_OFFSET_PA: f64 = 1e-3;
+
+/// How to search.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Search {
+    /// Exact Jacobians, tight tolerances, parameters where the law is stable at every stretch.
+    #[default]
+    Exact,
+    /// As the published program: its bounds and starts, its tolerances, and its neo-Hookean Jacobian, which lacks the
+    /// derivative of mu and leaves mu up to 3 % low.
+    Published,
+}
+
+/// Settings of a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MetaModelSettings {
+    /// How to search.
+    pub search: Search,
+    /// Added to W before the logarithm, Pa.
+    pub log_offset_pa: f64,
+}
+
+impl Default for MetaModelSettings {
+    fn default() -> Self {
+        Self { search: Search::Exact, log_offset_pa: META_MODEL_LOG_OFFSET_PA }
+    }
+}
+
+/// A fitted law.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    /// The law.
+    pub model: MetaModel,
+    /// Parameters in the order of [`MetaModel::parameter_names`].
+    pub parameters: Vec<f64>,
+    /// Shear modulus at rest, Pa.
+    pub shear_modulus_pa: f64,
+    /// Half the sum of squared residuals of ln(W + offset).
+    pub cost: f64,
+    /// Share of the variance of y that the law explains.
+    pub r_squared: f64,
+    /// Covariance of the parameters, residual variance times the inverse normal matrix; zero for a parameter that
+    /// stands at a bound, since it did not move.
+    pub covariance: Vec<Vec<f64>>,
+    /// Names of the parameters that stand at a bound.
+    pub at_bound: Vec<String>,
+    /// Verdict from the analytic regions.
+    pub stability: Stability,
+    /// Whether the search met a tolerance.
+    pub converged: bool,
+}
+
+/// Points that no law can be fitted to.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum FitError {
+    /// Too few points.
+    #[error("{found} points are too few to fit {model}: give at least {needed}")]
+    TooFew {
+        /// Points found.
+        found: usize,
+        /// The law.
+        model: MetaModel,
+        /// Points needed.
+        needed: usize,
+    },
+    /// Stretches and targets of different lengths, or one that is no number.
+    #[error("point {index} (stretch {stretch}, ln energy {target}) is not a positive stretch with a finite target")]
+    Point {
+        /// Index of the point.
+        index: usize,
+        /// Stretch.
+        stretch: f64,
+        /// Target.
+        target: f64,
+    },
+    /// All at rest.
+    #[error("all stretches are 1: nothing is deformed, so no modulus can be found")]
+    AllAtRest,
+}
+
+/// Fits W to targets y = ln(W + offset) at stretches.
+///
+/// # Errors
+/// [`FitError`] when the points cannot determine the law.
+pub fn fit(
+    model: MetaModel,
+    stretches: &[f64],
+    targets: &[f64],
+    settings: &MetaModelSettings,
+) -> Result<Fit, FitError> {
+    let needed = model.parameter_names().len() + 1;
+    if stretches.len() < needed || targets.len() != stretches.len() {
+        return Err(FitError::TooFew { found: stretches.len().min(targets.len()), model, needed });
+    }
+    for (index, (stretch, target)) in stretches.iter().zip(targets).enumerate() {
+        if !(*stretch > 0.0 && stretch.is_finite() && target.is_finite()) {
+            return Err(FitError::Point { index, stretch: *stretch, target: *target });
+        }
+    }
+    if stretches.iter().all(|l| (l - 1.0).abs() < 1e-9) {
+        return Err(FitError::AllAtRest);
+    }
+    let problem = Problem { model, stretches, targets, offset: settings.log_offset_pa, search: settings.search };
+    Ok(match model {
+        MetaModel::NeoHookean => report(&problem, best_of(&problem, &neo_hookean_searches(&problem))),
+        MetaModel::MooneyRivlin => report(&problem, best_of(&problem, &mooney_rivlin_searches(&problem))),
+        MetaModel::Ogden | MetaModel::OgdenHigh => report(&problem, best_of(&problem, &ogden_searches(&problem))),
+    })
+}
+
+struct Problem<'a> {
+    model: MetaModel,
+    stretches: &'a [f64],
+    targets: &'a [f64],
+    offset: f64,
+    search: Search,
+}
+
+impl<const N: usize> Residuals<N> for Problem<'_> {
+    fn residuals(&self, parameters: &[f64; N], out: &mut Vec<f64>) {
+        let residual = |(l, y): (&f64, &f64)| (self.model.energy_pa(parameters, *l) + self.offset).ln() - y;
+        out.extend(self.stretches.iter().zip(self.targets).map(residual));
+    }
+
+    fn jacobian(&self, parameters: &[f64; N], out: &mut Vec<[f64; N]>) {
+        out.extend(self.stretches.iter().map(|l| {
+            let energy = self.model.energy_pa(parameters, *l);
+            let slope = if self.search == Search::Published && self.model == MetaModel::NeoHookean {
+                // The published program's W' is W itself and its denominator mu W + offset.
+                return [energy / (parameters[0] * energy + self.offset); N];
+            } else {
+                self.model.energy_slope_pa(parameters, *l)
+            };
+            std::array::from_fn(|i| slope[i] / (energy + self.offset))
+        }));
+    }
+}
+
+type Start<const N: usize> = ([f64; N], Bounds<N>);
+
+/// A first modulus: the neo-Hookean one that fits the median point exactly, so that starts carry the data's scale.
+fn typical_modulus_pa(problem: &Problem) -> f64 {
+    let scale = |(l, y): (&f64, &f64)| {
+        let unit = MetaModel::NeoHookean.energy_pa(&[1.0], *l);
+        ((y.exp() - problem.offset) / unit).max(1e-3)
+    };
+    let strained = problem.stretches.iter().zip(problem.targets).filter(|(l, _)| (*l - 1.0).abs() > 1e-9);
+    let mut moduli: Vec<f64> = strained.map(scale).collect();
+    moduli.sort_by(f64::total_cmp);
+    moduli.get(moduli.len() / 2).copied().unwrap_or(1000.0)
+}
+
+const INF: f64 = f64::INFINITY;
+
+fn neo_hookean_searches(problem: &Problem) -> Vec<Start<1>> {
+    match problem.search {
+        Search::Published => vec![([1000.0], Bounds { low: [1e-3], high: [INF] })],
+        Search::Exact => vec![([typical_modulus_pa(problem)], Bounds { low: [0.0], high: [INF] })],
+    }
+}
+
+fn mooney_rivlin_searches(problem: &Problem) -> Vec<Start<2>> {
+    match problem.search {
+        Search::Published => vec![([1000.0, 1000.0], Bounds { low: [0.1, 0.1], high: [INF, INF] })],
+        Search::Exact => {
+            let quarter = 0.25 * typical_modulus_pa(problem);
+            // Both non-negative: stable at every stretch.
+            vec![([quarter, quarter], Bounds { low: [0.0, 0.0], high: [INF, INF] })]
+        }
+    }
+}
+
+fn ogden_searches(problem: &Problem) -> Vec<Start<2>> {
+    let limits: &[f64] = match (problem.search, problem.model) {
+        (Search::Published, MetaModel::OgdenHigh) => &[5.0, 10.0, 20.0, 50.0],
+        (_, MetaModel::OgdenHigh) => &[50.0],
+        _ => &[5.0],
+    };
+    let mut searches = Vec::new();
+    for limit in limits {
+        if problem.search == Search::Published {
+            searches.push(([1000.0, 0.1], Bounds { low: [0.1, 0.1], high: [INF, *limit] }));
+        } else {
+            let modulus = typical_modulus_pa(problem);
+            // Convex at every stretch: mu > 0 with alpha >= 1, or mu < 0 with alpha <= -2. Two starts a branch,
+            // since the cost may have a valley at small and another at large exponents.
+            for share in [0.1, 0.6] {
+                let (up, down) = (1.0 + share * (limit - 1.0), -2.0 - share * (limit - 2.0));
+                searches.push(([2.0 * modulus / up, up], Bounds { low: [0.0, 1.0], high: [INF, *limit] }));
+                searches.push(([2.0 * modulus / down, down], Bounds { low: [-INF, -limit], high: [0.0, -2.0] }));
+            }
+        }
+    }
+    if problem.search == Search::Published {
+        for limit in limits {
+            searches.push(([-1000.0, -2.1], Bounds { low: [-INF, -limit], high: [-0.1, -2.1] }));
+        }
+    }
+    searches
+}
+
+fn best_of<const N: usize>(problem: &Problem, searches: &[Start<N>]) -> (Solution<N>, Bounds<N>) {
+    let (tolerances, evaluations) = match problem.search {
+        Search::Published => (Tolerances { cost: 1e-8, step: 1e-8, gradient: 1e-8 }, 100 * N),
+        Search::Exact => (Tolerances { cost: 1e-14, step: 1e-10, gradient: 1e-12 }, 1000),
+    };
+    let solve = |(start, bounds): &Start<N>| (minimise(problem, start, bounds, &tolerances, evaluations), *bounds);
+    let mut best = solve(&searches[0]);
+    for search in &searches[1..] {
+        let found = solve(search);
+        if found.0.cost < best.0.cost {
+            best = found;
+        }
+    }
+    best
+}
+
+fn report<const N: usize>(problem: &Problem, (solution, bounds): (Solution<N>, Bounds<N>)) -> Fit {
+    let parameters = solution.parameters;
+    let stands_at = |i: usize| {
+        let near = |bound: f64| bound.is_finite() && (parameters[i] - bound).abs() <= 1e-6 * bound.abs().max(1e-3);
+        near(bounds.low[i]) || near(bounds.high[i])
+    };
+    let free: Vec<usize> = (0..N).filter(|i| !stands_at(*i)).collect();
+    let mut normal = [[0.0; N]; N];
+    for stretch in problem.stretches {
+        // The covariance is that of the law itself, whatever Jacobian the search used.
+        let energy = problem.model.energy_pa(&parameters, *stretch);
+        let slope = problem.model.energy_slope_pa(&parameters, *stretch).map(|s| s / (energy + problem.offset));
+        for i in 0..N {
+            for j in 0..N {
+                normal[i][j] += slope[i] * slope[j];
+            }
+        }
+    }
+    let freedom = (problem.stretches.len() - free.len()).max(1) as f64;
+    let variance = 2.0 * solution.cost / freedom;
+    let mut covariance = vec![vec![0.0; N]; N];
+    match free.as_slice() {
+        [i] => covariance[*i][*i] = variance / normal[*i][*i],
+        [i, j] => {
+            let det = normal[*i][*i] * normal[*j][*j] - normal[*i][*j] * normal[*j][*i];
+            covariance[*i][*i] = variance * normal[*j][*j] / det;
+            covariance[*j][*j] = variance * normal[*i][*i] / det;
+            covariance[*i][*j] = -variance * normal[*i][*j] / det;
+            covariance[*j][*i] = covariance[*i][*j];
+        }
+        _ => {}
+    }
+    let mean = problem.targets.iter().sum::<f64>() / problem.targets.len() as f64;
+    let spread: f64 = problem.targets.iter().map(|y| (y - mean).powi(2)).sum();
+    let window = problem.stretches.iter().fold([f64::INFINITY, 0.0_f64], |[a, b], l| [a.min(*l), b.max(*l)]);
+    let names = problem.model.parameter_names();
+    Fit {
+        model: problem.model,
+        parameters: parameters.to_vec(),
+        shear_modulus_pa: problem.model.small_strain_shear_modulus_pa(&parameters),
+        cost: solution.cost,
+        r_squared: if spread > 0.0 { 1.0 - 2.0 * solution.cost / spread } else { f64::NAN },
+        covariance,
+        at_bound: (0..N).filter(|i| stands_at(*i)).map(|i| names[i].to_owned()).collect(),
+        stability: Stability::of(problem.model, &parameters, window),
+        converged: solution.converged,
+    }
+}

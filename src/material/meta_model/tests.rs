@@ -1,0 +1,130 @@
+//! Recovery of known laws, Jacobians against differences, verdicts against the curves themselves.
+
+use super::*;
+use crate::material::task::stretches;
+
+const OFFSET: f64 = 1e-3;
+
+fn exact() -> MetaModelSettings {
+    MetaModelSettings::default()
+}
+
+fn targets(model: MetaModel, parameters: &[f64], l: &[f64]) -> Vec<f64> {
+    l.iter().map(|l| (model.energy_pa(parameters, *l) + OFFSET).ln()).collect()
+}
+
+#[test]
+fn a_law_is_recovered_from_its_own_curve() {
+    let l = stretches(0.7, 1.3, 61);
+    let cases: [(MetaModel, &[f64]); 6] = [
+        (MetaModel::NeoHookean, &[333.28]),
+        (MetaModel::MooneyRivlin, &[140.0, 166.5]),
+        (MetaModel::Ogden, &[420.0, 2.7]),
+        (MetaModel::Ogden, &[-200.0, -3.4]),
+        (MetaModel::OgdenHigh, &[-93.9, -22.0]),
+        (MetaModel::OgdenHigh, &[61.0, 17.0]),
+    ];
+    for (model, parameters) in cases {
+        let fit = fit(model, &l, &targets(model, parameters, &l), &exact()).unwrap();
+        for (found, true_value) in fit.parameters.iter().zip(parameters) {
+            assert!((found / true_value - 1.0).abs() < 1e-6, "{model}: {:?}", fit.parameters);
+        }
+        assert!(fit.converged && fit.cost < 1e-12 && fit.r_squared > 1.0 - 1e-9 && fit.stability.everywhere());
+    }
+}
+
+#[test]
+fn energy_slopes_and_stress_are_the_derivatives() {
+    for (model, p) in [
+        (MetaModel::NeoHookean, [500.0, 0.0]),
+        (MetaModel::MooneyRivlin, [140.0, 90.0]),
+        (MetaModel::Ogden, [300.0, 2.5]),
+        (MetaModel::OgdenHigh, [-100.0, -14.0]),
+    ] {
+        for l in [0.8, 0.99, 1.2] {
+            let slope = model.energy_slope_pa(&p, l);
+            for i in 0..model.parameter_names().len() {
+                let h = 1e-6 * p[i].abs();
+                let shifted = |d: f64| {
+                    let mut q = p;
+                    q[i] += d;
+                    model.energy_pa(&q, l)
+                };
+                let difference = (shifted(h) - shifted(-h)) / (2.0 * h);
+                assert!((difference - slope[i]).abs() <= 1e-7 * slope[i].abs() + 1e-9, "{model} {i} at {l}");
+            }
+            let h = 1e-6;
+            let difference = (model.energy_pa(&p, l + h) - model.energy_pa(&p, l - h)) / (2.0 * h);
+            assert!((difference - model.stress_pa(&p, l)).abs() < 1e-6 * difference.abs() + 1e-4, "{model} at {l}");
+            let modulus = model.energy_pa(&p, 1.0 + 1e-4) / (1.5 * 1e-8);
+            assert!((modulus / model.small_strain_shear_modulus_pa(&p) - 1.0).abs() < 2e-3, "{model}");
+        }
+    }
+}
+
+#[test]
+fn verdicts_agree_with_the_curves_themselves() {
+    let window = [0.8, 1.25];
+    let l = stretches(window[0], window[1], 901);
+    let mut seen = [0; 2];
+    for model in [MetaModel::MooneyRivlin, MetaModel::Ogden] {
+        for a in [-300.0, -20.0, 25.0, 400.0] {
+            for b in [-900.0_f64, -4.3, -1.7, 0.4, 1.6, 150.0] {
+                let p = [a, if model == MetaModel::Ogden { b.clamp(-4.3, 1.6) } else { b }];
+                let verdict = Stability::of(model, &p, window);
+                let stress: Vec<f64> = l.iter().map(|l| model.stress_pa(&p, *l)).collect();
+                let grows = l.iter().zip(&stress).all(|(l, s)| (l - 1.0) * s >= -1e-9);
+                let convex = stress.windows(2).all(|pair| pair[1] > pair[0]);
+                let rises = l.windows(2).zip(stress.windows(2)).all(|(l, s)| l[1] * s[1] > l[0] * s[0]);
+                let holds = |range: StabilityRange| range != StabilityRange::Nowhere;
+                assert_eq!(holds(verdict.energy_grows), grows, "{model} {p:?}");
+                assert_eq!(holds(verdict.convex), convex, "{model} {p:?}");
+                assert_eq!(holds(verdict.true_stress_rises), rises, "{model} {p:?}");
+                seen[usize::from(convex)] += 1;
+            }
+        }
+    }
+    assert!(seen[0] > 5 && seen[1] > 5, "both verdicts occur: {seen:?}");
+}
+
+#[test]
+fn covariance_is_the_scatter_of_repeated_fits() {
+    let l = stretches(0.7, 1.3, 41);
+    let clean = targets(MetaModel::MooneyRivlin, &[140.0, 166.5], &l);
+    let noise = |seed: u64, i: usize| {
+        // A fixed low-discrepancy sequence, mapped to a uniform of variance 0.05^2.
+        let x = ((seed * 41 + i as u64 + 1) as f64 * 0.618_033_988_749_894_9).fract();
+        (x - 0.5) * 12.0_f64.sqrt() * 0.05
+    };
+    let mut moduli = Vec::new();
+    let mut predicted = 0.0;
+    for seed in 0..300 {
+        let noisy: Vec<f64> = clean.iter().enumerate().map(|(i, y)| y + noise(seed * 7919 % 3001, i)).collect();
+        let fit = fit(MetaModel::NeoHookean, &l, &noisy, &exact()).unwrap();
+        predicted += fit.covariance[0][0].sqrt() / 300.0;
+        moduli.push(fit.parameters[0]);
+    }
+    let mean = moduli.iter().sum::<f64>() / 300.0;
+    let scatter = (moduli.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 299.0).sqrt();
+    // Misfit of the law adds to the residual variance, so the stated sd is no smaller than the scatter.
+    assert!(scatter > 0.0 && predicted > 0.8 * scatter && predicted < 20.0 * scatter, "{predicted} {scatter}");
+}
+
+#[test]
+fn a_parameter_at_its_bound_is_named_and_has_no_variance() {
+    let l = stretches(0.7, 1.3, 41);
+    let y: Vec<f64> = targets(MetaModel::OgdenHigh, &[-40.0, -20.0], &l);
+    let fit = fit(MetaModel::Ogden, &l, &y, &exact()).unwrap();
+    assert_eq!(fit.at_bound, ["alpha"]);
+    assert!((fit.parameters[1] + 5.0).abs() < 1e-5);
+    assert!(fit.covariance[1][1] == 0.0 && fit.covariance[0][0] > 0.0);
+}
+
+#[test]
+fn points_that_determine_nothing_are_refused() {
+    let model = MetaModel::MooneyRivlin;
+    assert!(matches!(fit(model, &[0.9, 1.1], &[1.0, 2.0], &exact()), Err(FitError::TooFew { .. })));
+    assert_eq!(fit(model, &[1.0; 5], &[1.0; 5], &exact()), Err(FitError::AllAtRest));
+    let bad = fit(model, &[0.9, 1.0, -1.1], &[1.0, 2.0, 3.0], &exact());
+    assert!(matches!(bad, Err(FitError::Point { index: 2, .. })));
+}
