@@ -6,6 +6,7 @@ pub mod distance;
 pub mod gaussian;
 mod grid;
 pub mod morphology;
+pub mod nifti;
 pub mod resample;
 mod volume;
 

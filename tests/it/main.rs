@@ -3,6 +3,7 @@
 mod fem;
 mod mesh_files;
 mod pipelines;
+mod nifti_guard;
 mod python;
 mod rooms;
 mod transform_files;

@@ -1,0 +1,152 @@
+//! Volumes to NIfTI bytes: one deterministic `.nii.gz`, without a word about the patient, the machine or the time.
+
+use super::gzip;
+use super::orientation::shear;
+use crate::geometry::Frame;
+use crate::image::{Grid, Mask, Volume};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+
+/// 32-bit floats as `.nii.gz` bytes.
+pub fn encode_f32<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
+    encode(&volume.grid, 16, 32, volume.data.iter().flat_map(|x| x.to_le_bytes()))
+}
+
+/// Bytes (labels, small intensities) as `.nii.gz` bytes.
+pub fn encode_u8<F: Frame>(volume: &Volume<u8, F>) -> Vec<u8> {
+    encode(&volume.grid, 2, 8, volume.data.iter().copied())
+}
+
+/// 16-bit integers as `.nii.gz` bytes.
+pub fn encode_i16<F: Frame>(volume: &Volume<i16, F>) -> Vec<u8> {
+    encode(&volume.grid, 4, 16, volume.data.iter().flat_map(|x| x.to_le_bytes()))
+}
+
+/// A mask as `.nii.gz` bytes: 1 inside, 0 outside, 8 bits.
+pub fn encode_mask<F: Frame>(mask: &Mask<F>) -> Vec<u8> {
+    encode(&mask.grid, 2, 8, mask.data.iter().map(|&inside| u8::from(inside)))
+}
+
+/// Three 32-bit floats per voxel (a displacement in mm, RAS) as `.nii.gz` bytes, 5-D with `dim[5] = 3` as the NIfTI
+/// standard stores vectors.
+pub fn encode_vectors<F: Frame>(volume: &Volume<[f32; 3], F>) -> Vec<u8> {
+    let component = |c: usize| volume.data.iter().flat_map(move |v| v[c].to_le_bytes());
+    let data = component(0).chain(component(1)).chain(component(2));
+    let mut bytes = header_1(&volume.grid, 16, 32);
+    bytes[40..42].copy_from_slice(&5i16.to_le_bytes());
+    for (n, size) in [(4, 1i16), (5, 3)] {
+        bytes[40 + 2 * n..42 + 2 * n].copy_from_slice(&size.to_le_bytes());
+    }
+    // NIFTI_INTENT_DISPVECT
+    bytes[68..70].copy_from_slice(&1006i16.to_le_bytes());
+    bytes.extend(data);
+    gzip::pack(&bytes)
+}
+
+fn encode<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16, data: impl Iterator<Item = u8>) -> Vec<u8> {
+    // NIfTI-1 stores sizes in 16 bits; everything reads it, so NIfTI-2 only where it must be.
+    let large = grid.dims.iter().any(|&n| n > i16::MAX as usize);
+    let mut bytes = if large { header_2(grid, datatype, bits) } else { header_1(grid, datatype, bits) };
+    bytes.reserve_exact(grid.len() * bits as usize / 8);
+    bytes.extend(data);
+    gzip::pack(&bytes)
+}
+
+/// What the orientation fields of a grid hold.
+struct Form {
+    code: i16,
+    /// The quaternion can only hold perpendicular axes.
+    qform: bool,
+    qfac: f64,
+    quatern: [f64; 3],
+    offset: [f64; 3],
+    rows: [[f64; 4]; 3],
+    size_mm: [f64; 3],
+}
+
+fn form<F: Frame>(grid: &Grid<F>) -> Form {
+    let m = &grid.mm_from_voxel;
+    let linear: Matrix3<f64> = m.fixed_view::<3, 3>(0, 0).into_owned();
+    let size_mm = grid.spacing_mm();
+    let qfac = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let axes = Matrix3::from_columns(&[
+        linear.column(0) / size_mm[0],
+        linear.column(1) / size_mm[1],
+        linear.column(2) / (size_mm[2] * qfac),
+    ]);
+    let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)).into_inner();
+    // The standard stores b, c, d and means the root with a >= 0.
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    Form {
+        // Scanner coordinates, or aligned to another image: MNI is reached rigidly, so code 4 (MNI size) would be untrue.
+        code: if F::NAME == "MNI" { 2 } else { 1 },
+        qform: shear(&linear) < 1e-5,
+        qfac,
+        quatern: [q.i * sign, q.j * sign, q.k * sign],
+        offset: [m[(0, 3)], m[(1, 3)], m[(2, 3)]],
+        rows: std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)])),
+        size_mm,
+    }
+}
+
+/// Millimetres and seconds.
+const UNITS: u8 = 2 | 8;
+
+/// 348 bytes of header and the four that say that no extension follows. Text fields stay zero.
+fn header_1<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16) -> Vec<u8> {
+    let form = form(grid);
+    let mut h = vec![0u8; 352];
+    let mut put = |at: usize, bytes: &[u8]| h[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, &348i32.to_le_bytes());
+    put(38, b"r");
+    put(40, &3i16.to_le_bytes());
+    for n in 0..7 {
+        let size = if n < 3 { grid.dims[n] as i16 } else { 1 };
+        put(42 + 2 * n, &size.to_le_bytes());
+    }
+    put(70, &datatype.to_le_bytes());
+    put(72, &bits.to_le_bytes());
+    let sizes = [form.qfac, form.size_mm[0], form.size_mm[1], form.size_mm[2], 1.0, 1.0, 1.0, 1.0];
+    for (n, size) in sizes.into_iter().enumerate() {
+        put(76 + 4 * n, &(size as f32).to_le_bytes());
+    }
+    put(108, &352f32.to_le_bytes());
+    put(112, &1f32.to_le_bytes());
+    put(123, &[UNITS]);
+    put(252, &(if form.qform { form.code } else { 0 }).to_le_bytes());
+    put(254, &form.code.to_le_bytes());
+    for (n, x) in form.quatern.iter().chain(&form.offset).chain(form.rows.iter().flatten()).enumerate() {
+        put(256 + 4 * n, &(*x as f32).to_le_bytes());
+    }
+    put(344, b"n+1\0");
+    h
+}
+
+/// 540 bytes of header and the four that say that no extension follows.
+fn header_2<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16) -> Vec<u8> {
+    let form = form(grid);
+    let mut h = vec![0u8; 544];
+    let mut put = |at: usize, bytes: &[u8]| h[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, &540i32.to_le_bytes());
+    put(4, b"n+2\0\r\n\x1a\n");
+    put(12, &datatype.to_le_bytes());
+    put(14, &bits.to_le_bytes());
+    put(16, &3i64.to_le_bytes());
+    for n in 0..7 {
+        let size = if n < 3 { grid.dims[n] as i64 } else { 1 };
+        put(24 + 8 * n, &size.to_le_bytes());
+    }
+    let sizes = [form.qfac, form.size_mm[0], form.size_mm[1], form.size_mm[2], 1.0, 1.0, 1.0, 1.0];
+    for (n, size) in sizes.into_iter().enumerate() {
+        put(104 + 8 * n, &size.to_le_bytes());
+    }
+    put(168, &544i64.to_le_bytes());
+    put(176, &1f64.to_le_bytes());
+    let code = i32::from(form.code);
+    put(344, &(if form.qform { code } else { 0 }).to_le_bytes());
+    put(348, &code.to_le_bytes());
+    for (n, x) in form.quatern.iter().chain(&form.offset).chain(form.rows.iter().flatten()).enumerate() {
+        put(352 + 8 * n, &x.to_le_bytes());
+    }
+    put(500, &i32::from(UNITS).to_le_bytes());
+    h
+}

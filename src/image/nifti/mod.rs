@@ -1,0 +1,211 @@
+//! NIfTI-1 and NIfTI-2 bytes to volumes and back, behind a guard.
+//!
+//! The voxels are decoded by the `nifti` crate; everything around it is checked here, because a wrong answer about a
+//! patient's left and right is worse than none: gzip CRC and length, header against real size before anything is reserved,
+//! data type, scaling, orientation (none, two that disagree, singular), voxel size. NaN voxels become 0 and are counted.
+
+mod encode;
+mod error;
+mod gzip;
+mod header;
+mod orientation;
+
+pub use encode::{encode_f32, encode_i16, encode_mask, encode_u8, encode_vectors};
+pub use error::{NiftiError, NiftiProblem};
+pub use orientation::Orientation;
+
+use super::volume::{LabelMap, Mask, Volume};
+use crate::geometry::Native;
+use header::{Header, Layout};
+use nifti::{InMemNiftiVolume, IntoNdArray, NiftiType};
+use serde::{Deserialize, Serialize};
+
+/// Choices that a file may leave open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReadOptions {
+    /// Which affine to believe when sform and qform disagree; `None` refuses such a file.
+    pub prefer: Option<Orientation>,
+    /// Which volume (from 0) of a 4-D file; `None` refuses a file of several.
+    pub volume: Option<usize>,
+}
+
+/// A scan as read.
+#[derive(Clone, Debug)]
+pub struct NiftiImage {
+    /// The scaled intensities on the file's own grid, all finite.
+    pub volume: Volume<f32, Native>,
+    /// What was odd and read all the same; without the file's name.
+    pub warnings: Vec<String>,
+    /// Voxels that were NaN or infinite and are 0 now.
+    pub nonfinite_voxels: usize,
+    /// Which affine the grid comes from.
+    pub orientation: Orientation,
+}
+
+/// Reads a scan. `name` is what messages call the file; it must end in `.nii` or `.nii.gz`.
+///
+/// # Errors
+/// [`NiftiError`] names the file, the field and the remedy for everything that is refused.
+pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
+    let image = read(bytes, name, options)?;
+    let first = image.volume.data[0];
+    if image.volume.data.iter().all(|&x| x == first) {
+        return Err(refused(name, NiftiProblem::Constant { value: first }));
+    }
+    Ok(image)
+}
+
+/// Reads a label map: whole numbers from 0 to 255. Returns the warnings beside it.
+///
+/// # Errors
+/// [`NiftiError`], also for values that are no labels.
+pub fn decode_labels(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+) -> Result<(LabelMap<Native>, Vec<String>), NiftiError> {
+    let image = read(bytes, name, options)?;
+    // Scaling in 32 bits leaves 2.9999998 for 3.
+    let is_label = |x: f32| (x - x.round()).abs() < 1e-3 && (-0.5..255.5).contains(&x);
+    let count = image.volume.data.iter().filter(|&&x| !is_label(x)).count();
+    if count > 0 {
+        let first = image.volume.data.iter().copied().find(|&x| !is_label(x)).unwrap_or(f32::NAN);
+        return Err(refused(name, NiftiProblem::NotLabels { count, first }));
+    }
+    Ok((image.volume.map(|x| x.round() as u8), image.warnings))
+}
+
+/// Reads a mask. Whole numbers: all but 0 are inside. Fractions (a soft mask): above half of the largest value, and a
+/// warning says so. Returns the warnings beside it.
+///
+/// # Errors
+/// [`NiftiError`], also for a mask without a voxel inside.
+pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(Mask<Native>, Vec<String>), NiftiError> {
+    let NiftiImage { volume, mut warnings, .. } = read(bytes, name, options)?;
+    let soft = volume.data.iter().any(|x| (x - x.round()).abs() > 1e-3);
+    let mask = if soft {
+        let half = 0.5 * volume.data.iter().copied().fold(0f32, f32::max);
+        warnings.push(format!("the mask holds fractions; voxels above {half} are inside"));
+        volume.map(|x| x > half)
+    } else {
+        volume.map(|x| x.round() != 0.0)
+    };
+    if mask.data.iter().all(|&inside| !inside) {
+        return Err(refused(name, NiftiProblem::EmptyMask));
+    }
+    Ok((mask, warnings))
+}
+
+fn refused(name: &str, problem: NiftiProblem) -> NiftiError {
+    NiftiError { file: name.to_owned(), problem }
+}
+
+fn read(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
+    check_extension(name).and_then(|()| read_checked(bytes, options)).map_err(|problem| refused(name, problem))
+}
+
+fn check_extension(name: &str) -> Result<(), NiftiProblem> {
+    let name = name.to_ascii_lowercase();
+    let ends = |endings: &[&str]| endings.iter().any(|e| name.ends_with(e));
+    if ends(&[".nii", ".nii.gz"]) {
+        return Ok(());
+    }
+    let hint = if ends(&[".dcm", ".ima"]) {
+        "convert the DICOM series with dcm2niix"
+    } else if ends(&[".hdr", ".img", ".hdr.gz", ".img.gz"]) {
+        "join the header/image pair into one .nii file (fslchfiletype NIFTI_GZ, or load and save with nibabel)"
+    } else if ends(&[".mgz", ".mgh"]) {
+        "convert it with mri_convert or nibabel"
+    } else if ends(&[".nrrd", ".nhdr", ".mha", ".mhd"]) {
+        "save it as NIfTI (3D Slicer or SimpleITK do)"
+    } else {
+        "convert the scan with dcm2niix"
+    };
+    Err(NiftiProblem::Extension { hint })
+}
+
+fn read_checked(bytes: &[u8], options: &ReadOptions) -> Result<NiftiImage, NiftiProblem> {
+    let packed = gzip::is_gzip(bytes);
+    let unpacked;
+    let head = if packed {
+        unpacked = gzip::head(bytes, header::HEADER_BYTES)?;
+        &unpacked[..]
+    } else {
+        bytes
+    };
+    let header = Header::parse(head)?;
+    let layout = header.layout(options.volume)?;
+    let (slope, intercept) = header.scaling()?;
+    let mut warnings = Vec::new();
+    let (grid, orientation) = orientation::grid(&header, layout.dims, options.prefer, &mut warnings)?;
+    if header.bitpix as usize != 8 * layout.kind.size_of() {
+        warnings.push(format!(
+            "bitpix is {}, datatype {} has {}; datatype is believed",
+            header.bitpix,
+            header.datatype,
+            8 * layout.kind.size_of()
+        ));
+    }
+    let raw = if packed {
+        gzip::part(bytes, layout.first, layout.bytes, layout.end)?
+    } else {
+        if (bytes.len() as u64) < layout.end {
+            return Err(NiftiProblem::Truncated { declared: layout.end, found: bytes.len() as u64 });
+        }
+        // Behind the check the places fit usize.
+        bytes[layout.first as usize..(layout.first + layout.bytes) as usize].to_vec()
+    };
+    let mut data = voxels(raw, &layout, &header, slope, intercept)?;
+    let mut nonfinite_voxels = 0;
+    for x in data.iter_mut().filter(|x| !x.is_finite()) {
+        *x = 0.0;
+        nonfinite_voxels += 1;
+    }
+    if nonfinite_voxels > 0 {
+        warnings.push(format!("{nonfinite_voxels} voxels are NaN or infinite and were set to 0"));
+    }
+    Ok(NiftiImage { volume: Volume::from_data(grid, data), warnings, nonfinite_voxels, orientation })
+}
+
+/// Voxels through the crate. The scaling is ours: the crate scales integers in the precision of the result.
+fn voxels(
+    raw: Vec<u8>,
+    layout: &Layout,
+    header: &Header,
+    slope: f64,
+    intercept: f64,
+) -> Result<Vec<f32>, NiftiProblem> {
+    let [nx, ny, nz] = layout.dims.map(|n| n as u16);
+    let failed = |e: &nifti::NiftiError| NiftiProblem::DataType {
+        code: header.datatype,
+        kind: "not readable",
+        remedy: if matches!(e, nifti::NiftiError::IncompatibleLength(..)) {
+            "the data is shorter than declared; export the file again"
+        } else {
+            "save it as float32"
+        },
+    };
+    let dim = [3, nx, ny, nz, 1, 1, 1, 1];
+    let volume = InMemNiftiVolume::from_raw_fields(dim, layout.kind, 0.0, 0.0, raw, header.endianness);
+    let volume = volume.map_err(|e| failed(&e))?;
+    let plain = slope == 1.0 && intercept == 0.0;
+    let scaled = |x: f64| (x * slope + intercept) as f32;
+    // Up to 16 bits a 32-bit float holds every value; beyond, the scaling starts from 64 bits.
+    match layout.kind {
+        NiftiType::Int32 | NiftiType::Uint32 | NiftiType::Int64 | NiftiType::Uint64 | NiftiType::Float64 => {
+            let array = volume.into_ndarray::<f64>().map_err(|e| failed(&e))?;
+            Ok(array.into_raw_vec_and_offset().0.into_iter().map(scaled).collect())
+        }
+        _ => {
+            let array = volume.into_ndarray::<f32>().map_err(|e| failed(&e))?;
+            let mut data = array.into_raw_vec_and_offset().0;
+            if !plain {
+                for x in &mut data {
+                    *x = scaled(f64::from(*x));
+                }
+            }
+            Ok(data)
+        }
+    }
+}
