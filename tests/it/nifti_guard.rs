@@ -219,7 +219,7 @@ fn each_malformed_file_is_refused_by_file_field_and_remedy() {
                 f.qform_code = 0;
                 f.srow = [[1.0, 0.0, 2.0, 0.0], [0.0, 2.0, 2.0, 0.0], [0.0, 0.0, 1e-4, 0.0]];
             }),
-            &["srow", "singular", "dcm2niix"],
+            &["srow", "singular", "DICOM again"],
         ),
         ("NaN sform", File::with(|f| f.srow[1][3] = f64::NAN), &["srow", "not a finite", "correct the header"]),
         (
