@@ -8,6 +8,7 @@ mod grid;
 pub mod morphology;
 pub mod nifti;
 pub mod resample;
+pub mod seg_nrrd;
 mod volume;
 
 pub use bounds::VoxelBox;

@@ -6,4 +6,5 @@ mod pipelines;
 mod nifti_guard;
 mod python;
 mod rooms;
+mod slicer_files;
 mod transform_files;
