@@ -2,8 +2,8 @@
 
 mod fem;
 mod mesh_files;
-mod pipelines;
 mod nifti_guard;
+mod pipelines;
 mod python;
 mod rooms;
 mod slicer_files;

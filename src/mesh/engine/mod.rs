@@ -1,0 +1,321 @@
+//! Meshing engines behind one interface: a label map in, conforming labelled tetrahedra out.
+//!
+//! Every engine meshes the same smooth [`LabelField`]s and hands its tets to the same quality pass, so that what
+//! follows does not depend on which one ran. `lattice` is ours and always there; `cgal`, `gmsh` and `tetgen` are
+//! programs, used when they are installed.
+
+mod cgal;
+mod lattice;
+mod process;
+mod sizing;
+
+pub use process::{Limits, ProcessError};
+
+use super::label_field::LabelField;
+use super::optimise::{self, Complex, OptimiseSettings, Point};
+use super::repair::{self, Island};
+use super::tet_mesh::{MeshError, TetMesh};
+use crate::geometry::Frame;
+use crate::image::LabelMap;
+use serde::{Deserialize, Serialize};
+use sizing::EdgeField;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// The engines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Engine {
+    /// Our body-centred lattice; always there.
+    Lattice,
+    /// CGAL's Mesh_3 through our small program.
+    Cgal,
+}
+
+impl Engine {
+    /// The name used on the command line and in manifests.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lattice => "lattice",
+            Self::Cgal => "cgal",
+        }
+    }
+}
+
+/// How fine the mesh shall be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshSize {
+    /// About this many tets (within 15 %).
+    Cells(usize),
+    /// Target edge length in mm.
+    EdgeMm(f64),
+}
+
+/// Where the programs are; a missing one is `None`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnginePrograms {
+    /// `hgm-cgal-mesher`.
+    pub cgal: Option<PathBuf>,
+}
+
+impl EnginePrograms {
+    /// Looks beside the executable, then in the variable `HGM_CGAL_MESHER`, then on `PATH`.
+    pub fn find(executable: Option<&std::path::Path>, variable: impl Fn(&str) -> Option<std::ffi::OsString>) -> Self {
+        let path = variable("PATH").unwrap_or_default();
+        let on_path = |name: &str| std::env::split_paths(&path).map(|d| d.join(name)).find(|p| p.is_file());
+        let folder = executable.and_then(std::path::Path::parent);
+        let beside = folder.and_then(|d| {
+            let places = [d.join("hgm-cgal-mesher"), d.join("../engines/hgm-cgal-mesher")];
+            places.into_iter().find(|p| p.is_file())
+        });
+        let named = variable("HGM_CGAL_MESHER").map(PathBuf::from).filter(|p| p.is_file());
+        Self { cgal: named.or(beside).or_else(|| on_path("hgm-cgal-mesher")) }
+    }
+
+    /// The engine that is used when none is named: `cgal` where it is built, else `lattice`.
+    pub fn preferred(&self) -> Engine {
+        if self.cgal.is_some() { Engine::Cgal } else { Engine::Lattice }
+    }
+}
+
+/// Everything that decides a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSettings {
+    /// The engine; see [`EnginePrograms::preferred`].
+    pub engine: Engine,
+    /// How fine.
+    pub size: MeshSize,
+    /// Labels that are not meshed (they count as outside).
+    pub without: Vec<u8>,
+    /// Smoothing of the label indicators, in voxels.
+    pub smoothing_voxels: f64,
+    /// Parts of the labelled region smaller than this share of the largest are removed; parts of a label smaller than
+    /// one target tet take the label around them.
+    pub smallest_part: f64,
+    /// The quality pass.
+    pub optimise: OptimiseSettings,
+    /// Time and memory of an engine that is a program.
+    pub limits: Limits,
+}
+
+impl Default for MeshSettings {
+    fn default() -> Self {
+        Self {
+            engine: Engine::Lattice,
+            size: MeshSize::Cells(60_000),
+            without: Vec::new(),
+            smoothing_voxels: 0.7,
+            smallest_part: 0.05,
+            optimise: OptimiseSettings::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// Why there is no mesh.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum EngineError {
+    #[error("no voxel carries a label to mesh (labels left out: {without:?}); check the label map")]
+    NoLabels { without: Vec<u8> },
+    #[error("{what} must be a positive finite number, got {value}")]
+    Setting { what: &'static str, value: f64 },
+    #[error(
+        "a target edge of {edge_mm:.2} mm would give about {cells:.1e} tets; the most is {most:.0e}; ask for a larger edge"
+    )]
+    TooFine { edge_mm: f64, cells: f64, most: f64 },
+    #[error(
+        "engine `{engine}`: the labelled region near {centre_mm:.1?} mm ({volume_mm3:.1} mm3) is too small for tets of {edge_mm:.2} mm; ask for more cells or a smaller edge"
+    )]
+    TooSmall { engine: &'static str, centre_mm: [f64; 3], volume_mm3: f64, edge_mm: f64 },
+    #[error(
+        "engine `{engine}` is not installed ({program}); install it (see `hgm doctor`) or use the engine `lattice`"
+    )]
+    Missing { engine: &'static str, program: &'static str },
+    #[error("engine `{engine}`: {source}")]
+    Program { engine: &'static str, source: ProcessError },
+    #[error("engine `{engine}`: the result is not a valid mesh: {source}; use the engine `lattice`")]
+    Invalid { engine: &'static str, source: MeshError },
+}
+
+/// What was done on the way to a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeshingRecord {
+    /// The engine that ran.
+    pub engine: Engine,
+    /// The target edge in mm that gave the mesh.
+    pub edge_mm: f64,
+    /// Parts that were too small to mesh.
+    pub islands: Vec<Island>,
+}
+
+/// The most tets that a mesh may have.
+const MOST_CELLS: f64 = 2e7;
+
+/// Meshes a label map: tets in the map's frame (mm, RAS+), labelled as the map is.
+///
+/// # Errors
+/// [`EngineError`] names the engine, what went wrong and what to try.
+pub fn mesh_labels<F: Frame>(
+    map: &LabelMap<F>,
+    settings: &MeshSettings,
+    programs: &EnginePrograms,
+) -> Result<(TetMesh, MeshingRecord), EngineError> {
+    let name = settings.engine.name();
+    for (what, value) in
+        [("the smoothing", settings.smoothing_voxels + 1e-9), ("the smallest part", settings.smallest_part + 1e-9)]
+    {
+        positive(what, value)?;
+    }
+    let no_labels = || EngineError::NoLabels { without: settings.without.clone() };
+    let mut map = map.map(|l| if settings.without.contains(&l) { 0 } else { l });
+    let labelled = map.data.iter().filter(|&&l| l != 0).count();
+    let volume_mm3 = labelled as f64 * map.grid.voxel_volume_mm3();
+    if labelled == 0 {
+        return Err(no_labels());
+    }
+    // A first guess: tets of a fair mesh of edge h have about 0.17 h^3.
+    let mut edge_mm = match settings.size {
+        MeshSize::EdgeMm(edge) => positive("the target edge", edge)?,
+        MeshSize::Cells(cells) => (volume_mm3 / (TET_SHARE * positive("the number of cells", cells as f64)?)).cbrt(),
+    };
+    let cells = volume_mm3 / (TET_SHARE * edge_mm.powi(3));
+    if cells > MOST_CELLS {
+        return Err(EngineError::TooFine { edge_mm, cells, most: MOST_CELLS });
+    }
+    let islands = repair::remove_islands(&mut map, settings.smallest_part, TET_SHARE * edge_mm.powi(3));
+    let field = LabelField::new(&map, settings.smoothing_voxels).ok_or_else(no_labels)?;
+    let seeds = sizing::interface_seeds(&field);
+    let make = |edge_mm: f64| match settings.engine {
+        Engine::Lattice => Ok(lattice::mesh(&field, edge_mm * CUBE_PER_EDGE)),
+        Engine::Cgal => {
+            let program = programs.cgal.as_ref();
+            let program = program.ok_or(EngineError::Missing { engine: name, program: "hgm-cgal-mesher" })?;
+            cgal::mesh(program, &field, &EdgeField::uniform(edge_mm), &seeds, &settings.limits)
+                .map_err(|source| EngineError::Program { engine: name, source })
+        }
+    };
+    let mut complex = make(edge_mm)?;
+    if let MeshSize::Cells(wanted) = settings.size {
+        for _ in 0..4 {
+            let ratio = complex.count() as f64 / wanted as f64;
+            if complex.count() == 0 || (0.92..=1.08).contains(&ratio) {
+                break;
+            }
+            edge_mm *= ratio.cbrt();
+            complex = make(edge_mm)?;
+        }
+    }
+    repair::separate(&mut complex);
+    if complex.count() == 0 {
+        let centre_mm = centre_of_mass(&field);
+        return Err(EngineError::TooSmall { engine: name, centre_mm, volume_mm3, edge_mm });
+    }
+    optimise::optimise(&mut complex, &field, &settings.optimise);
+    repair::separate(&mut complex);
+    let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
+    Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
+}
+
+/// Volume of a tet per cubed edge length in a mesh of this kind (a regular one has 0.118, CGAL's average 0.17).
+const TET_SHARE: f64 = 0.17;
+/// Cube edge of the lattice whose tets have as much volume: (12 * TET_SHARE)^(1/3).
+const CUBE_PER_EDGE: f64 = 1.268;
+
+fn positive(what: &'static str, value: f64) -> Result<f64, EngineError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(EngineError::Setting { what, value }) }
+}
+
+fn centre_of_mass(field: &LabelField) -> [f64; 3] {
+    let [nx, ny, _] = field.dims();
+    let spacing = field.spacing_mm();
+    let (mut sum, mut count) = (Point::zeros(), 0.0);
+    for (v, _) in field.largest().iter().enumerate().filter(|(_, l)| **l != 0) {
+        let c = [v % nx, v / nx % ny, v / (nx * ny)];
+        sum += Point::from(std::array::from_fn::<f64, 3, _>(|a| c[a] as f64 * spacing[a]));
+        count += 1.0;
+    }
+    let centre = sum / f64::max(count, 1.0);
+    field.frame_from_box().transform_point(&centre.into()).coords.into()
+}
+
+/// Box coordinates to the map's frame; a mirroring affine turns the tets around.
+fn to_frame(complex: &Complex, field: &LabelField) -> Result<TetMesh, MeshError> {
+    let (x, mut tets, fields) = complex.compacted();
+    let m = field.frame_from_box();
+    let nodes = x.iter().map(|p| m.transform_point(&(*p).into()).coords.into()).collect();
+    if m.fixed_view::<3, 3>(0, 0).determinant() < 0.0 {
+        for tet in &mut tets {
+            tet.swap(2, 3);
+        }
+    }
+    TetMesh::new(nodes, tets, fields.iter().map(|&f| field.labels()[f as usize]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mni;
+    use crate::image::Grid;
+
+    /// A ball of radius 20 mm in a shell of radius 30 mm, off centre in a mirrored, shifted grid.
+    pub(super) fn ball_in_shell() -> LabelMap<Mni> {
+        let mut m = nalgebra::Matrix4::from_diagonal(&nalgebra::Vector4::new(-1.5, 1.5, 1.5, 1.0));
+        m.fixed_view_mut::<3, 1>(0, 3).copy_from(&nalgebra::Vector3::new(40.0, -35.0, -38.0));
+        let grid = Grid::new([52, 50, 51], m).unwrap();
+        let data = (0..grid.len())
+            .map(|n| {
+                let r = grid.position(grid.voxel(n).map(|c| c as f64).into()).mm.coords.norm();
+                if r < 20.0 { 3 } else { 2 * u8::from(r < 30.0) }
+            })
+            .collect();
+        LabelMap::from_data(grid, data)
+    }
+
+    fn volumes(mesh: &TetMesh) -> [f64; 2] {
+        [2, 3].map(|l| (0..mesh.tets().len()).filter(|&t| mesh.labels()[t] == l).map(|t| mesh.volume_mm3(t)).sum())
+    }
+
+    #[test]
+    fn lattice_keeps_volumes_shape_and_size_of_a_ball_in_a_shell() {
+        let settings = MeshSettings { size: MeshSize::Cells(8000), ..MeshSettings::default() };
+        let (mesh, _) = mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap();
+        let count = mesh.tets().len() as f64;
+        assert!((count / 8000.0 - 1.0).abs() < 0.15, "{count} tets");
+        let ball = |r: f64| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3);
+        let [shell_mm3, inner_mm3] = volumes(&mesh);
+        assert!((inner_mm3 / ball(20.0) - 1.0).abs() < 0.01, "{inner_mm3}");
+        assert!((shell_mm3 / (ball(30.0) - ball(20.0)) - 1.0).abs() < 0.01, "{shell_mm3}");
+        let worst = (0..mesh.tets().len()).map(|t| {
+            let [a, b, c, d] = mesh.tets()[t].map(|n| Point::from(mesh.nodes_mm()[n as usize]));
+            optimise::min_sine(&a, &b, &c, &d)
+        });
+        assert!(worst.fold(1.0, f64::min) > 15f64.to_radians().sin());
+    }
+
+    #[test]
+    fn the_same_bytes_on_one_and_two_threads() {
+        let settings = MeshSettings { size: MeshSize::Cells(3000), ..MeshSettings::default() };
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap().0)
+        };
+        assert!(on(1) == on(2));
+    }
+
+    #[test]
+    fn refusals_name_the_engine_and_the_remedy() {
+        let map = ball_in_shell();
+        let refuse =
+            |settings: MeshSettings| mesh_labels(&map, &settings, &EnginePrograms::default()).unwrap_err().to_string();
+        let default = MeshSettings::default;
+        assert!(refuse(MeshSettings { engine: Engine::Cgal, ..default() }).contains("`cgal` is not installed"));
+        assert!(refuse(MeshSettings { without: vec![2, 3], ..default() }).contains("no voxel carries a label"));
+        assert!(refuse(MeshSettings { size: MeshSize::EdgeMm(-1.0), ..default() }).contains("target edge"));
+        assert!(refuse(MeshSettings { size: MeshSize::EdgeMm(0.01), ..default() }).contains("larger edge"));
+        assert!(refuse(MeshSettings { size: MeshSize::Cells(0), ..default() }).contains("number of cells"));
+    }
+}

@@ -1,0 +1,140 @@
+//! Other people's programs with a time limit and a memory limit.
+
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// What a program may use.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Wall clock in seconds.
+    pub time_s: f64,
+    /// Address space in megabytes.
+    pub memory_mb: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { time_s: 300.0, memory_mb: 6000 }
+    }
+}
+
+/// Why a program gave no answer.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum ProcessError {
+    #[error("it cannot be started ({0}); install it, or choose another engine")]
+    Start(std::io::Error),
+    #[error("it was stopped after {time_s} s; raise the time limit, ask for fewer cells, or choose another engine")]
+    TimedOut { time_s: f64 },
+    #[error("it failed ({status}): {last_words}")]
+    Failed { status: String, last_words: String },
+    #[error("its answer is not a mesh")]
+    Answer,
+}
+
+/// Everything a pipe gives; what arrived before a broken pipe is kept, the parser judges it.
+fn drain(pipe: Option<impl Read>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(mut pipe) = pipe {
+        let _ = pipe.read_to_end(&mut bytes);
+    }
+    bytes
+}
+
+/// Runs `command` under `limits` with `input` on its stdin; returns its stdout.
+pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<Vec<u8>, ProcessError> {
+    let mut child = capped(command, limits.memory_mb)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(ProcessError::Start)?;
+    let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+    let deadline = Instant::now() + Duration::from_secs_f64(limits.time_s);
+    // One thread per pipe: none can block another. A program that stops reading has failed and says so by its status.
+    let _ = std::thread::spawn(move || stdin.map(|mut pipe| pipe.write_all(&input)));
+    let out = std::thread::spawn(move || drain(stdout));
+    let err = std::thread::spawn(move || drain(stderr));
+    let mut pause = Duration::from_millis(1);
+    let status = loop {
+        match child.try_wait() {
+            Ok(Some(status)) => break status,
+            Ok(None) if Instant::now() < deadline => std::thread::sleep(pause),
+            _ => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(ProcessError::TimedOut { time_s: limits.time_s });
+            }
+        }
+        pause = (pause * 2).min(Duration::from_millis(20));
+    };
+    let (out, err) = (out.join().unwrap_or_default(), err.join().unwrap_or_default());
+    if status.success() {
+        return Ok(out);
+    }
+    let said = String::from_utf8_lossy(if err.is_empty() { &out } else { &err }).into_owned();
+    let tail: Vec<&str> = said.lines().rev().filter(|l| !l.trim().is_empty()).take(3).collect();
+    let last_words = tail.into_iter().rev().collect::<Vec<_>>().join(" | ");
+    let last_words = if last_words.is_empty() { "without a word".to_owned() } else { last_words };
+    Err(ProcessError::Failed { status: status.to_string(), last_words })
+}
+
+/// The command behind the shell's `ulimit -v`, where there is such a shell: the limit is the kernel's, not a hope.
+fn capped(command: &Command, memory_mb: u64) -> Command {
+    let mut shell = if cfg!(unix) {
+        let mut shell = Command::new("/bin/sh");
+        shell.args(["-c", &format!("ulimit -v {} && exec \"$0\" \"$@\"", memory_mb * 1024)]);
+        shell.arg(command.get_program());
+        shell
+    } else {
+        Command::new(command.get_program())
+    };
+    shell.args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        shell.current_dir(folder);
+    }
+    shell
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn sh(script: &str) -> Command {
+        let mut command = Command::new("/bin/sh");
+        command.args(["-c", script]);
+        command
+    }
+
+    #[test]
+    fn input_reaches_the_program_and_its_answer_comes_back() {
+        let input = vec![7u8; 1 << 20];
+        assert_eq!(run(&Command::new("cat"), input.clone(), &Limits::default()).unwrap(), input);
+    }
+
+    #[test]
+    fn a_program_that_hangs_is_stopped() {
+        let limits = Limits { time_s: 0.2, ..Limits::default() };
+        let started = Instant::now();
+        assert!(matches!(run(&sh("exec sleep 30"), Vec::new(), &limits), Err(ProcessError::TimedOut { .. })));
+        assert!(started.elapsed() < Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_program_that_wants_too_much_memory_fails_by_name() {
+        let limits = Limits { memory_mb: 50, ..Limits::default() };
+        // tail must hold what it may still have to print.
+        let error = run(&sh("head -c 200000000 /dev/zero | tail -n 1 >&2"), Vec::new(), &limits).unwrap_err();
+        assert!(matches!(&error, ProcessError::Failed { last_words, .. } if last_words.contains("memory")), "{error}");
+    }
+
+    #[test]
+    fn last_words_and_missing_programs_are_reported() {
+        let error = run(&sh("echo first; echo it broke >&2; exit 4"), Vec::new(), &Limits::default()).unwrap_err();
+        assert!(error.to_string().contains("it broke"), "{error}");
+        assert!(run(&Command::new("/no/such/program"), Vec::new(), &Limits::default()).is_err());
+    }
+}
