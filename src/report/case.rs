@@ -2,13 +2,18 @@
 
 use super::colour::ColourScale;
 use super::figure::CaseImages;
+use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
 use super::page::{CasePage, ErrorMap, title_of};
 use super::viewer::{ViewedSurface, Viewer};
 use crate::artefact::{WriteError, write_whole};
 use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
-use crate::mesh::format::{MeshWithFields, ReadError, gifti, vtu};
+use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::image::nifti::{self, NiftiError, ReadOptions};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::mesh::format::{MeshWithFields, ReadError, WriteError as FieldError, gifti, vtu};
 use crate::mesh::{TetMesh, TriMesh};
+use crate::register::transform_text::{self, TransformTextError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -27,10 +32,18 @@ pub enum ReportError {
     Text { file: String },
     #[error("{file}: point array `{array}` has {found} numbers for {nodes} nodes; write the file again")]
     Array { file: String, array: String, found: usize, nodes: usize },
+    #[error("{file}: its grid is not that of {other}; write both on one grid")]
+    Grid { file: String, other: String },
+    #[error(transparent)]
+    Image(#[from] NiftiError),
+    #[error(transparent)]
+    Transform(#[from] TransformTextError),
     #[error(transparent)]
     Mesh(#[from] ReadError),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
+    #[error("a surface for other viewers: {0}")]
+    HandOff(FieldError),
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -124,14 +137,47 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     Ok(page)
 }
 
-/// Makes `report.html` of a case directory again. Returns its path.
+/// `report.html` and the files for other viewers (see [`hand_off`]), by their paths in the case directory.
 ///
 /// # Errors
-/// [`ReportError`]; nothing is written then.
+/// [`ReportError`] as [`read_case`].
+pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
+    let page = read_case(folder)?;
+    let mut files = vec![("report.html".to_owned(), page.to_html().into_bytes())];
+    let case = Case { folder };
+    if let Some(images) = case.images()? {
+        files.extend(hand_off::segmentations(&images));
+    }
+    if let Some(outcome) = &page.outcome {
+        files.extend(hand_off::series(outcome));
+        if let Some((file, sample)) = best_sample(&case, outcome)? {
+            if let Some(errors) = sample.point_field("rmse_mm") {
+                let deformed = displaced(&file, &sample)?;
+                let sets = outcome.rmse_sets();
+                let surfaces = hand_off::error_surfaces(&sample.mesh, &deformed, &errors.values, &sets);
+                files.extend(surfaces.map_err(ReportError::HandOff)?);
+            }
+        }
+    }
+    Ok(files)
+}
+
+/// Makes `report.html` of a case directory, and the files for other viewers, again. Returns the page's path.
+///
+/// # Errors
+/// [`ReportError`]; nothing is written unless everything could be made.
 pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
-    let path = folder.join("report.html");
-    write_whole(&path, read_case(folder)?.to_html().as_bytes())?;
-    Ok(path)
+    for (file, bytes) in report_files(folder)? {
+        write_whole(&folder.join(file), &bytes)?;
+    }
+    Ok(folder.join("report.html"))
+}
+
+/// The best sample's file and its name, when both are there.
+fn best_sample(case: &Case<'_>, outcome: &ExperimentOutcome) -> Result<Option<(String, MeshWithFields)>, ReportError> {
+    let Some(best) = outcome.best() else { return Ok(None) };
+    let file = best.file.clone().unwrap_or_else(|| format!("sim/{}.vtu", best.id));
+    Ok(case.mesh(&file)?.map(|sample| (file, sample)))
 }
 
 /// Where the mesh is cut: through the resection margin when there is one, else near the middle.
@@ -169,9 +215,8 @@ fn add_results(
         page.absent.push("the error per node (no sample is the best one)".to_owned());
         return Ok(());
     };
-    let file = best.file.clone().unwrap_or_else(|| format!("sim/{}.vtu", best.id));
-    let Some(sample) = case.mesh(&file)? else {
-        page.absent.push(format!("the error per node and the 3-D view ({file} is not there)"));
+    let Some((file, sample)) = best_sample(case, outcome)? else {
+        page.absent.push(format!("the error per node and the 3-D view (the file of {} is not there)", best.id));
         return Ok(());
     };
     let mesh = &sample.mesh;
@@ -231,10 +276,54 @@ fn viewer(
 }
 
 impl Case<'_> {
+    fn mask(&self, file: &str) -> Result<Option<Mask<Mni>>, ReportError> {
+        // Read as labels: a cavity that is empty is a result, not a fault.
+        Ok(self.labels(file)?.map(|labels| labels.map(|l| l != 0)))
+    }
+
+    fn labels(&self, file: &str) -> Result<Option<LabelMap<Mni>>, ReportError> {
+        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
+        Ok(Some(nifti::decode_labels(&bytes, file, &ReadOptions::default())?.0.relabelled()))
+    }
+
+    fn intensities(&self, file: &str) -> Result<Option<Volume<f32, Mni>>, ReportError> {
+        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
+        Ok(Some(nifti::decode(&bytes, file, &ReadOptions::default())?.volume.relabelled()))
+    }
+
+    fn transform<M: Frame, F: Frame>(&self, file: &str) -> Result<Option<RigidTransform<M, F>>, ReportError> {
+        let Some(text) = self.text(file)? else { return Ok(None) };
+        Ok(Some(transform_text::rigid_from_text(&text, file)?))
+    }
+
+    /// An image and its brain mask, which must share a grid; `None` when either is absent.
+    fn masked_image(&self, image: &str, mask: &str) -> Result<Option<(Volume<f32, Mni>, Mask<Mni>)>, ReportError> {
+        let (Some(volume), Some(brain)) = (self.intensities(image)?, self.mask(mask)?) else { return Ok(None) };
+        if !volume.grid.coincides(&brain.grid, 1e-3) {
+            return Err(ReportError::Grid { file: mask.to_owned(), other: image.to_owned() });
+        }
+        Ok(Some((volume, brain)))
+    }
+
     /// The images in the MNI frame; `None` without the pre-operative image and its brain.
     fn images(&self) -> Result<Option<CaseImages>, ReportError> {
-        let _ = self;
-        Ok(None)
+        let pre = self.masked_image("anat/pre_space-MNI_T1w.nii.gz", "anat/pre_space-MNI_desc-brain_mask.nii.gz")?;
+        let Some((pre, pre_brain)) = pre else { return Ok(None) };
+        let pre_from_post = self.transform::<Post, Pre>("xfm/from-post_to-pre.txt")?;
+        let mni_from_pre = self.transform::<Pre, Mni>("xfm/from-pre_to-MNI.txt")?;
+        // As scanned: the coordinates of the one scan are taken for those of the other.
+        let registered_from_scanned = pre_from_post.zip(mni_from_pre).map(|(pre_from_post, mni_from_pre)| {
+            mni_from_pre.inverse().relabelled::<Mni, Post>().then(&pre_from_post).then(&mni_from_pre)
+        });
+        Ok(Some(CaseImages {
+            pre,
+            pre_brain,
+            post: self.masked_image("anat/post_space-MNI_T1w.nii.gz", "anat/post_space-MNI_desc-brain_mask.nii.gz")?,
+            labels: self.labels("anat/pre_space-MNI_dseg.nii.gz")?,
+            resected: self.mask("anat/pre_space-MNI_label-resected_mask.nii.gz")?,
+            cavity: self.mask("anat/post_space-MNI_label-cavity_mask.nii.gz")?,
+            registered_from_scanned,
+        }))
     }
 }
 
@@ -242,6 +331,8 @@ impl Case<'_> {
 mod tests {
     use super::*;
     use crate::experiment::outcome::SampleOutcome;
+    use crate::geometry::Position;
+    use crate::image::Grid;
     use crate::mesh::format::Field;
 
     fn mesh() -> TetMesh {
@@ -290,7 +381,38 @@ mod tests {
         assert_eq!(deformed.surface.nodes_mm[0], [0.5; 3]);
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(path).unwrap();
+        assert!(folder.path().join("sim/best_margin.shape.gii").is_file());
         assert!(html.contains("id=\"view\"") && !html.contains(&folder.path().display().to_string()));
+    }
+
+    #[test]
+    fn images_are_masked_and_a_known_pose_is_undone() {
+        let folder = tempfile::tempdir().unwrap();
+        case(folder.path());
+        let grid = Grid::<Mni>::axis_aligned([30, 30, 30], [2.0; 3], [-30.0; 3]);
+        let radius = |n: usize| {
+            let [i, j, k] = grid.voxel(n).map(|x| x as f64);
+            grid.position([i, j, k].into()).mm.coords.norm()
+        };
+        let brain = Mask::from_data(grid, (0..grid.len()).map(|n| radius(n) < 24.0).collect());
+        let image = Volume::from_data(grid, (0..grid.len()).map(|n| 100.0 + radius(n) as f32).collect());
+        for role in ["pre", "post"] {
+            write(folder.path(), &format!("anat/{role}_space-MNI_T1w.nii.gz"), &nifti::encode_f32(&image));
+            write(folder.path(), &format!("anat/{role}_space-MNI_desc-brain_mask.nii.gz"), &nifti::encode_mask(&brain));
+        }
+        let none = brain.map(|_| false);
+        write(folder.path(), "anat/post_space-MNI_label-cavity_mask.nii.gz", &nifti::encode_mask(&none));
+        write(folder.path(), "xfm/from-post_to-pre.txt", b"1 0 0 10\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+        write(folder.path(), "xfm/from-pre_to-MNI.txt", b"0 -1 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n");
+        let images = Case { folder: folder.path() }.images().unwrap().unwrap();
+        // A point of the post-operative scan moves by +10 mm along the scanner's x, which is the frame's y.
+        let moved = images.registered_from_scanned.unwrap().apply(Position::new(1.0, 2.0, 3.0));
+        assert!((moved.mm - nalgebra::Point3::new(1.0, 12.0, 3.0)).norm() < 1e-12, "{moved:?}");
+        let page = read_case(folder.path()).unwrap();
+        assert_eq!((page.registration.as_ref().unwrap().has_before, page.mosaics.len()), (true, 2));
+        write(folder.path(), "anat/pre_space-MNI_desc-brain_mask.nii.gz", b"no");
+        let message = read_case(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("anat/pre_space-MNI_desc-brain_mask.nii.gz"), "{message}");
     }
 
     #[test]
@@ -300,7 +422,7 @@ mod tests {
         case(folder.path());
         std::fs::remove_file(folder.path().join("sim/sample-00.vtu")).unwrap();
         let page = read_case(folder.path()).unwrap();
-        assert!(page.absent.iter().any(|a| a.contains("sim/sample-00.vtu")), "{:?}", page.absent);
+        assert!(page.absent.iter().any(|a| a.contains("the file of sample-00")), "{:?}", page.absent);
         write(folder.path(), "sim/outcome.json", b"{\"kind\": 3}");
         let message = read_case(folder.path()).unwrap_err().to_string();
         assert!(message.contains("sim/outcome.json"), "{message}");

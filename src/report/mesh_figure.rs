@@ -179,7 +179,7 @@ pub fn value_views(
 }
 
 /// Facets of a set: as named, or the boundary facets whose nodes are all in the node set.
-fn set_facets(mesh: &TetMesh, set: &str, boundary: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
+pub fn set_facets(mesh: &TetMesh, set: &str, boundary: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
     if let Some(facets) = mesh.facet_sets.get(set).filter(|f| !f.is_empty()) {
         return Some(facets.clone());
     }

@@ -106,6 +106,7 @@ impl Viewer {
                     "positions": base64.encode(positions),
                     "triangles": base64.encode(triangles),
                     "colours": base64.encode(self.colours(&surface, &values)),
+                    "range": ColourScale::over(values.iter().copied(), "").map(|r| [r.low, r.high]),
                 })
             })
             .collect();

@@ -31,7 +31,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("material", vec!["artefact"]),
         ("fem", vec!["geometry", "mesh", "material"]),
         ("experiment", all[..10].to_vec()),
-        ("report", vec!["geometry", "artefact", "image", "segment", "mesh", "material", "experiment"]),
+        ("report", vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment"]),
         ("cli", all.to_vec()),
     ])
 }

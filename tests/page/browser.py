@@ -42,9 +42,8 @@ class Browser:
             preexec_fn=wire, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
         os.close(from_browser)
-        self.buffer, self.number, self.events = b"", 0, []
+        self.buffer, self.number, self.events, self.session = b"", 0, [], None
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
-        self.session = None
         self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ["Page", "Runtime", "Network", "Log", "DOM"]:
             self.call(f"{domain}.enable")
@@ -89,9 +88,9 @@ class Browser:
     def call(self, method, timeout=60, **params):
         self.number += 1
         message = {"id": self.number, "method": method, "params": params}
-        if getattr(self, "session", None):
+        if self.session:
             message["sessionId"] = self.session
-        os.write(self.out, json.dumps(message).encode() + b"\0") if len(params) < 1 else self._write(message)
+        self._write(message)
         end = time.monotonic() + timeout
         while time.monotonic() < end:
             answer = self._receive(end - time.monotonic())

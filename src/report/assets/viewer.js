@@ -32,6 +32,7 @@
     nv.setScale(1.3);
     nv.drawScene();
     say("");
+    canvas.dataset.seconds = (performance.now() / 1000).toFixed(2);
     canvas.dataset.ready = "yes";
 
     const pressed = (buttons, chosen) => buttons.forEach((b) => b.setAttribute("aria-pressed", String(b === chosen)));

@@ -1,0 +1,368 @@
+#!/usr/bin/env python3
+"""Looks at reports in headless Chromium: no outside request, no complaint, a 3-D view that shows something, colour bars that
+mean what they say, a page that can be read without JavaScript, by keyboard and by colour-blind readers.
+
+    tests/page/test_page.py REPORT.html ... --pictures DIR
+
+Exit code 1 when a check fails. DIR gets a picture of every section.
+"""
+
+import argparse
+import json
+import pathlib
+import re
+import sys
+import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from browser import Browser  # noqa: E402
+
+CHECKS = []
+# What a page may take on two idle cores; a loaded machine gets more through --slack.
+FIRST_PAINT_S, VIEW_S, SIZE_BYTES = 1.0, 3.0, 10_000_000
+
+
+def check(function):
+    CHECKS.append(function)
+    return function
+
+
+def require(truth, message):
+    if not truth:
+        raise AssertionError(message)
+
+
+def pixels(png):
+    """Rows of a non-interlaced 8-bit RGB(A) PNG, as lists of tuples (PNG specification, section 9: filters)."""
+    at, data, width, height, channels = 8, b"", 0, 0, 3
+    while at < len(png):
+        size, kind = int.from_bytes(png[at:at + 4], "big"), png[at + 4:at + 8]
+        body = png[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height = int.from_bytes(body[:4], "big"), int.from_bytes(body[4:8], "big")
+            channels = {2: 3, 6: 4}[body[9]]
+        elif kind == b"IDAT":
+            data += body
+        at += 12 + size
+    raw, stride, rows, above = zlib.decompress(data), width * channels, [], bytearray(width * channels)
+    for y in range(height):
+        kind, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for x in range(stride):
+            left = row[x - channels] if x >= channels else 0
+            up, corner = above[x], above[x - channels] if x >= channels else 0
+            if kind == 1:
+                row[x] = row[x] + left & 255
+            elif kind == 2:
+                row[x] = row[x] + up & 255
+            elif kind == 3:
+                row[x] = row[x] + (left + up) // 2 & 255
+            elif kind == 4:
+                guess = left + up - corner
+                row[x] = row[x] + min((left, up, corner), key=lambda v: abs(guess - v)) & 255
+        rows.append([tuple(row[x:x + 3]) for x in range(0, stride, channels)])
+        above = row
+    return rows
+
+
+def rectangle(browser, selector):
+    return browser.evaluate(
+        f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+        " return [r.x + scrollX, r.y + scrollY, r.width, r.height]; })()")
+
+
+def has(browser, selector):
+    return browser.evaluate(f"document.querySelector({json.dumps(selector)}) !== null")
+
+
+def view_ready(browser, timeout=60):
+    browser.wait_for("document.getElementById('gl').dataset.ready === 'yes'", timeout)
+    browser.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+    browser.evaluate("document.getElementById('stage').scrollIntoView({block: 'center'})")
+    browser.listen(0.5)
+
+
+def inked(browser):
+    """Share of the 3-D canvas that is not background, the number of its colours, and its pixels."""
+    rows = pixels(browser.picture(clip=rectangle(browser, "#stage")))
+    ground = rows[5][len(rows[0]) // 2]
+    flat = [p for row in rows for p in row]
+    far = sum(1 for p in flat if max(abs(a - b) for a, b in zip(p, ground)) > 24)
+    return far / len(flat), len(set(flat)), rows
+
+
+@check
+def opens_from_disk_quickly_and_small(page, options):
+    size = page.stat().st_size
+    require(size < SIZE_BYTES, f"{size} bytes")
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("performance.getEntriesByName('first-contentful-paint').length > 0")
+        paint = browser.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime") / 1000
+        require(paint <= FIRST_PAINT_S * options.slack, f"first paint after {paint:.2f} s")
+        text = f"{size / 1e6:.2f} MB, first paint {paint:.2f} s"
+        if has(browser, "#gl"):
+            browser.wait_for("document.getElementById('gl').dataset.ready === 'yes'", 60)
+            ready = browser.evaluate("Number(document.getElementById('gl').dataset.seconds)")
+            require(ready <= VIEW_S * options.slack, f"3-D view after {ready:.2f} s")
+            text += f", 3-D view {ready:.2f} s"
+        return text
+
+
+@check
+def asks_nothing_of_other_places_and_has_no_complaints(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if has(browser, "#gl"):
+            view_ready(browser)
+        for button in ["[data-surface]", "[data-azimuth]", "input[type=radio]", "details > summary"]:
+            browser.evaluate(f"document.querySelectorAll({json.dumps(button)}).forEach((b) => b.click())")
+        browser.listen(1)
+        require(not browser.requests(), f"requests: {browser.requests()}")
+        require(not browser.complaints(), f"complaints: {browser.complaints()}")
+        return "0 requests, 0 complaints"
+
+
+@check
+def a_request_and_a_complaint_would_be_seen(page, _):
+    with Browser() as browser:
+        browser.open("data:text/html,<img src='http://example.org/x.png'><script>console.error('no')</script>")
+        browser.listen(1)
+        require("http://example.org/x.png" in browser.requests(), f"seen: {browser.requests()}")
+        require("no" in browser.complaints(), f"seen: {browser.complaints()}")
+
+
+@check
+def the_view_shows_every_surface_and_turns_by_keyboard(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if not has(browser, "#gl"):
+            return "no 3-D view on this page"
+        view_ready(browser)
+        shares = []
+        for n in range(browser.evaluate("document.querySelectorAll('[data-surface]').length")):
+            browser.evaluate(f"document.querySelectorAll('[data-surface]')[{n}].click()")
+            browser.listen(0.4)
+            share, colours, _ = inked(browser)
+            shares.append(round(share, 3))
+            require(share > 0.02 and colours > 50, f"surface {n}: {share:.3f} of the canvas, {colours} colours")
+        browser.evaluate("document.getElementById('gl').focus()")
+        _, _, before = inked(browser)
+        for _ in range(6):
+            browser.key("ArrowRight", 39)
+        browser.listen(0.5)
+        _, _, after = inked(browser)
+        require(before != after, "the arrow keys turn nothing")
+        return f"{len(shares)} surfaces, share of the canvas {shares}"
+
+
+@check
+def colour_bars_span_the_data(page, _):
+    html = page.read_text(encoding="utf-8")
+    bar = re.search(r'id="view-bar" data-low="([^"]+)" data-high="([^"]+)"', html)
+    data = re.search(r'<script type="application/json" id="view-data">(.*?)</script>', html)
+    if not bar or not data:
+        return "no coloured view on this page"
+    low, high = map(float, bar.groups())
+    ranges = [s["range"] for s in json.loads(data.group(1))["surfaces"] if s["range"]]
+    require(ranges, "no surface carries values")
+    # The surface leaves out inner nodes and decimation takes means: the page may span less than the data, never more.
+    require(min(r[0] for r in ranges) >= low and max(r[1] for r in ranges) <= high, f"{ranges} outside {low}..{high}")
+    shown = re.findall(r'aria-label="Colour bar: error per node[^"]* from ([^ ]+) \(dark\) to ([^ ]+) \(bright\)"', html)
+    require(shown, "no colour bar names the error")
+    for ends in shown:
+        values = [float(t.replace("\u2212", "-").replace("\u2009", "")) for t in ends]
+        require(all(abs(a - b) <= 0.006 * max(abs(b), 0.01) for a, b in zip(values, (low, high))), f"{values}, {low}..{high}")
+    return f"{low:.4g} to {high:.4g} mm on {len(shown)} bars"
+
+
+@check
+def everything_but_the_view_works_without_javascript(page, _):
+    with Browser(javascript=False) as browser:
+        browser.open(page.as_uri())
+        browser.listen(0.5)
+        require(len({p for row in pixels(browser.picture()) for p in row}) > 20, "the page is blank")
+        root = browser.call("DOM.getDocument")["root"]["nodeId"]
+
+        def node(selector):
+            return browser.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+
+        require(not node("#view") or node("#stage-message"), "no word about the 3-D view")
+        if not node("#f-fixed"):
+            return "readable"
+        # The switch works by CSS alone: the tiles differ between before and after.
+        shots = []
+        for choice in ["#f-fixed", "#f-moving"]:
+            browser.call("DOM.scrollIntoViewIfNeeded", nodeId=node(choice))
+            browser.listen(0.8)
+            quad = browser.call("DOM.getContentQuads", nodeId=node(choice))["quads"][0]
+            x, y = (quad[0] + quad[4]) / 2, (quad[1] + quad[5]) / 2
+            for kind in ["mousePressed", "mouseReleased"]:
+                browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            browser.listen(0.4)
+            shots.append(pixels(browser.picture()))
+        differ = sum(p != q for a, b in zip(*shots) for p, q in zip(a, b))
+        require(differ > 2000, f"the switch before/after changes {differ} pixels")
+        return f"readable; the switch changes {differ} pixels"
+
+
+ACCESSIBILITY = r"""
+(() => {
+  const faults = [];
+  const luminance = (c) => {
+    const [r, g, b] = c.map((v) => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; });
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const parse = (text) => { const n = text.match(/[\d.]+/g).map(Number); return n.length > 3 ? n : [...n, 1]; };
+  const ground = (element) => {
+    for (let e = element; e; e = e.parentElement) {
+      const c = parse(getComputedStyle(e).backgroundColor);
+      if (c[3] === 1) return c.slice(0, 3);
+    }
+    return [255, 255, 255];
+  };
+  let texts = 0, worst = 99;
+  for (const e of document.querySelectorAll("body *")) {
+    const own = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+    if (!own || ["SCRIPT", "STYLE"].includes(e.tagName) || e.tagName === "title" || !e.getClientRects().length) continue;
+    const svg = e.closest("svg");
+    const style = getComputedStyle(e);
+    let behind = ground(e);
+    if (svg && e.previousElementSibling && e.previousElementSibling.tagName === "rect" && (e.getAttribute("fill") || "").startsWith("#")) {
+      behind = parse(getComputedStyle(e.previousElementSibling).fill).slice(0, 3); // The cell of a heat map.
+    }
+    const [a, b] = [luminance(parse(svg ? style.fill : style.color).slice(0, 3)), luminance(behind)];
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    texts += 1;
+    worst = Math.min(worst, ratio);
+    if (ratio < 4.5) faults.push(`contrast ${ratio.toFixed(2)}: ${e.tagName} "${e.textContent.trim().slice(0, 40)}"`);
+  }
+  for (const img of document.querySelectorAll("img")) if (!img.alt) faults.push("img without alt");
+  for (const svg of document.querySelectorAll("svg")) {
+    if (svg.getAttribute("aria-hidden") !== "true" && !svg.getAttribute("aria-label")) faults.push("svg without a name");
+  }
+  for (const input of document.querySelectorAll("input, textarea")) {
+    if (!input.labels.length) faults.push(`no label: ${input.id}`);
+  }
+  for (const e of document.querySelectorAll("[aria-labelledby]")) {
+    if (!document.getElementById(e.getAttribute("aria-labelledby"))) faults.push("label that is not there");
+  }
+  const levels = [...document.querySelectorAll("h1, h2, h3, h4")].map((h) => Number(h.tagName[1]));
+  levels.forEach((l, n) => { if (n && l > levels[n - 1] + 1) faults.push(`heading ${l} after ${levels[n - 1]}`); });
+  if (levels.filter((l) => l === 1).length !== 1) faults.push("not one h1");
+  if (document.documentElement.lang !== "en") faults.push("no language");
+  if (document.documentElement.scrollWidth > innerWidth + 1) faults.push(`wider than the window: ${document.documentElement.scrollWidth}`);
+  const ids = [...document.querySelectorAll("[id]")].map((e) => e.id);
+  if (new Set(ids).size !== ids.length) faults.push("an id twice");
+  return { faults, texts, worst };
+})()
+"""
+
+
+@check
+def can_be_read_in_light_dark_and_narrow(page, _):
+    said = []
+    for options in [{}, {"dark": True}, {"width": 390}]:
+        with Browser(**options) as browser:
+            browser.open(page.as_uri())
+            browser.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+            result = browser.evaluate(ACCESSIBILITY)
+            require(not result["faults"], f"{options}: {result['faults'][:8]}")
+            said.append(f"{result['worst']:.1f}")
+    return f"{result['texts']} texts, smallest contrast {' / '.join(said)} (light / dark / narrow)"
+
+
+@check
+def every_control_is_reached_by_tab(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if has(browser, "#gl"):
+            view_ready(browser)
+        browser.evaluate("document.activeElement.blur(); scrollTo(0, 0)")
+        # A group of radio buttons is one stop.
+        names = browser.evaluate(
+            "[...document.querySelectorAll('button, summary, textarea, input, canvas, nav a')]"
+            ".filter((e) => e.getClientRects().length)"
+            ".map((e, n) => { e.dataset.n = n; return e.type === 'radio' ? e.name : '#' + n; })")
+        reached = set()
+        for _ in range(len(names) + 80):
+            browser.key("Tab", 9)
+            reached.add(browser.evaluate(
+                "(() => { const e = document.activeElement; return e.type === 'radio' ? e.name : '#' + e.dataset.n; })()"))
+        missing = set(names) - reached
+        require(not missing, f"not reached: {sorted(missing)}")
+        return f"{len(set(names))} controls"
+
+
+@check
+def still_pictures_for_who_asks_for_less_motion(page, _):
+    with Browser(reduced_motion=True) as browser:
+        browser.open(page.as_uri())
+        running = browser.evaluate("document.getAnimations().length")
+        require(running == 0, f"{running} animations run")
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        browser.listen(0.3)
+        running = browser.evaluate("document.getAnimations().length")
+        require(running > 0 or not has(browser, "#f-after"), "the pictures do not alternate")
+        return f"{running} alternating tiles, none with reduced motion"
+
+
+@check
+def a_rating_is_saved_as_json(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        saved = browser.evaluate("""
+          new Promise((done) => {
+            const make = URL.createObjectURL;
+            URL.createObjectURL = (blob) => { blob.text().then(done); return make(blob); };
+            HTMLAnchorElement.prototype.click = () => {};
+            document.getElementById("r-mesh-good").checked = true;
+            document.getElementById("r-cavity-bad").checked = true;
+            document.getElementById("rating-note").value = "the \\"edge\\"";
+            document.getElementById("rating-form").requestSubmit();
+          })""")
+        record = json.loads(saved)
+        require(record["ratings"] == {"mesh": "good", "cavity": "bad"} and record["note"] == 'the "edge"', saved)
+        said = browser.evaluate("document.getElementById('rating-said').textContent")
+        require("2 of 6" in said, said)
+
+
+def take_pictures(page, folder, dark):
+    folder.mkdir(parents=True, exist_ok=True)
+    with Browser(dark=dark) as browser:
+        browser.open(page.as_uri())
+        if has(browser, "#gl"):
+            view_ready(browser)
+        browser.evaluate("document.querySelector('nav').style.position = 'static'")
+        for name in browser.evaluate("[...document.querySelectorAll('#warnings, main > section')].map((e) => e.id)"):
+            browser.picture(folder / f"{name}.png", rectangle(browser, f"#{name}"))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("pages", nargs="+", type=pathlib.Path, metavar="REPORT.html")
+    parser.add_argument("--pictures", type=pathlib.Path, help="folder for a picture of every section")
+    parser.add_argument("--slack", type=float, default=1.0, help="factor on the time bars for a loaded machine")
+    parser.add_argument("--only", help="run the checks whose name contains this")
+    options = parser.parse_args()
+    failed = 0
+    for number, page in enumerate(p.resolve() for p in options.pages):
+        print(f"page {number + 1}: {page.parent.name}/{page.name}", flush=True)
+        for function in CHECKS:
+            if options.only and options.only not in function.__name__:
+                continue
+            try:
+                said = function(page, options)
+                print(f"  ok     {function.__name__}" + (f": {said}" if said else ""), flush=True)
+            except (AssertionError, RuntimeError, TimeoutError, OSError) as error:
+                failed += 1
+                print(f"  FAILED {function.__name__}: {error}", flush=True)
+        if options.pictures:
+            for dark in (False, True):
+                folder = options.pictures / f"page-{number + 1}-{page.parent.name}" / ("dark" if dark else "light")
+                take_pictures(page, folder, dark)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
