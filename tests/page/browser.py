@@ -142,11 +142,11 @@ class Browser:
             self.listen(0.05)
         raise TimeoutError(expression)
 
-    def picture(self, path=None, clip=None):
-        """PNG bytes of the visible part, or of a rectangle of the page."""
+    def picture(self, path=None, clip=None, scale=1):
+        """PNG bytes of the visible part, or of a rectangle of the page, at a scale."""
         params = {"format": "png"}
         if clip:
-            params |= {"clip": dict(zip(["x", "y", "width", "height"], clip)) | {"scale": 1}, "captureBeyondViewport": True}
+            params |= {"clip": dict(zip(["x", "y", "width", "height"], clip)) | {"scale": scale}, "captureBeyondViewport": True}
         data = base64.b64decode(self.call("Page.captureScreenshot", **params)["data"])
         if path:
             with open(path, "wb") as file:

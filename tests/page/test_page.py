@@ -83,7 +83,7 @@ def view_ready(browser, timeout=60):
 
 def inked(browser):
     """Share of the 3-D canvas that is not background, the number of its colours, and its pixels."""
-    rows = pixels(browser.picture(clip=rectangle(browser, "#stage")))
+    rows = pixels(browser.picture(clip=rectangle(browser, "#stage"), scale=0.5))
     ground = rows[5][len(rows[0]) // 2]
     flat = [p for row in rows for p in row]
     far = sum(1 for p in flat if max(abs(a - b) for a, b in zip(p, ground)) > 24)
