@@ -56,13 +56,15 @@ fn legend(structures: &[Structure]) -> String {
     html + "</ul>"
 }
 
-fn rows(tiles: &[TileFigure], layers: &[&str], what: &str) -> String {
+/// Rows of tiles, one per plane, under headings of the level `heading`.
+fn rows(tiles: &[TileFigure], layers: &[&str], what: &str, heading: &str) -> String {
     let mut html = String::new();
     for plane in PLANES {
         let row: String =
             tiles.iter().filter(|t| t.tile.plane == plane).map(|figure| tile(figure, layers, what)).collect();
         if !row.is_empty() {
-            let _ = write!(html, "<h4>{}</h4><div class=\"tiles\">{row}</div>", plane.name());
+            let name = plane.name();
+            let _ = write!(html, "<{heading} class=\"plane\">{name}</{heading}><div class=\"tiles\">{row}</div>");
         }
     }
     html
@@ -77,7 +79,7 @@ pub fn mosaic(mosaic: &Mosaic) -> String {
         escape(&mosaic.title),
         escape(&mosaic.caption),
         legend(&mosaic.structures),
-        rows(&mosaic.tiles, &["image"], &mosaic.title.to_lowercase())
+        rows(&mosaic.tiles, &["image"], &mosaic.title.to_lowercase(), "h4")
     )
 }
 
@@ -110,7 +112,7 @@ pub fn registration(figure: &RegistrationFigure) -> String {
         "</fieldset><div class=\"controls\"><input type=\"checkbox\" id=\"o-flicker\" class=\"show-outlines\" checked>\
          <label for=\"o-flicker\">Outlines</label>{}</div>\n{}</div>\n",
         legend(&figure.structures),
-        rows(&figure.tiles, &["image fixed", "image moving", "image scanned"], "before and after surgery")
+        rows(&figure.tiles, &["image fixed", "image moving", "image scanned"], "before and after surgery", "h3")
     );
     html
 }
