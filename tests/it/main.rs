@@ -1,5 +1,6 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
+mod damaged_files;
 mod fem;
 mod mesh_files;
 mod nifti_guard;

@@ -190,7 +190,7 @@ impl Array {
             "GZipBase64Binary" => {
                 let mut bytes = Vec::new();
                 // A block that unpacks to more than was announced is not read to its end.
-                let limit = self.count as u64 * 8 + 1;
+                let limit = (self.count as u64).saturating_mul(8).saturating_add(1);
                 ZlibDecoder::new(packed.as_slice()).take(limit).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
                 bytes
             }

@@ -153,7 +153,7 @@ pub(super) fn numbers_from_bytes(
             let packed = source.take(size)?;
             let before = bytes.len();
             ZlibDecoder::new(packed.as_slice())
-                .take(expected as u64 + 1)
+                .take((expected as u64).saturating_add(1))
                 .read_to_end(&mut bytes)
                 .map_err(|e| format!("zlib block {n}: {e}"))?;
             if bytes.len() - before != expected {

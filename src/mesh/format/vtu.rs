@@ -329,8 +329,10 @@ impl<'a> File<'a> {
             .find(|a| a.section == section && name.is_none_or(|n| a.name == n))
             .ok_or_else(|| self.damaged(field, "the array is missing"))?;
         let numbers = self.decode_array(raw)?;
-        if numbers.len() != components * places {
-            return Err(self.damaged(field, format!("{} numbers, not {}", numbers.len(), components * places)));
+        // Counts come from the file: their product may be anything.
+        let wanted = components.saturating_mul(places);
+        if numbers.len() != wanted {
+            return Err(self.damaged(field, format!("{} numbers, not {wanted}", numbers.len())));
         }
         Ok(numbers)
     }
@@ -341,7 +343,7 @@ impl<'a> File<'a> {
             return Ok(None);
         }
         let values = self.decode_array(raw)?;
-        if values.len() != raw.components * places {
+        if values.len() != raw.components.saturating_mul(places) {
             let wanted = format!("{} numbers, not {} x {places}", values.len(), raw.components);
             return Err(self.damaged(&raw.name, wanted));
         }
