@@ -4,11 +4,15 @@
 //! stdout (JSON with `--json`), logs and progress to stderr. Exit codes: 0 done, 1 failed, 2 usage, 3 input rejected,
 //! 4 computed but the quality gate refused it (outputs kept).
 
+mod case;
 mod completions;
 mod doctor;
 mod failure;
 mod man;
+mod phantom;
+mod prep;
 mod report;
+mod run;
 mod session;
 
 pub use failure::{Failure, Reject};
@@ -29,6 +33,9 @@ pub struct Hgm {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Prep(prep::Args),
+    Run(run::Args),
+    Phantom(phantom::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -40,6 +47,9 @@ pub fn main() -> ExitCode {
     let hgm = Hgm::parse();
     let json = hgm.global.json;
     let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
+        Command::Prep(args) => prep::run(&args, &session),
+        Command::Run(args) => run::run(&args, &session),
+        Command::Phantom(args) => phantom::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),

@@ -4,6 +4,8 @@ pub mod estimate;
 pub mod observed;
 pub mod outcome;
 pub mod phantom;
+pub mod prior;
+pub mod resection;
 pub mod rmse;
 pub mod sample;
 pub mod sweep;

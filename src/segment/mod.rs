@@ -2,4 +2,20 @@
 
 pub mod atlas;
 mod atlas_labels;
+mod bias;
+mod brain;
 pub mod label;
+mod mixture;
+pub mod native;
+mod priors;
+mod segmentation;
+mod ventricle;
+
+pub use bias::LogBias;
+pub use brain::BrainSettings;
+pub use priors::AtlasPriors;
+pub use segmentation::{
+    SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
+    segment_with_priors,
+};
+pub use ventricle::VentricleSettings;

@@ -82,7 +82,7 @@ impl EnginePrograms {
 
 /// Everything that decides a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct MeshSettings {
     /// The engine; see [`EnginePrograms::preferred`].
     pub engine: Engine,

@@ -1,0 +1,200 @@
+//! Stage `anat`: both scans in MNI space, brain masks, labels, cavity, resected tissue.
+
+use super::registration::transforms;
+use super::scans::{GivenMask, given_mask};
+use super::{Case, Failure, Overrides, Reject, Scans, facts};
+use crate::artefact::{Manifest, Produced, Stage};
+use crate::cli::Session;
+use crate::experiment::outcome::ResectionVolumes;
+use crate::geometry::{Frame, Mni};
+use crate::image::nifti::{self, ReadOptions, encode_i16, encode_mask, encode_u8};
+use crate::image::resample::{Interpolation, resample};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::resect::{CavityPair, CavitySettings, Side, apart_from, csf_grey_border, find_cavity, subtract};
+use crate::segment::native::mask_on;
+use crate::segment::{SegmentOverrides, SegmentSettings, atlas, label, segment_t1};
+use anyhow::anyhow;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
+const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
+const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";
+const POST_VENTRICLE: &str = "anat/post_space-MNI_label-ventricle_mask.nii.gz";
+
+/// What the report says of the masks.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct AnatFacts {
+    /// Volumes, cc.
+    pub volumes: ResectionVolumes,
+    /// Hemisphere of the resection.
+    pub side: Side,
+    /// Largest voxel edge of either scan, mm.
+    pub coarsest_voxel_mm: f64,
+}
+
+/// The masks a case's later stages start from, as its files hold them.
+#[derive(Debug)]
+pub struct Anatomy {
+    /// Labels with the resected tissue as a label of its own.
+    pub labels: LabelMap<Mni>,
+    /// Cavity on the post-operative scan.
+    pub cavity: Mask<Mni>,
+    /// Ventricles on the post-operative scan, apart from the cavity.
+    pub post_ventricle: Mask<Mni>,
+}
+
+impl Anatomy {
+    /// Reads the masks of a case.
+    ///
+    /// # Errors
+    /// Rejected when a file is missing or damaged.
+    pub fn read(case: &Case) -> Result<Self, Failure> {
+        let options = ReadOptions::default();
+        let (labels, _) = nifti::decode_labels(&case.read(PRE_DSEG)?, PRE_DSEG, &options).reject()?;
+        let mask = |name: &str| -> Result<Mask<Mni>, Failure> {
+            let (volume, _) = nifti::decode_labels(&case.read(name)?, name, &options).reject()?;
+            Ok(volume.relabelled::<Mni>().map(|l| l > 0))
+        };
+        let (cavity, resected, post_ventricle) = (mask(CAVITY)?, mask(RESECTED)?, mask(POST_VENTRICLE)?);
+        let mut labels: LabelMap<Mni> = labels.relabelled();
+        for (l, taken) in labels.data.iter_mut().zip(&resected.data) {
+            if *taken && *l != label::VENTRICLE {
+                *l = label::RESECTED;
+            }
+        }
+        Ok(Self { labels, cavity, post_ventricle })
+    }
+}
+
+/// Resamples, segments and finds the cavity; a user's own masks win.
+///
+/// # Errors
+/// Rejected scans and masks.
+pub fn anat(
+    case: &Case,
+    scans: &Scans,
+    overrides: &Overrides,
+    after: &Manifest,
+    session: &Session,
+) -> Result<(Manifest, AnatFacts), Failure> {
+    let segment_settings: SegmentSettings = session.settings("segment")?;
+    let cavity_settings: CavitySettings = session.settings("resect")?;
+    let mut stage = Stage::new("anat", VERSION, &case.folder, &(&segment_settings, &cavity_settings))
+        .input("pre", &scans.pre_bytes)
+        .input("post", &scans.post_bytes)
+        .after(after)
+        .frame(Mni::NAME);
+    let mut given = |role: &str, path: &Option<PathBuf>| -> Result<Option<GivenMask>, Failure> {
+        let Some(path) = path else { return Ok(None) };
+        let (mask, bytes) = given_mask(path, scans, session)?;
+        stage = stage.clone().input(role, &bytes);
+        Ok(Some(mask))
+    };
+    let brain = given("brain mask", &overrides.brain_mask)?;
+    let cavity = given("cavity mask", &overrides.cavity_mask)?;
+    let resected = given("resected mask", &overrides.resected_mask)?;
+
+    case.run(&stage, "anat", || {
+        let bar = session.progress(4, "images");
+        let (pre_from_post, mni_from_pre) = transforms(case)?;
+        let mni_from_post = pre_from_post.then(&mni_from_pre);
+        let grid = atlas::template().grid();
+        let on_mni = |mask: &GivenMask| mask.on_mni(&grid, &mni_from_pre, &mni_from_post);
+
+        bar.set_message("pre-operative tissue");
+        let brain_on_pre = match &brain {
+            None => None,
+            Some(GivenMask::Pre(mask)) => Some(mask.clone()),
+            Some(GivenMask::Post(mask)) => Some(mask_on(mask, &scans.pre.grid, &pre_from_post.inverse())),
+        };
+        let before =
+            segment_t1(&scans.pre, &mni_from_pre, &SegmentOverrides { brain: brain_on_pre.as_ref() }, &segment_settings)
+                .reject()?;
+        bar.inc(1);
+        bar.set_message("post-operative tissue");
+        let after = segment_t1(&scans.post, &mni_from_post, &SegmentOverrides::default(), &segment_settings).reject()?;
+        bar.inc(1);
+
+        bar.set_message("cavity");
+        let pair = CavityPair {
+            pre: &before.t1_mni,
+            pre_labels: &before.labels_mni,
+            pre_brain: &before.brain_mni,
+            post: &after.t1_mni,
+            post_known: &after.known_mni,
+            csf_grey_border: csf_grey_border(&before.tissue_means, &before.tissue_deviations),
+        };
+        let by_hand =
+            subtract(cavity.as_ref().map(on_mni), resected.as_ref().map(on_mni), &before.brain_mni, &before.labels_mni);
+        let found = match by_hand.reject()? {
+            Some(found) => found,
+            None => find_cavity(&pair, &cavity_settings).reject()?,
+        };
+        if found.resected.count() == 0 {
+            return Err(Failure::Rejected(anyhow!("the resected tissue is empty; give --resected-mask")));
+        }
+        bar.inc(1);
+
+        bar.set_message("writing");
+        let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &found.cavity, 1.0);
+        if post_ventricle.count() == 0 {
+            return Err(Failure::Rejected(anyhow!(
+                "no ventricle is left on the post-operative scan: it is empty or lies within the cavity; check --cavity-mask"
+            )));
+        }
+        let post_brain = after.brain_mni.clone();
+        let post_brain = apart_from(&post_brain, &found.cavity, 0.0);
+        let mut produced = Produced::default();
+        let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
+        let pre_t1 = resample(&scans.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        let post_t1 = resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        write("anat/pre_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&pre_t1.volume)));
+        write("anat/post_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&post_t1.volume)));
+        write("anat/pre_space-MNI_desc-brain_mask.nii.gz", encode_mask(&before.brain_mni));
+        write("anat/post_space-MNI_desc-brain_mask.nii.gz", encode_mask(&post_brain));
+        write(PRE_DSEG, encode_u8(&before.labels_mni));
+        write(CAVITY, encode_mask(&found.cavity));
+        write(RESECTED, encode_mask(&found.resected));
+        write(POST_VENTRICLE, encode_mask(&post_ventricle));
+        write("anat/pre_space-native_desc-brain_mask.nii.gz", encode_mask(&before.brain));
+        write("anat/pre_space-native_dseg.nii.gz", encode_u8(&before.labels));
+        write("anat/post_space-native_desc-brain_mask.nii.gz", encode_mask(&after.brain));
+        let native_cavity = match &cavity {
+            Some(GivenMask::Post(mask)) => mask.clone(),
+            _ => mask_on(&found.cavity, &scans.post.grid, &mni_from_post),
+        };
+        let native_resected = match &resected {
+            Some(GivenMask::Pre(mask)) => mask.clone(),
+            _ => mask_on(&found.resected, &scans.pre.grid, &mni_from_pre),
+        };
+        write("anat/post_space-native_label-cavity_mask.nii.gz", encode_mask(&native_cavity));
+        write("anat/pre_space-native_label-resected_mask.nii.gz", encode_mask(&native_resected));
+        bar.finish_and_clear();
+
+        produced.warnings.extend(before.warnings.iter().map(|w| format!("pre: {w}")));
+        produced.warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
+        let spacing = scans.pre.grid.spacing_mm().into_iter().chain(scans.post.grid.spacing_mm());
+        produced.facts = facts(&AnatFacts {
+            volumes: ResectionVolumes {
+                cavity_cc: Some(native_cavity.volume_cc()),
+                resected_cc: Some(native_resected.volume_cc()),
+                ventricle_before_cc: Some(before.volumes.ventricle_cc),
+                ventricle_after_cc: Some(post_ventricle.volume_cc()),
+                brain_cc: Some(before.volumes.brain_cc),
+            },
+            side: found.side,
+            coarsest_voxel_mm: spacing.fold(0.0, f64::max),
+        })?;
+        Ok(produced)
+    })
+}
+
+/// Intensities as 16-bit whole numbers, scaled so that the brightest keeps three digits.
+fn whole_numbers(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
+    let highest = volume.data.iter().copied().fold(0.0f32, f32::max);
+    let scale = if (500.0..32000.0).contains(&highest) { 1.0 } else { 4000.0 / highest.max(1e-6) };
+    volume.map(|x| (x * scale).round().clamp(0.0, 32000.0) as i16)
+}

@@ -1,0 +1,146 @@
+//! Stage `mesh`: label map to rest mesh with its boundary sets.
+
+use super::{Case, Failure, REST_MESH, Reject, facts};
+use crate::artefact::{Manifest, Produced, Stage};
+use crate::cli::Session;
+use crate::experiment::outcome::{MeshOutcome, SetOutcome};
+use crate::geometry::{Frame, Mni};
+use crate::image::LabelMap;
+use crate::mesh::engine::{Engine, EnginePrograms, MeshSettings, MeshSize, mesh_labels};
+use crate::mesh::format::gifti::{self, Space};
+use crate::mesh::format::{msh, vtu};
+use crate::mesh::{TetMesh, TriMesh};
+use crate::segment::label;
+use crate::tag::{TagSettings, tag_boundary_sets};
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+/// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
+const LARGE_ISLAND_MM3: f64 = 500.0;
+
+/// Engine and size as the command line gives them.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct MeshOptions {
+    /// Mesh engine [default: cgal where it is built, else lattice]
+    #[arg(long, value_name = "ENGINE", value_parser = engine)]
+    pub mesher: Option<Engine>,
+    /// Target number of tetrahedra (within 15 %)
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Target edge length in mm, instead of a number of tetrahedra
+    #[arg(long, value_name = "MM", conflicts_with = "cells")]
+    pub edge_mm: Option<f64>,
+}
+
+fn engine(name: &str) -> Result<Engine, String> {
+    serde_json::from_value(name.into()).map_err(|_| format!("no engine `{name}`; `hgm doctor` lists what there is"))
+}
+
+/// What the report says of the mesh.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MeshFacts {
+    /// Size and quality.
+    pub mesh: MeshOutcome,
+    /// The boundary sets.
+    pub sets: Vec<SetOutcome>,
+    /// Sets that are not to be believed, a sentence each.
+    pub implausible: Vec<String>,
+}
+
+/// Where the engines are on this machine.
+pub fn programs() -> EnginePrograms {
+    EnginePrograms::find(std::env::current_exe().ok().as_deref(), |name| std::env::var_os(name))
+}
+
+/// Meshes a label map (grey, white, ventricle, resected), tags the sets, leaves only the tissue, writes the rest mesh.
+///
+/// # Errors
+/// Rejected label maps and engines that fail.
+pub fn mesh(
+    case: &Case,
+    labels: &LabelMap<Mni>,
+    options: &MeshOptions,
+    after: &Manifest,
+    session: &Session,
+) -> Result<(Manifest, MeshFacts), Failure> {
+    let programs = programs();
+    let settings = mesh_settings(options, &programs, session)?;
+    let tag_settings: TagSettings = session.settings("tag")?;
+    let stage = Stage::new("mesh", VERSION, &case.folder, &(&settings, &tag_settings)).after(after).frame(Mni::NAME);
+    case.run(&stage, "mesh", || {
+        let (mut whole, record) = mesh_labels(labels, &settings, &programs).reject()?;
+        let tags = tag_boundary_sets(&mut whole, &tag_settings).reject()?;
+        let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
+        let (rest, _) = whole.restricted(tissue).context("the mesh holds no grey or white matter").reject()?;
+        let mut produced = Produced::default();
+        produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
+        produced.files.push(("mesh/rest.msh".to_owned(), msh::encode(&rest)?));
+        for (set, facets) in &rest.facet_sets {
+            let (surface, _) = TriMesh::from_facets(rest.nodes_mm(), facets);
+            let file = format!("mesh/rest_{set}.surf.gii");
+            produced.files.push((file, gifti::encode_surface(&surface, Space::Mni152, set)));
+        }
+        let large = record.islands.iter().filter(|island| island.volume_mm3 > LARGE_ISLAND_MM3);
+        produced.warnings.extend(large.map(|island| {
+            let name = label::name(island.label).unwrap_or("unknown");
+            format!("a part of {name} of {:.2} cc lay apart and was left out of the mesh", island.volume_mm3 / 1000.0)
+        }));
+        produced.warnings.extend(tags.warnings.iter().cloned());
+        let sets = tags.sets.iter().map(|set| SetOutcome {
+            name: set.name.clone(),
+            nodes: set.nodes,
+            area_mm2: Some(set.area_mm2),
+            centroid_mm: Some(set.centroid_mm),
+        });
+        let facts_of_mesh = MeshFacts {
+            mesh: outcome(&rest, settings.engine),
+            sets: sets.collect(),
+            implausible: tags.warnings.clone(),
+        };
+        produced.facts = facts(&facts_of_mesh)?;
+        Ok(produced)
+    })
+}
+
+/// The settings of room `mesh` with the command line over them.
+///
+/// # Errors
+/// A settings table that does not fit.
+pub fn mesh_settings(
+    options: &MeshOptions,
+    programs: &EnginePrograms,
+    session: &Session,
+) -> Result<MeshSettings, Failure> {
+    let named = session.has_settings("mesh", "engine");
+    let mut settings: MeshSettings = session.settings("mesh")?;
+    if let Some(engine) = options.mesher {
+        settings.engine = engine;
+    } else if !named {
+        settings.engine = programs.preferred();
+    }
+    if let Some(cells) = options.cells {
+        settings.size = MeshSize::Cells(cells);
+    }
+    if let Some(edge_mm) = options.edge_mm {
+        settings.size = MeshSize::EdgeMm(edge_mm);
+    }
+    settings.without = vec![label::CSF];
+    Ok(settings)
+}
+
+fn outcome(mesh: &TetMesh, engine: Engine) -> MeshOutcome {
+    let mut volume_cc = BTreeMap::new();
+    for (t, &l) in mesh.labels().iter().enumerate() {
+        *volume_cc.entry(label::name(l).unwrap_or("unknown").to_owned()).or_insert(0.0) += mesh.volume_mm3(t) / 1000.0;
+    }
+    MeshOutcome {
+        engine: engine.name().to_owned(),
+        nodes: mesh.nodes_mm().len(),
+        tets: mesh.tets().len(),
+        volume_cc,
+        ..MeshOutcome::default()
+    }
+}

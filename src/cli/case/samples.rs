@@ -1,0 +1,97 @@
+//! Stage `sample-NN`: one simulation each, so that a sweep can stop anywhere, resume, and be split over machines.
+
+use super::{Case, Failure, REST_MESH, Reject, facts};
+use crate::artefact::{Manifest, Produced, Stage};
+use crate::cli::Session;
+use crate::experiment::outcome::SampleOutcome;
+use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::sweep::{Reference, SolvedSample, solve_sample};
+use crate::fem::Scenario;
+use crate::geometry::{Frame, Mni};
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, vtu};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+
+/// What every sample of a sweep shares.
+#[derive(Debug)]
+pub struct Sweep<'a> {
+    /// The rest mesh.
+    pub mesh: &'a TetMesh,
+    /// Loads, supports and solver; the materials are the sample's.
+    pub template: &'a Scenario,
+    /// The tissues whose material is varied.
+    pub tissues: &'a [Tissue],
+    /// What the samples are compared with.
+    pub reference: &'a Reference,
+    /// The manifest of the stage that made mesh and reference.
+    pub after: &'a Manifest,
+}
+
+/// Runs (or skips) every sample; the records come back in order.
+///
+/// # Errors
+/// A scenario or mesh that the solver refuses; a sample without equilibrium is only recorded.
+pub fn samples(
+    case: &Case,
+    sweep: &Sweep<'_>,
+    list: &[Sample],
+    session: &Session,
+) -> Result<Vec<(SampleOutcome, Manifest)>, Failure> {
+    let bar = session.progress(list.len() as u64, "simulation");
+    let mut records = Vec::with_capacity(list.len());
+    for sample in list {
+        let stage =
+            Stage::new(&format!("sim-{}", sample.id), VERSION, &case.folder, &(sweep.template, sweep.tissues, sample))
+                .after(sweep.after)
+                .frame(Mni::NAME);
+        let (manifest, record) = case.run(&stage, &sample.id, || {
+            let show = |p: &crate::fem::Progress| {
+                bar.set_message(format!("{} residual {:.1e}", sample.id, p.relative_residual));
+            };
+            let solved =
+                solve_sample(sweep.mesh, sweep.template, sweep.tissues, sample, sweep.reference, &show).reject()?;
+            produced(sweep.mesh, solved)
+        })?;
+        records.push((record, manifest));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(records)
+}
+
+fn produced(mesh: &TetMesh, solved: SolvedSample) -> Result<Produced, Failure> {
+    let mut produced = Produced::default();
+    let mut record = solved.record;
+    match solved.state {
+        None => produced.warnings.push(format!("{}: no equilibrium was found; the sample is left out", record.id)),
+        Some((outcome, errors)) => {
+            let file = format!("sim/{}.vtu", record.id);
+            let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
+            let points = [
+                Field::vector("displacement", &outcome.displacement_mm),
+                Field::vector("reaction_n", &outcome.reaction_n),
+                Field::scalar("rmse_mm", errors.node_error_mm),
+                Field::scalar("rmse_observed", observed),
+            ];
+            let cells = [
+                Field::scalar("jacobian", outcome.jacobian),
+                Field::scalar("strain_energy_density_pa", outcome.strain_energy_density_pa),
+            ];
+            produced.files.push((file.clone(), vtu::encode(mesh, &points, &cells)?));
+            produced.warnings.extend(outcome.warnings);
+            record.file = Some(file);
+        }
+    }
+    produced.facts = facts(&record)?;
+    Ok(produced)
+}
+
+/// The rest mesh of a case.
+///
+/// # Errors
+/// Rejected when it is missing or damaged.
+pub fn rest_mesh(case: &Case) -> Result<TetMesh, Failure> {
+    Ok(vtu::decode(&case.read(REST_MESH)?, REST_MESH).reject()?.mesh)
+}

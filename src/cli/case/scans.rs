@@ -1,0 +1,122 @@
+//! The files a user gives: two scans and masks of their own.
+
+use super::{Failure, Reject, shown};
+use crate::cli::Session;
+use crate::cli::session::read_input;
+use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
+use crate::image::nifti::{self, ReadOptions};
+use crate::image::{Grid, Mask, Volume};
+use crate::segment::native::mask_on;
+use anyhow::anyhow;
+use std::path::{Path, PathBuf};
+
+/// Masks that win over the computed ones. Each may be in the grid of either scan.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Overrides {
+    /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    pub brain_mask: Option<PathBuf>,
+    /// A mask of the cavity, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    pub cavity_mask: Option<PathBuf>,
+    /// A mask of the resected tissue, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    pub resected_mask: Option<PathBuf>,
+}
+
+/// The two scans as bytes and as volumes.
+#[derive(Debug)]
+pub struct Scans {
+    /// The pre-operative file's bytes.
+    pub pre_bytes: Vec<u8>,
+    /// The post-operative file's bytes.
+    pub post_bytes: Vec<u8>,
+    /// The pre-operative scan.
+    pub pre: Volume<f32, Pre>,
+    /// The post-operative scan.
+    pub post: Volume<f32, Post>,
+    /// What the reader noticed.
+    pub warnings: Vec<String>,
+}
+
+impl Scans {
+    /// Reads both scans.
+    ///
+    /// # Errors
+    /// Rejected with file, field and remedy; also when both files are the same.
+    pub fn read(pre: &Path, post: &Path, session: &Session) -> Result<Self, Failure> {
+        let options: ReadOptions = session.settings("image")?;
+        let (pre_bytes, post_bytes) = (read_input(pre)?, read_input(post)?);
+        if pre_bytes == post_bytes {
+            return Err(Failure::Rejected(anyhow!(
+                "{} and {}: the two files are the same; give the pre-operative scan first, the post-operative second",
+                shown(pre),
+                shown(post)
+            )));
+        }
+        let before = nifti::decode(&pre_bytes, &shown(pre), &options).reject()?;
+        let after = nifti::decode(&post_bytes, &shown(post), &options).reject()?;
+        if before.volume == after.volume {
+            return Err(Failure::Rejected(anyhow!(
+                "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery",
+                shown(pre),
+                shown(post)
+            )));
+        }
+        let mut warnings: Vec<String> = before.warnings.iter().map(|w| format!("pre: {w}")).collect();
+        warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
+        let (pre, post) = (before.volume.relabelled(), after.volume.relabelled());
+        Ok(Self { pre_bytes, post_bytes, pre, post, warnings })
+    }
+}
+
+/// A mask of the user's and its bytes, in the frame of the scan whose grid it has.
+#[derive(Debug)]
+pub enum GivenMask {
+    /// On the pre-operative grid.
+    Pre(Mask<Pre>),
+    /// On the post-operative grid.
+    Post(Mask<Post>),
+}
+
+/// Reads a mask and finds whose grid it is on.
+///
+/// # Errors
+/// Rejected when it is on neither grid, empty, or not a mask.
+pub fn given_mask(path: &Path, scans: &Scans, session: &Session) -> Result<(GivenMask, Vec<u8>), Failure> {
+    // Half a voxel is what two programs may disagree about an origin; more is another grid.
+    const TOLERANCE_MM: f64 = 0.1;
+    let options: ReadOptions = session.settings("image")?;
+    let bytes = read_input(path)?;
+    let (mask, _): (Mask<Native>, _) = nifti::decode_mask(&bytes, &shown(path), &options).reject()?;
+    let pre: Grid<Native> = scans.pre.grid.relabelled();
+    let post: Grid<Native> = scans.post.grid.relabelled();
+    if mask.grid.coincides(&pre, TOLERANCE_MM) {
+        Ok((GivenMask::Pre(mask.relabelled()), bytes))
+    } else if mask.grid.coincides(&post, TOLERANCE_MM) {
+        Ok((GivenMask::Post(mask.relabelled()), bytes))
+    } else {
+        Err(Failure::Rejected(anyhow!(
+            "{}: dim {:?} and its affine are those of neither scan (pre {:?}, post {:?}); resample the mask to one of them",
+            shown(path),
+            mask.grid.dims,
+            pre.dims,
+            post.dims
+        )))
+    }
+}
+
+impl GivenMask {
+    /// The mask on the MNI grid.
+    pub fn on_mni(
+        &self,
+        grid: &Grid<Mni>,
+        mni_from_pre: &RigidTransform<Pre, Mni>,
+        mni_from_post: &RigidTransform<Post, Mni>,
+    ) -> Mask<Mni> {
+        match self {
+            Self::Pre(mask) => mask_on(mask, grid, &mni_from_pre.inverse()),
+            Self::Post(mask) => mask_on(mask, grid, &mni_from_post.inverse()),
+        }
+    }
+}

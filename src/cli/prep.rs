@@ -1,0 +1,88 @@
+//! `hgm prep`: a T1 pair to registered images, masks and a tagged mesh.
+
+use super::case::{self, AnatFacts, Anatomy, Case, MeshFacts, MeshOptions, Overrides, RegistrationFacts, Scans};
+use super::{Failure, Session};
+use crate::artefact::Manifest;
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use anyhow::anyhow;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// T1 pair -> registered images, masks, tagged mesh and a page to check them
+///
+/// Example: hgm prep pre.nii.gz post.nii.gz -o case
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Pre-operative T1 (.nii or .nii.gz)
+    pub pre: PathBuf,
+    /// Post-operative T1 (.nii or .nii.gz)
+    pub post: PathBuf,
+    /// The case folder
+    #[arg(short, long, value_name = "CASE", default_value = "case")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    #[command(flatten)]
+    pub mesh: MeshOptions,
+}
+
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let case = Case::open(&args.output, session);
+    let prepared = prepare(&case, args, session)?;
+    let outcome = prepared.outcome();
+    let page = case.finish(&outcome, &BTreeMap::new(), &prepared.manifests)?;
+    session.emit(&outcome, &page)?;
+    prepared.quality_gate()
+}
+
+/// What `prep` leaves for the experiments.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The stages' manifests, in order.
+    pub manifests: Vec<Manifest>,
+    /// Registration figures.
+    pub registration: RegistrationFacts,
+    /// Mask figures.
+    pub anat: AnatFacts,
+    /// Mesh figures.
+    pub mesh: MeshFacts,
+}
+
+/// Runs (or skips) the stages up to the tagged mesh.
+///
+/// # Errors
+/// The first stage that is rejected or fails.
+pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, Failure> {
+    let scans = Scans::read(&args.pre, &args.post, session)?;
+    let (registered, registration) = case::registration(case, &scans, session)?;
+    let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
+    let labels = Anatomy::read(case)?.labels;
+    let (meshed, mesh) = case::mesh(case, &labels, &args.mesh, &segmented, session)?;
+    Ok(Prepared { manifests: vec![registered, segmented, meshed], registration, anat, mesh })
+}
+
+impl Prepared {
+    /// The part of an outcome that is known before any simulation.
+    pub fn outcome(&self) -> ExperimentOutcome {
+        ExperimentOutcome {
+            kind: ExperimentKind::Resection,
+            volumes: Some(self.anat.volumes),
+            sets: self.mesh.sets.clone(),
+            registrations: self.registration.fits.clone(),
+            mesh: Some(self.mesh.mesh.clone()),
+            warnings: self.manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
+            ..ExperimentOutcome::default()
+        }
+    }
+
+    /// Exit code 4 when a boundary set is not to be believed.
+    ///
+    /// # Errors
+    /// [`Failure::QualityGate`] with the sets' warnings.
+    pub fn quality_gate(&self) -> Result<(), Failure> {
+        if self.mesh.implausible.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::QualityGate(anyhow!("{} (outputs kept)", self.mesh.implausible.join("; "))))
+    }
+}

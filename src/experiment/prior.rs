@@ -1,0 +1,124 @@
+//! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
+
+use super::estimate::LogPrior;
+use super::sample::{Sample, Tissue, TissueSample, every_combination};
+use crate::material::Task;
+use crate::material::generative::{SampleSettings, SampledMaterial, sample_shear_moduli};
+use crate::material::law::Material;
+use crate::material::meta_model::FitError;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Which prior.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PriorSettings {
+    /// The published program's choices instead of the exact ones.
+    pub published: bool,
+}
+
+/// Why there are no samples.
+#[derive(Debug, Error)]
+pub enum PriorError {
+    /// The tissue has no task of its own.
+    #[error("there is no prior for the tissue `{0}`; use brain, grey_matter or white_matter")]
+    UnknownTissue(String),
+    /// The meta-model could not be fitted.
+    #[error("the prior of `{tissue}` gives no material: {source}")]
+    Fit {
+        /// The tissue.
+        tissue: String,
+        /// Why.
+        source: FitError,
+    },
+    /// No level.
+    #[error("sd_levels is empty: give at least one level, -2 to 2 in the paper")]
+    NoLevels,
+}
+
+/// The hyperelastic task of a tissue: healthy brain, grey or white matter.
+///
+/// # Errors
+/// [`PriorError::UnknownTissue`].
+pub fn task_of(tissue: &Tissue) -> Result<Task, PriorError> {
+    match tissue.name.as_str() {
+        "brain" => Ok(Task::HYPERELASTIC_HEALTHY),
+        "grey_matter" => Ok(Task::HYPERELASTIC_GREY),
+        "white_matter" => Ok(Task::HYPERELASTIC_WHITE),
+        other => Err(PriorError::UnknownTissue(other.to_owned())),
+    }
+}
+
+fn materials(tissue: &Tissue, levels: &[f64], prior: &PriorSettings) -> Result<Vec<SampledMaterial>, PriorError> {
+    let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
+    sample_shear_moduli(task_of(tissue)?, levels, &settings)
+        .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
+}
+
+/// Every combination of the tissues' levels as neo-Hookean materials of the given Poisson's ratio.
+///
+/// # Errors
+/// [`PriorError`].
+pub fn samples_of_prior(
+    tissues: &[Tissue],
+    sd_levels: &[f64],
+    poisson_ratio: f64,
+    prior: &PriorSettings,
+) -> Result<Vec<Sample>, PriorError> {
+    if sd_levels.is_empty() {
+        return Err(PriorError::NoLevels);
+    }
+    let mut levels = Vec::new();
+    for tissue in tissues {
+        let list = materials(tissue, sd_levels, prior)?;
+        let sample = |m: &SampledMaterial| TissueSample {
+            sd_level: m.sd_level,
+            shear_modulus_pa: m.shear_modulus_pa,
+            material: Material::neo_hookean(m.shear_modulus_pa, poisson_ratio),
+        };
+        levels.push((tissue.clone(), list.iter().map(sample).collect()));
+    }
+    Ok(every_combination(&levels))
+}
+
+/// The prior of ln(shear modulus): the samples at -1, 0 and 1 standard deviations span its mean and spread (the
+/// meta-model's modulus is close to log-linear in the level).
+///
+/// # Errors
+/// [`PriorError`].
+pub fn log_prior(tissue: &Tissue, prior: &PriorSettings) -> Result<LogPrior, PriorError> {
+    let three = materials(tissue, &[-1.0, 0.0, 1.0], prior)?;
+    let log = |n: usize| three[n].shear_modulus_pa.ln();
+    Ok(LogPrior {
+        name: format!("shear_modulus_pa of {}", tissue.name),
+        mean: log(1),
+        sd: Some(0.5 * (log(2) - log(0))),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nine_levels_of_two_tissues_are_the_papers_81_samples() {
+        let levels = crate::material::generative::nine_levels();
+        let samples =
+            samples_of_prior(&Tissue::grey_and_white(), &levels, 0.45, &PriorSettings { published: true }).unwrap();
+        assert_eq!(samples.len(), 81);
+        // Granados et al. 2021, Table 1: grey at +2 SD 2299 Pa, white at 0 SD 610 Pa.
+        let last = &samples[80].tissues["grey_matter"];
+        assert!((last.shear_modulus_pa - 2299.0).abs() < 1.0);
+        assert!((samples[4].tissues["white_matter"].shear_modulus_pa - 610.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn the_log_prior_lies_between_its_samples_and_an_unknown_tissue_is_refused() {
+        let prior = log_prior(&Tissue::whole_brain()[0], &PriorSettings::default()).unwrap();
+        assert!(prior.sd.unwrap() > 0.1 && prior.mean.exp() > 100.0);
+        let tumour = Tissue { name: "tumour".to_owned(), labels: vec![9] };
+        assert!(matches!(log_prior(&tumour, &PriorSettings::default()), Err(PriorError::UnknownTissue(_))));
+        let none = samples_of_prior(&Tissue::whole_brain(), &[], 0.45, &PriorSettings::default());
+        assert!(matches!(none, Err(PriorError::NoLevels)));
+    }
+}

@@ -1,0 +1,103 @@
+//! The patient: the brain without the resected tissue under gravity, against what the post-operative scan shows.
+
+use super::outcome::NoiseFloor;
+use super::sample::Tissue;
+use crate::fem::{Loads, Scenario, SolverSettings};
+use serde::{Deserialize, Serialize};
+
+/// Loads, supports and samples of a patient's sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ResectionSettings {
+    /// 1: the whole brain one material; 2: grey and white matter apart (81 samples).
+    pub tissues: usize,
+    /// Gravity in the MNI frame. Along -z by default (head upright, as in the paper's scenario); a patient who lies
+    /// supine in the scanner has it along -y.
+    pub gravity_m_per_s2: [f64; 3],
+    /// Density of the tissue; below the full 1000 where cerebrospinal fluid still carries part of the weight.
+    pub density_kg_per_m3: f64,
+    /// Poisson's ratio of every tissue.
+    pub poisson_ratio: f64,
+    /// Levels of the prior that are tried, in standard deviations.
+    pub sd_levels: Vec<f64>,
+    /// Node sets held still.
+    pub fixed: Vec<String>,
+    /// Expected error of the rigid registration over the brain, mm: part of the noise floor.
+    pub registration_error_mm: f64,
+    /// Solver.
+    pub solver: SolverSettings,
+}
+
+impl Default for ResectionSettings {
+    fn default() -> Self {
+        Self {
+            tissues: 1,
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+            density_kg_per_m3: 1000.0,
+            poisson_ratio: 0.45,
+            sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
+            fixed: vec!["base".to_owned(), "falx".to_owned()],
+            registration_error_mm: 0.2,
+            solver: SolverSettings::default(),
+        }
+    }
+}
+
+impl ResectionSettings {
+    /// The tissues varied.
+    pub fn tissue_list(&self) -> Vec<Tissue> {
+        if self.tissues == 1 { Tissue::whole_brain() } else { Tissue::grey_and_white() }
+    }
+
+    /// The scenario without its materials.
+    pub fn scenario(&self) -> Scenario {
+        Scenario {
+            fixed: self.fixed.clone(),
+            loads: Loads {
+                gravity_m_per_s2: self.gravity_m_per_s2,
+                density_kg_per_m3: self.density_kg_per_m3,
+                ..Loads::default()
+            },
+            solver: self.solver.clone(),
+            ..Scenario::default()
+        }
+    }
+
+    /// What the measurement itself is worth: the registration's expected error, the position of a boundary within the
+    /// coarsest voxel (uniform over its width: width / sqrt 12) and a segmented surface, which two raters place about
+    /// half a voxel apart.
+    pub fn noise_floor(&self, coarsest_voxel_mm: f64) -> NoiseFloor {
+        NoiseFloor {
+            registration_mm: Some(self.registration_error_mm),
+            voxel_mm: Some(coarsest_voxel_mm / 12f64.sqrt()),
+            segmentation_mm: Some(0.5 * coarsest_voxel_mm),
+        }
+    }
+}
+
+/// Whether `deformed` is better than `rest` by more than the measurement is worth.
+pub fn improvement(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> &'static str {
+    let floor_mm = floor.combined_mm().unwrap_or(0.0);
+    if rest_mm - deformed_mm > floor_mm {
+        "better than rest"
+    } else if deformed_mm - rest_mm > floor_mm {
+        "worse than rest"
+    } else {
+        "not distinguishable from rest"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_below_the_noise_floor_is_not_distinguishable() {
+        let floor = ResectionSettings::default().noise_floor(1.0);
+        let combined = floor.combined_mm().unwrap();
+        assert!((combined - (0.04f64 + 1.0 / 12.0 + 0.25).sqrt()).abs() < 1e-12);
+        assert_eq!(improvement(3.0, 2.9, &floor), "not distinguishable from rest");
+        assert_eq!(improvement(3.0, 2.0, &floor), "better than rest");
+        assert_eq!(improvement(2.0, 3.0, &floor), "worse than rest");
+    }
+}

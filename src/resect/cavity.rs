@@ -1,0 +1,293 @@
+//! The cavity that surgery left, and the tissue that filled it.
+
+use super::intensity::on_the_scale_of;
+use crate::geometry::Mni;
+use crate::image::components::{Connectivity, components, fill_holes};
+use crate::image::distance::distance_mm;
+use crate::image::gaussian::gaussian;
+use crate::image::morphology::{close, dilate, erode, open};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::segment::label;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Both scans on one grid, reached rigidly.
+#[derive(Clone, Copy, Debug)]
+pub struct CavityPair<'a> {
+    /// Pre-operative intensities.
+    pub pre: &'a Volume<f32, Mni>,
+    /// Pre-operative labels (`segment::label`).
+    pub pre_labels: &'a LabelMap<Mni>,
+    /// Pre-operative brain.
+    pub pre_brain: &'a Mask<Mni>,
+    /// Post-operative intensities.
+    pub post: &'a Volume<f32, Mni>,
+    /// Where the post-operative scan looked: elsewhere is unknown, never cavity.
+    pub post_known: &'a Mask<Mni>,
+    /// Intensity between CSF and grey matter on the pre-operative scale.
+    pub csf_grey_border: f64,
+}
+
+/// How the cavity is found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CavitySettings {
+    /// Smoothness of the ratio between the scans' intensities, mm.
+    pub bias_sigma_mm: f64,
+    /// The rim of the brain where a small error of mask or registration looks like a loss, mm.
+    pub rim_mm: f64,
+    /// Sulci that have opened are thinner than twice this, mm.
+    pub opening_mm: f64,
+    /// How far the boundary may grow from the seed through dark voxels, mm.
+    pub growth_mm: f64,
+    /// Gaps (blood, vessels) narrower than twice this are closed, mm.
+    pub closing_mm: f64,
+    /// Smallest volume that counts as a cavity, cc.
+    pub smallest_cc: f64,
+}
+
+impl Default for CavitySettings {
+    fn default() -> Self {
+        Self { bias_sigma_mm: 25.0, rim_mm: 2.0, opening_mm: 2.0, growth_mm: 8.0, closing_mm: 3.0, smallest_cc: 1.0 }
+    }
+}
+
+/// Hemisphere of the cavity's centre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// The patient's left.
+    Left,
+    /// The patient's right.
+    Right,
+}
+
+/// What was found, on the common grid.
+#[derive(Clone, Debug)]
+pub struct CavityFinding {
+    /// The cavity as the post-operative scan shows it.
+    pub cavity: Mask<Mni>,
+    /// The tissue that filled it, on the pre-operative scan.
+    pub resected: Mask<Mni>,
+    /// Hemisphere.
+    pub side: Side,
+}
+
+/// There is no cavity to speak of.
+#[derive(Debug, Error, PartialEq)]
+pub enum ResectError {
+    /// Post looks like pre.
+    #[error(
+        "no cavity of at least {smallest_cc} cc was found on the post-operative scan (largest loss of tissue: \
+         {largest_cc:.2} cc); check that the files are not swapped or the same, or give --cavity-mask"
+    )]
+    NoCavity {
+        /// The largest candidate.
+        largest_cc: f64,
+        /// What would have counted.
+        smallest_cc: f64,
+    },
+    /// A given cavity lies elsewhere.
+    #[error("the cavity lies outside the brain: only {percent:.0} % of it was tissue before; check the masks' grids")]
+    OutsideBrain {
+        /// Share of the cavity that was tissue on the pre-operative scan.
+        percent: f64,
+    },
+}
+
+/// Finds the cavity: dark on post and tissue on pre, away from the brain's rim, opened; of the parts the one largest
+/// by volume x depth x loss; grown through dark voxels, closed, smoothed, without the ventricles.
+///
+/// # Errors
+/// [`ResectError::NoCavity`] when no part is large enough.
+pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<CavityFinding, ResectError> {
+    let grid = pair.pre.grid;
+    let tissue = pair.pre_labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER);
+    let known_tissue = both(&tissue, pair.post_known);
+    let post = on_the_scale_of(pair.pre, pair.post, &known_tissue, settings.bias_sigma_mm);
+    let border = pair.csf_grey_border as f32;
+    let dark = Mask::from_data(
+        grid,
+        post.data.iter().zip(&pair.post_known.data).map(|(value, known)| *known && *value < border).collect(),
+    );
+    let inner = erode(pair.pre_brain, settings.rim_mm);
+    let lost = open(&both(&both(&dark, &tissue), &inner), settings.opening_mm);
+    let depth_mm = distance_mm(&pair.pre_brain.map(|inside| !inside));
+    let loss = |n: usize| f64::from((pair.pre.data[n] - post.data[n]).max(0.0)) * f64::from(depth_mm.data[n]);
+    let parts = components(&lost, Connectivity::Faces);
+    let score = |part: u32| (0..grid.len()).filter(|&n| parts.labels.data[n] == part).map(loss).sum::<f64>();
+    let best = (1..=parts.voxels.len() as u32).map(|part| (score(part), part)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let best = best.map_or(0, |(_, part)| part);
+    let seed = parts.labels.map(|part| best > 0 && part == best);
+    if seed.volume_cc() < settings.smallest_cc {
+        return Err(ResectError::NoCavity { largest_cc: seed.volume_cc(), smallest_cc: settings.smallest_cc });
+    }
+
+    let ventricle = pair.pre_labels.map(|l| l == label::VENTRICLE);
+    let growable = without(&both(&dark, pair.pre_brain), &ventricle);
+    let grown = grow(&seed, &growable, settings.growth_mm);
+    let closed = fill_holes(&close(&grown, settings.closing_mm));
+    let smooth = gaussian(&closed.map(|inside| f32::from(u8::from(inside))), 1.0).map(|share| share > 0.5);
+    let cavity = without(&both(&smooth, pair.pre_brain), &ventricle);
+    let resected = without(&cavity, &ventricle);
+    let side = side_of(&cavity);
+    Ok(CavityFinding { cavity, resected, side })
+}
+
+/// The finding of a mask (or two) given by hand; what is missing is the other one within the brain.
+///
+/// # Errors
+/// [`ResectError::OutsideBrain`] when less than half of the cavity was brain before.
+pub fn subtract(
+    cavity: Option<Mask<Mni>>,
+    resected: Option<Mask<Mni>>,
+    pre_brain: &Mask<Mni>,
+    pre_labels: &LabelMap<Mni>,
+) -> Result<Option<CavityFinding>, ResectError> {
+    let ventricle = pre_labels.map(|l| l == label::VENTRICLE);
+    let (cavity, resected) = match (cavity, resected) {
+        (None, None) => return Ok(None),
+        (Some(cavity), Some(resected)) => (cavity, resected),
+        (Some(cavity), None) => {
+            let resected = without(&both(&cavity, pre_brain), &ventricle);
+            (cavity, resected)
+        }
+        (None, Some(resected)) => (resected.clone(), resected),
+    };
+    let percent = 100.0 * both(&resected, pre_brain).count() as f64 / cavity.count().max(1) as f64;
+    if percent < 50.0 {
+        return Err(ResectError::OutsideBrain { percent });
+    }
+    let side = side_of(&cavity);
+    Ok(Some(CavityFinding { cavity, resected, side }))
+}
+
+/// Layers of one voxel (6-neighbours) from the seed through `allowed`, as many as fit into `limit_mm`.
+fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask<Mni> {
+    let [nx, ny, nz] = seed.grid.dims;
+    let [sx, sy, sz] = seed.grid.spacing_mm();
+    let mut grown = seed.clone();
+    let mut front: Vec<usize> = (0..seed.data.len()).filter(|&n| seed.data[n]).collect();
+    for _ in 0..(limit_mm / sx.min(sy).min(sz)).round() as usize {
+        let mut next = Vec::new();
+        for n in front {
+            let [i, j, k] = seed.grid.voxel(n);
+            let around = [
+                (i > 0).then(|| n - 1),
+                (i + 1 < nx).then(|| n + 1),
+                (j > 0).then(|| n - nx),
+                (j + 1 < ny).then(|| n + nx),
+                (k > 0).then(|| n - nx * ny),
+                (k + 1 < nz).then(|| n + nx * ny),
+            ];
+            for m in around.into_iter().flatten() {
+                if allowed.data[m] && !grown.data[m] {
+                    grown.data[m] = true;
+                    next.push(m);
+                }
+            }
+        }
+        front = next;
+    }
+    // What only hangs on by a thread is a sulcus that opened into the cavity.
+    let opened = open(&grown, 1.5);
+    Mask::from_data(seed.grid, opened.data.iter().zip(&seed.data).map(|(a, b)| *a || *b).collect())
+}
+
+fn side_of(mask: &Mask<Mni>) -> Side {
+    let x_mm = |n: usize| mask.grid.position(mask.grid.voxel(n).map(|c| c as f64).into()).mm.x;
+    let sum: f64 = (0..mask.data.len()).filter(|&n| mask.data[n]).map(x_mm).sum();
+    if sum < 0.0 { Side::Left } else { Side::Right }
+}
+
+fn both(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
+    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && *b).collect())
+}
+
+fn without(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
+    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && !*b).collect())
+}
+
+/// A mask without what touches another within `margin_mm`: the post-operative ventricle next to the cavity.
+pub fn apart_from(mask: &Mask<Mni>, other: &Mask<Mni>, margin_mm: f64) -> Mask<Mni> {
+    without(mask, &dilate(other, margin_mm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    /// A ball of white matter of radius 40 mm with a ventricle, and a second scan with other gain and a hole.
+    struct Head {
+        pre: Volume<f32, Mni>,
+        labels: LabelMap<Mni>,
+        brain: Mask<Mni>,
+        post: Volume<f32, Mni>,
+        hole: Mask<Mni>,
+    }
+
+    fn head(hole_radius_mm: f64) -> Head {
+        let grid = Grid::axis_aligned([60, 60, 60], [1.5; 3], [-44.25; 3]);
+        let at = |n: usize| grid.position(grid.voxel(n).map(|c| c as f64).into()).mm;
+        let far = |n: usize, c: [f64; 3]| (at(n) - nalgebra::Point3::from(c)).norm();
+        let mask = |f: &dyn Fn(usize) -> bool| Mask::from_data(grid, (0..grid.len()).map(f).collect());
+        let brain = mask(&|n| far(n, [0.0; 3]) < 40.0);
+        let ventricle = mask(&|n| far(n, [0.0; 3]) < 8.0);
+        let hole = mask(&|n| far(n, [-22.0, 5.0, 0.0]) < hole_radius_mm);
+        let label_of = |n: usize| if ventricle.data[n] { 4 } else { 3 * u8::from(brain.data[n]) };
+        let labels = LabelMap::from_data(grid, (0..grid.len()).map(label_of).collect());
+        let value = |n: usize| if labels.data[n] == 3 { 100.0f32 } else { 25.0 };
+        let pre = Volume::from_data(grid, (0..grid.len()).map(value).collect());
+        let dark = |n: usize| if hole.data[n] { 25.0 } else { value(n) };
+        let post = Volume::from_data(grid, (0..grid.len()).map(|n| 2.5 * dark(n)).collect());
+        Head { pre, labels, brain, post, hole }
+    }
+
+    fn pair<'a>(h: &'a Head, known: &'a Mask<Mni>) -> CavityPair<'a> {
+        CavityPair {
+            pre: &h.pre,
+            pre_labels: &h.labels,
+            pre_brain: &h.brain,
+            post: &h.post,
+            post_known: known,
+            csf_grey_border: 60.0,
+        }
+    }
+
+    #[test]
+    fn the_hole_is_found_whole_on_its_side() {
+        let h = head(12.0);
+        let known = h.brain.map(|_| true);
+        let found = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap();
+        assert!(found.cavity.dice(&h.hole) > 0.95, "{}", found.cavity.dice(&h.hole));
+        assert_eq!(found.side, Side::Left);
+    }
+
+    #[test]
+    fn without_a_hole_nothing_is_found_and_the_message_says_what_to_do() {
+        let h = head(0.0);
+        let known = h.brain.map(|_| true);
+        let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
+        assert!(error.to_string().contains("--cavity-mask"));
+    }
+
+    #[test]
+    fn what_the_second_scan_does_not_show_is_no_cavity() {
+        let h = head(12.0);
+        let known = h.hole.map(|inside| !inside);
+        let unseen = Head { post: h.post.map(|_| 0.0), ..head(12.0) };
+        assert!(find_cavity(&pair(&unseen, &h.hole.map(|_| false)), &CavitySettings::default()).is_err());
+        assert!(find_cavity(&pair(&h, &known), &CavitySettings::default()).is_err());
+    }
+
+    #[test]
+    fn a_mask_by_hand_must_lie_in_the_brain() {
+        let h = head(12.0);
+        let outside = h.brain.map(|inside| !inside);
+        assert!(matches!(subtract(Some(outside), None, &h.brain, &h.labels), Err(ResectError::OutsideBrain { .. })));
+        let given = subtract(Some(h.hole.clone()), None, &h.brain, &h.labels).unwrap().unwrap();
+        assert!(given.resected.dice(&h.hole) > 0.99);
+        assert_eq!(subtract(None, None, &h.brain, &h.labels).unwrap().map(|f| f.side), None);
+    }
+}

@@ -1,0 +1,70 @@
+//! Brain mask: what has the intensity of tissue, hangs together, and lies where the template expects the brain.
+
+use super::mixture::Mixture;
+use super::priors::AtlasPriors;
+use crate::geometry::Mni;
+use crate::image::components::{Connectivity, fill_holes, largest_component};
+use crate::image::gaussian::gaussian;
+use crate::image::morphology::{close, dilate, erode};
+use crate::image::{Mask, Volume};
+
+/// How the brain is told from its surroundings.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BrainSettings {
+    /// How far the patient's pia may lie outside the template's, in mm.
+    pub reach_mm: f64,
+    /// Bridges to dura, nerves and vessels thinner than twice this are cut.
+    pub opening_mm: f64,
+    /// Sulci narrower than twice this are part of the brain.
+    pub closing_mm: f64,
+    /// Deeper than this inside the template's brain, bridges are not looked for, and everything belongs to the brain at
+    /// twice the depth.
+    pub trusted_depth_mm: f64,
+}
+
+impl Default for BrainSettings {
+    fn default() -> Self {
+        Self { reach_mm: 7.0, opening_mm: 2.0, closing_mm: 5.0, trusted_depth_mm: 5.0 }
+    }
+}
+
+/// The mask of the brain (tissue, ventricles and sulci) on the working grid; may be empty.
+///
+/// `t1` has its bias taken out. Tissue lies between the border of CSF and grey matter and three deviations above white
+/// matter (fat and enhanced vessels are brighter).
+pub(super) fn brain_mask(
+    t1: &Volume<f32, Mni>,
+    known: &Mask<Mni>,
+    model: &Mixture,
+    priors: &AtlasPriors,
+    settings: &BrainSettings,
+) -> Mask<Mni> {
+    let (low, high) = (model.csf_grey_border() as f32, (model.means[2] + 3.0 * model.deviations[2]) as f32);
+    let reach = settings.reach_mm as f32;
+    let depth = settings.trusted_depth_mm as f32;
+    let tissue = at_each(t1, |n| known.data[n] && priors.brain_mm.data[n] < reach && (low..high).contains(&t1.data[n]));
+    let core = largest_component(&erode(&tissue, settings.opening_mm), Connectivity::Faces);
+    if core.count() == 0 {
+        return core;
+    }
+    let seeds = at_each(t1, |n| core.data[n] || (tissue.data[n] && priors.brain_mm.data[n] < -depth));
+    let seeds = largest_component(&seeds, Connectivity::Corners);
+    // The opening took a shell of its own radius; gyral crowns and thin folds need a little more to come back.
+    let grown = dilate(&seeds, settings.opening_mm + 1.5);
+    let tissue = at_each(t1, |n| grown.data[n] && tissue.data[n]);
+    let closed = close(&tissue, settings.closing_mm);
+    let solid = at_each(t1, |n| {
+        known.data[n] && priors.brain_mm.data[n] < reach && (closed.data[n] || priors.brain_mm.data[n] < -2.0 * depth)
+    });
+    let filled = fill_holes(&solid);
+    // Stairs and single voxels at the surface carry no information.
+    let smooth = gaussian(&filled.map(|inside| f32::from(u8::from(inside))), 0.8);
+    let mask = at_each(t1, |n| known.data[n] && smooth.data[n] > 0.5);
+    largest_component(&mask, Connectivity::Faces)
+}
+
+/// A mask on the grid of `like`.
+pub(super) fn at_each(like: &Volume<f32, Mni>, rule: impl Fn(usize) -> bool) -> Mask<Mni> {
+    Volume::from_data(like.grid, (0..like.data.len()).map(rule).collect())
+}

@@ -1,0 +1,96 @@
+//! What the template expects at each voxel of a patient's image.
+
+use super::atlas;
+use super::label;
+use crate::geometry::{Mni, Position};
+use crate::image::distance::signed_distance_mm;
+use crate::image::gaussian::gaussian;
+use crate::image::morphology::close;
+use crate::image::resample::{Interpolation, resample_through};
+use crate::image::{Grid, Volume};
+use std::sync::OnceLock;
+
+/// Widest distance outside the brain that the fields know, in mm.
+const FAR_MM: f32 = 60.0;
+
+/// The template's maps on a patient's working grid (MNI frame reached rigidly).
+#[derive(Clone, Debug)]
+pub struct AtlasPriors {
+    /// Signed distance to the template's brain surface in mm, negative inside. The surface is the pia with the sulci
+    /// closed.
+    pub brain_mm: Volume<f32, Mni>,
+    /// Probability of CSF, grey matter and white matter, 0 to 1, blurred by the expected misfit.
+    pub tissue: [Volume<f32, Mni>; 3],
+    /// Signed distance to the wall of the lateral and third ventricles in mm, negative inside.
+    pub ventricle_mm: Volume<f32, Mni>,
+    /// Signed distance to CSF that is no ventricle: sulci, fissures, cisterns, fourth ventricle; negative inside.
+    pub cistern_mm: Volume<f32, Mni>,
+}
+
+/// The fields on the template's own grid, before any warp.
+struct TemplateFields {
+    brain_mm: Volume<f32, Mni>,
+    tissue: [Volume<f32, Mni>; 3],
+    ventricle_mm: Volume<f32, Mni>,
+    cistern_mm: Volume<f32, Mni>,
+}
+
+fn template_fields() -> &'static TemplateFields {
+    static FIELDS: OnceLock<TemplateFields> = OnceLock::new();
+    FIELDS.get_or_init(|| {
+        let atlas = atlas::template();
+        let tissue_sum: Vec<f32> = (atlas.grey.data.iter().zip(&atlas.white.data))
+            .map(|(&g, &w)| (f32::from(g) + f32::from(w)) / 255.0)
+            .collect();
+        // The template's T1 reaches about a voxel past the pia: there grey and white together are below one half.
+        let solid = Volume::from_data(atlas.grid(), tissue_sum.iter().map(|&p| p >= 0.5).collect());
+        let mut brain = close(&solid, 6.0);
+        for (inside, &t1) in brain.data.iter_mut().zip(&atlas.t1.data) {
+            *inside &= t1 > 0;
+        }
+        let csf = (tissue_sum.iter().zip(&atlas.t1.data))
+            .map(|(&p, &t1)| if t1 > 0 { (1.0 - p).max(0.0) } else { 0.0 })
+            .collect();
+        let distance = |l: u8| signed_distance_mm(&atlas.labels.map(|v| v == l)).map(|d| d.min(FAR_MM));
+        TemplateFields {
+            brain_mm: signed_distance_mm(&brain).map(|d| d.min(FAR_MM)),
+            tissue: [
+                Volume::from_data(atlas.grid(), csf),
+                atlas.grey.map(|v| f32::from(v) / 255.0),
+                atlas.white.map(|v| f32::from(v) / 255.0),
+            ],
+            ventricle_mm: distance(label::VENTRICLE),
+            cistern_mm: distance(label::CSF),
+        }
+    })
+}
+
+impl AtlasPriors {
+    /// The template's fields at `template_from_patient(p)` for every voxel centre `p` of the grid; `None` is far outside.
+    /// `misfit_mm` is the expected error of that map (standard deviation): the tissue maps are blurred by it.
+    #[must_use]
+    pub fn through(
+        grid: &Grid<Mni>,
+        template_from_patient: impl Fn(Position<Mni>) -> Option<Position<Mni>> + Sync,
+        misfit_mm: f64,
+    ) -> Self {
+        let fields = template_fields();
+        let warped = |field: &Volume<f32, Mni>, outside: f32| {
+            resample_through(field, grid, &template_from_patient, Interpolation::Linear, outside).volume
+        };
+        let tissue = fields.tissue.each_ref().map(|map| gaussian(&warped(map, 0.0), misfit_mm));
+        Self {
+            brain_mm: warped(&fields.brain_mm, FAR_MM),
+            tissue,
+            ventricle_mm: warped(&fields.ventricle_mm, FAR_MM),
+            cistern_mm: warped(&fields.cistern_mm, FAR_MM),
+        }
+    }
+
+    /// The template as it stands, for a patient who has only been aligned rigidly: misfits of several millimetres are
+    /// expected.
+    #[must_use]
+    pub fn rigid(grid: &Grid<Mni>) -> Self {
+        Self::through(grid, Some, 3.0)
+    }
+}

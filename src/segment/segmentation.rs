@@ -1,0 +1,334 @@
+//! The whole way from a T1 image to its labels.
+
+use super::atlas;
+use super::brain::{BrainSettings, at_each, brain_mask};
+use super::label;
+use super::mixture::{Mixture, MixtureSettings, fit_mixture};
+use super::native::{labels_on, mask_on};
+use super::priors::AtlasPriors;
+use super::ventricle::{VentricleSettings, ventricles};
+use crate::geometry::{Frame, Mni, RigidTransform};
+use crate::image::resample::{Interpolation, resample};
+use crate::image::{LabelMap, Mask, Volume};
+use thiserror::Error;
+
+/// Everything that steers [`segment_t1`].
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SegmentSettings {
+    /// Brain mask.
+    pub brain: BrainSettings,
+    /// Ventricles.
+    pub ventricle: VentricleSettings,
+    /// Most iterations of expectation maximisation.
+    pub iterations: usize,
+    /// Order of the bias field's polynomial, 0 (none) to 3.
+    pub bias_order: usize,
+    /// Iterations before the bias field is estimated: a bias fitted to unsettled classes swallows their contrast.
+    pub bias_starts_at: usize,
+    /// Weight of one of six neighbours in the Markov field.
+    pub neighbour_weight: f64,
+    /// Share of the tissue prior that does not believe the template, 0 to 1.
+    pub disbelief: f64,
+    /// Smallest brain volume that is accepted, in cubic centimetres.
+    pub smallest_brain_cc: f64,
+    /// Largest brain volume that is accepted, in cubic centimetres.
+    pub largest_brain_cc: f64,
+}
+
+impl Default for SegmentSettings {
+    fn default() -> Self {
+        Self {
+            brain: BrainSettings::default(),
+            ventricle: VentricleSettings::default(),
+            iterations: 30,
+            bias_order: 3,
+            bias_starts_at: 5,
+            neighbour_weight: 0.25,
+            disbelief: 0.3,
+            smallest_brain_cc: 700.0,
+            largest_brain_cc: 2200.0,
+        }
+    }
+}
+
+/// Masks the user brings; they win over the computed ones.
+#[derive(Clone, Debug)]
+pub struct SegmentOverrides<'a, F: Frame> {
+    /// The brain, on any grid of the image's frame.
+    pub brain: Option<&'a Mask<F>>,
+}
+
+impl<F: Frame> Default for SegmentOverrides<'_, F> {
+    fn default() -> Self {
+        Self { brain: None }
+    }
+}
+
+/// A T1 image taken apart, in its own grid and on the template's grid (reached rigidly: sizes are the patient's).
+#[derive(Clone, Debug)]
+pub struct Segmentation<F: Frame> {
+    /// The brain in the image's grid: tissue, ventricles and sulci inside the pia.
+    pub brain: Mask<F>,
+    /// Labels in the image's grid, see [`label`].
+    pub labels: LabelMap<F>,
+    /// The image on the template's grid with its bias taken out.
+    pub t1_mni: Volume<f32, Mni>,
+    /// Where the image's field of view covers the template's grid. Elsewhere nothing is known.
+    pub known_mni: Mask<Mni>,
+    /// The brain on the template's grid.
+    pub brain_mni: Mask<Mni>,
+    /// Labels on the template's grid.
+    pub labels_mni: LabelMap<Mni>,
+    /// Mean intensities of CSF, grey matter and white matter after the bias is taken out, in the image's own units.
+    pub tissue_means: [f64; 3],
+    /// Standard deviations of the same.
+    pub tissue_deviations: [f64; 3],
+    /// Volumes on the template's grid.
+    pub volumes: TissueVolumes,
+    /// What a reader should know.
+    pub warnings: Vec<SegmentWarning>,
+}
+
+/// Volumes in cubic centimetres.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct TissueVolumes {
+    /// Everything inside the pia.
+    pub brain_cc: f64,
+    /// CSF outside the ventricles.
+    pub csf_cc: f64,
+    /// Grey matter.
+    pub grey_matter_cc: f64,
+    /// White matter.
+    pub white_matter_cc: f64,
+    /// Lateral and third ventricles.
+    pub ventricle_cc: f64,
+}
+
+/// Findings that do not stop the work.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, Error)]
+#[serde(rename_all = "kebab-case")]
+pub enum SegmentWarning {
+    /// The field of view ends inside the brain.
+    #[error("{percent:.0} % of the expected brain lies outside the field of view: nothing is said about that part")]
+    CroppedBrain {
+        /// Share of the template's brain outside the image, in percent.
+        percent: f64,
+    },
+    /// No ventricle was found.
+    #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
+    NoVentricle,
+    /// Grey and white matter are hard to tell apart.
+    #[error("grey and white matter differ by only {ratio:.1} standard deviations: is this a T1-weighted image?")]
+    LowContrast {
+        /// Difference of the means over the mean of the deviations.
+        ratio: f64,
+    },
+}
+
+/// Why an image could not be segmented.
+#[derive(Debug, Error)]
+pub enum SegmentError {
+    /// The image shows too little of the brain.
+    #[error(
+        "only {percent:.0} % of the expected brain lies in the field of view: at least half is needed; check the \
+         registration to the template, or give an image of the whole head"
+    )]
+    LittleBrain {
+        /// Share of the template's brain inside the image, in percent.
+        percent: f64,
+    },
+    /// No three tissues of rising intensity.
+    #[error(
+        "CSF, grey and white matter cannot be told apart by intensity: the image must be T1-weighted (CSF dark, white \
+         matter bright) and registered to the template"
+    )]
+    NoTissueContrast,
+    /// The mask found (or given) is no brain.
+    #[error(
+        "the brain's volume is {found_cc:.0} cc, outside {smallest_cc:.0} to {largest_cc:.0} cc: check the registration \
+         and the voxel size, or give a brain mask"
+    )]
+    ImplausibleBrain {
+        /// Volume found.
+        found_cc: f64,
+        /// Smallest accepted.
+        smallest_cc: f64,
+        /// Largest accepted.
+        largest_cc: f64,
+    },
+    /// A setting has no meaning.
+    #[error("the segmentation setting `{name}` is {value}: it must be {rule}")]
+    Setting {
+        /// The setting's name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+}
+
+/// Labels CSF, grey matter, white matter and ventricles of a T1 image that has been registered rigidly to the template.
+///
+/// The template's maps are used as they stand; after a deformable fit call [`segment_with_priors`].
+///
+/// # Errors
+/// [`SegmentError`] when the image shows too little brain or no tissue contrast, or when the mask is no brain.
+pub fn segment_t1<F: Frame>(
+    t1: &Volume<f32, F>,
+    mni_from_t1: &RigidTransform<F, Mni>,
+    overrides: &SegmentOverrides<'_, F>,
+    settings: &SegmentSettings,
+) -> Result<Segmentation<F>, SegmentError> {
+    segment_with_priors(t1, mni_from_t1, &AtlasPriors::rigid(&atlas::template().grid()), overrides, settings)
+}
+
+/// [`segment_t1`] with the template's maps already carried onto the patient. The work is done on the priors' grid.
+///
+/// # Errors
+/// As [`segment_t1`].
+pub fn segment_with_priors<F: Frame>(
+    t1: &Volume<f32, F>,
+    mni_from_t1: &RigidTransform<F, Mni>,
+    priors: &AtlasPriors,
+    overrides: &SegmentOverrides<'_, F>,
+    settings: &SegmentSettings,
+) -> Result<Segmentation<F>, SegmentError> {
+    check(settings)?;
+    let grid = priors.brain_mm.grid;
+    let t1_from_mni = mni_from_t1.inverse();
+    // The spline keeps the sharpness that a linear kernel would take from every sulcus.
+    let on_grid = resample(t1, &grid, &t1_from_mni.to_affine(), Interpolation::CubicBSpline, 0.0);
+    let (raw, known) = (on_grid.volume.map(|x| x.max(0.0)), on_grid.inside);
+    let mut warnings = Vec::new();
+
+    let expected = priors.brain_mm.map(|d| d < 0.0);
+    let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
+    let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
+    if percent < 50.0 {
+        return Err(SegmentError::LittleBrain { percent });
+    }
+    if percent < 98.0 {
+        warnings.push(SegmentWarning::CroppedBrain { percent: 100.0 - percent });
+    }
+
+    let given = overrides.brain.map(|mask| mask_on(mask, &grid, &t1_from_mni));
+    let brain = if let Some(mask) = given { mask } else { computed_brain(&raw, &known, priors, settings)? };
+    let found_cc = brain.volume_cc();
+    if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
+        return Err(SegmentError::ImplausibleBrain {
+            found_cc,
+            smallest_cc: settings.smallest_brain_cc,
+            largest_cc: settings.largest_brain_cc,
+        });
+    }
+
+    let inside = at_each(&raw, |n| brain.data[n] && known.data[n]);
+    let model =
+        fit_mixture(&raw, &inside, priors, &mixture_settings(settings, 1)).ok_or(SegmentError::NoTissueContrast)?;
+    let ratio = 2.0 * (model.means[2] - model.means[1]) / (model.deviations[1] + model.deviations[2]);
+    if ratio < 1.5 {
+        warnings.push(SegmentWarning::LowContrast { ratio });
+    }
+    let mut labels_mni = most_probable(&raw, &model);
+    let csf = labels_mni.map(|l| l == label::CSF);
+    let ventricle = ventricles(&csf, &brain, priors, &settings.ventricle);
+    if ventricle.count() == 0 {
+        warnings.push(SegmentWarning::NoVentricle);
+    }
+    for (l, &inside) in labels_mni.data.iter_mut().zip(&ventricle.data) {
+        if inside {
+            *l = label::VENTRICLE;
+        }
+    }
+    let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
+    let volumes = TissueVolumes {
+        brain_cc: found_cc,
+        csf_cc: volume(label::CSF),
+        grey_matter_cc: volume(label::GREY_MATTER),
+        white_matter_cc: volume(label::WHITE_MATTER),
+        ventricle_cc: volume(label::VENTRICLE),
+    };
+    let labels = labels_on(&labels_mni, &t1.grid, mni_from_t1);
+    Ok(Segmentation {
+        brain: overrides
+            .brain
+            .filter(|m| m.grid.coincides(&t1.grid, 1e-3))
+            .cloned()
+            .unwrap_or_else(|| labels.map(|l| l > 0)),
+        labels,
+        t1_mni: without_bias(&raw, &model),
+        known_mni: known,
+        brain_mni: brain,
+        labels_mni,
+        tissue_means: model.means,
+        tissue_deviations: model.deviations,
+        volumes,
+        warnings,
+    })
+}
+
+fn check(settings: &SegmentSettings) -> Result<(), SegmentError> {
+    let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 9] = [
+        ("brain.reach_mm", settings.brain.reach_mm, 0.0..=30.0, "0 to 30 mm"),
+        ("brain.opening_mm", settings.brain.opening_mm, 0.0..=10.0, "0 to 10 mm"),
+        ("brain.closing_mm", settings.brain.closing_mm, 0.0..=20.0, "0 to 20 mm"),
+        ("brain.trusted_depth_mm", settings.brain.trusted_depth_mm, 0.0..=30.0, "0 to 30 mm"),
+        ("ventricle.reach_mm", settings.ventricle.reach_mm, 0.0..=30.0, "0 to 30 mm"),
+        ("ventricle.closing_mm", settings.ventricle.closing_mm, 0.0..=5.0, "0 to 5 mm"),
+        ("bias_order", settings.bias_order as f64, 0.0..=3.0, "0 to 3"),
+        ("disbelief", settings.disbelief, 0.0..=1.0, "0 to 1"),
+        ("neighbour_weight", settings.neighbour_weight, 0.0..=5.0, "0 to 5"),
+    ];
+    for (name, value, range, rule) in rules {
+        if !range.contains(&value) {
+            return Err(SegmentError::Setting { name, value, rule });
+        }
+    }
+    Ok(())
+}
+
+fn mixture_settings(settings: &SegmentSettings, stride: usize) -> MixtureSettings {
+    MixtureSettings {
+        iterations: settings.iterations,
+        bias_order: settings.bias_order,
+        bias_starts_at: settings.bias_starts_at,
+        neighbour_weight: settings.neighbour_weight,
+        disbelief: settings.disbelief,
+        stride,
+    }
+}
+
+/// Intensities are learnt on every second voxel deep in the template's brain, then the mask is found with them.
+fn computed_brain(
+    raw: &Volume<f32, Mni>,
+    known: &Mask<Mni>,
+    priors: &AtlasPriors,
+    settings: &SegmentSettings,
+) -> Result<Mask<Mni>, SegmentError> {
+    let deep = at_each(raw, |n| known.data[n] && priors.brain_mm.data[n] < -4.0);
+    let model =
+        fit_mixture(raw, &deep, priors, &mixture_settings(settings, 2)).ok_or(SegmentError::NoTissueContrast)?;
+    Ok(brain_mask(&without_bias(raw, &model), known, &model, priors, &settings.brain))
+}
+
+fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture) -> Volume<f32, Mni> {
+    let grid = raw.grid;
+    let value = |n: usize| (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32;
+    Volume::from_data(grid, (0..grid.len()).map(value).collect())
+}
+
+fn most_probable(like: &Volume<f32, Mni>, model: &Mixture) -> LabelMap<Mni> {
+    let mut labels = Volume::filled(like.grid, label::BACKGROUND);
+    for (&n, p) in model.voxels.iter().zip(&model.probabilities) {
+        labels.data[n as usize] = if p[0] > p[1] && p[0] > p[2] {
+            label::CSF
+        } else if p[1] >= p[2] {
+            label::GREY_MATTER
+        } else {
+            label::WHITE_MATTER
+        };
+    }
+    labels
+}

@@ -1,0 +1,86 @@
+//! Lateral and third ventricles: CSF that is nearer, through CSF, to the template's ventricles than to its cisterns.
+
+use super::brain::at_each;
+use super::priors::AtlasPriors;
+use crate::geometry::Mni;
+use crate::image::components::{Connectivity, fill_holes, without_islands};
+use crate::image::morphology::{close, erode};
+use crate::image::{Mask, Volume};
+
+/// How the ventricles are told from the other CSF.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct VentricleSettings {
+    /// How far the patient's ventricles may reach beyond the template's, in mm.
+    pub reach_mm: f64,
+    /// CSF at least this far from the template's ventricles, where the template has a cistern or sulcus, is no ventricle.
+    pub cistern_clearance_mm: f64,
+    /// Choroid plexus and septa thinner than twice this are part of the ventricles.
+    pub closing_mm: f64,
+}
+
+impl Default for VentricleSettings {
+    fn default() -> Self {
+        Self { reach_mm: 10.0, cistern_clearance_mm: 4.0, closing_mm: 1.0 }
+    }
+}
+
+/// The ventricles among the voxels of `csf`, on the working grid; may be empty.
+///
+/// Two fronts start together and advance through CSF at one voxel a step: one from the CSF deep in the template's
+/// ventricles, one from the CSF in its cisterns and sulci; where they meet, they stop. Enlarged ventricles grow into
+/// what is tissue in the template, where no cistern starts.
+pub(super) fn ventricles(
+    csf: &Mask<Mni>,
+    brain: &Mask<Mni>,
+    priors: &AtlasPriors,
+    settings: &VentricleSettings,
+) -> Mask<Mni> {
+    const VENTRICLE: u8 = 1;
+    const CISTERN: u8 = 2;
+    let (reach, clearance) = (settings.reach_mm as f32, settings.cistern_clearance_mm as f32);
+    let deep = erode(csf, 1.0);
+    let mut owner: Vec<u8> = (0..csf.data.len())
+        .map(|n| {
+            let from_ventricle = priors.ventricle_mm.data[n];
+            if !csf.data[n] {
+                0
+            } else if from_ventricle < -0.5 && (deep.data[n] || from_ventricle < -1.5) {
+                VENTRICLE
+            } else if from_ventricle > clearance && priors.cistern_mm.data[n] < 0.0 || from_ventricle > 2.0 * reach {
+                CISTERN
+            } else {
+                0
+            }
+        })
+        .collect();
+    let mut front: Vec<u32> = (0..owner.len() as u32).filter(|&n| owner[n as usize] > 0).collect();
+    let [nx, ny, _] = csf.grid.dims;
+    let strides = [1, nx, nx * ny];
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for &n in &front {
+            let n = n as usize;
+            let voxel = csf.grid.voxel(n);
+            for a in 0..3 {
+                let below = (voxel[a] > 0).then(|| n - strides[a]);
+                let above = (voxel[a] + 1 < csf.grid.dims[a]).then(|| n + strides[a]);
+                for m in below.into_iter().chain(above) {
+                    if owner[m] == 0 && csf.data[m] {
+                        owner[m] = owner[n];
+                        next.push(m as u32);
+                    }
+                }
+            }
+        }
+        front = next;
+    }
+    let ventricle = at_each(&priors.ventricle_mm, |n| owner[n] == VENTRICLE && priors.ventricle_mm.data[n] < reach);
+    let ventricle = without_islands(&ventricle, Connectivity::Faces, 30);
+    let closed = fill_holes(&close(&ventricle, settings.closing_mm));
+    // A closing may not reach over to a cistern or leave the brain.
+    Volume::from_data(
+        csf.grid,
+        (0..owner.len()).map(|n| closed.data[n] && brain.data[n] && owner[n] != CISTERN).collect(),
+    )
+}
