@@ -14,7 +14,9 @@ pub struct ResectionSettings {
     /// Gravity in the MNI frame. Along -z by default (head upright, as in the paper's scenario); a patient who lies
     /// supine in the scanner has it along -y.
     pub gravity_m_per_s2: [f64; 3],
-    /// Density of the tissue; below the full 1000 where cerebrospinal fluid still carries part of the weight.
+    /// Effective density: tissue less the fluid that carries it, from 33 (all submerged: 1040 - 1007) to 1040 (all
+    /// drained). Gravity fixes only modulus / density, so a modulus is only as good as this assumption; 100 is a
+    /// brain of which about a fifteenth of the weight is no longer carried.
     pub density_kg_per_m3: f64,
     /// Poisson's ratio of every tissue.
     pub poisson_ratio: f64,
@@ -33,7 +35,7 @@ impl Default for ResectionSettings {
         Self {
             tissues: 1,
             gravity_m_per_s2: [0.0, 0.0, -9.81],
-            density_kg_per_m3: 1000.0,
+            density_kg_per_m3: 100.0,
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
             fixed: vec!["base".to_owned(), "falx".to_owned()],

@@ -36,6 +36,8 @@ pub struct SolvedSample {
     pub record: SampleOutcome,
     /// The deformed state with its errors; absent when no equilibrium was found.
     pub state: Option<(Outcome, StateErrors)>,
+    /// Why there is no state.
+    pub reason: Option<String>,
 }
 
 /// Why a sweep cannot go on (a sample without equilibrium is recorded, not an error).
@@ -127,7 +129,9 @@ pub fn solve_sample(
     };
     let outcome = match simulate(mesh, &scenario, progress) {
         Ok(outcome) => outcome,
-        Err(FemError::NoEquilibrium { .. }) => return Ok(SolvedSample { record, state: None }),
+        Err(error @ FemError::NoEquilibrium { .. }) => {
+            return Ok(SolvedSample { record, state: None, reason: Some(error.to_string()) });
+        }
         Err(error) => return Err(error.into()),
     };
     let errors = reference.errors(mesh, &outcome.displacement_mm);
@@ -136,7 +140,7 @@ pub fn solve_sample(
     record.newton_iterations = outcome.convergence.iterations.len();
     record.relative_residuals = outcome.convergence.iterations.iter().map(|i| i.relative_residual).collect();
     record.displacement_max_mm = Some(largest_norm(&outcome.displacement_mm));
-    Ok(SolvedSample { record, state: Some((outcome, errors)) })
+    Ok(SolvedSample { record, state: Some((outcome, errors)), reason: None })
 }
 
 fn largest_norm(vectors: &[[f64; 3]]) -> f64 {

@@ -9,6 +9,7 @@ mod mixture;
 pub mod native;
 mod priors;
 mod segmentation;
+mod sulci;
 mod ventricle;
 
 pub use bias::LogBias;
@@ -18,4 +19,5 @@ pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
     segment_with_priors,
 };
+pub use sulci::with_closed_sulci;
 pub use ventricle::VentricleSettings;

@@ -10,7 +10,7 @@ use crate::mesh::engine::{Engine, EnginePrograms, MeshSettings, MeshSize, mesh_l
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::{TetMesh, TriMesh};
-use crate::segment::label;
+use crate::segment::{label, with_closed_sulci};
 use crate::tag::{TagSettings, tag_boundary_sets};
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,8 @@ use std::collections::BTreeMap;
 const VERSION: u32 = 1;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
+/// Sulci and fissures up to twice this width are closed in the mesh.
+const SULCUS_MM: f64 = 4.0;
 
 /// Engine and size as the command line gives them.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -71,7 +73,8 @@ pub fn mesh(
     let tag_settings: TagSettings = session.settings("tag")?;
     let stage = Stage::new("mesh", VERSION, &case.folder, &(&settings, &tag_settings)).after(after).frame(Mni::NAME);
     case.run(&stage, "mesh", || {
-        let (mut whole, record) = mesh_labels(labels, &settings, &programs).reject()?;
+        let body = with_closed_sulci(labels, SULCUS_MM);
+        let (mut whole, record) = mesh_labels(&body, &settings, &programs).reject()?;
         let tags = tag_boundary_sets(&mut whole, &tag_settings).reject()?;
         let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
         let (rest, _) = whole.restricted(tissue).context("the mesh holds no grey or white matter").reject()?;
