@@ -10,9 +10,9 @@
 use super::colour::{CAVITY, RESECTED, Rgb, VENTRICLE, of_label};
 use super::figure::CaseImages;
 use super::mesh_figure::set_facets;
-use super::seg_nrrd::{self, Segment};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::image::LabelMap;
+use crate::image::seg_nrrd::{self, Segment};
 use crate::mesh::format::{Field, WriteError, gifti, pvd};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::label;
@@ -22,7 +22,11 @@ pub type CaseFile = (String, Vec<u8>);
 
 fn segment(label: u8, colour: Rgb) -> Segment {
     let name = label::name(label).unwrap_or("label").replace('_', " ");
-    Segment { label, name, colour }
+    Segment { label, name, colour: fractions(colour) }
+}
+
+fn fractions(colour: Rgb) -> [f64; 3] {
+    colour.map(|c| f64::from(c) / 255.0)
 }
 
 /// Segmentations of a case for 3D Slicer.
@@ -48,7 +52,7 @@ pub fn segmentations(images: &CaseImages) -> Vec<CaseFile> {
     }
     if let Some(cavity) = &images.cavity {
         let labels: LabelMap<_> = cavity.map(u8::from);
-        let segments = [Segment { label: 1, name: "cavity".to_owned(), colour: CAVITY }];
+        let segments = [Segment { label: 1, name: "cavity".to_owned(), colour: fractions(CAVITY) }];
         files.push(("anat/post_space-MNI_label-cavity.seg.nrrd".to_owned(), seg_nrrd::encode(&labels, &segments)));
     }
     files

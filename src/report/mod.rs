@@ -11,6 +11,5 @@ pub mod mesh_figure;
 pub mod page;
 pub mod picture;
 pub mod render;
-pub mod seg_nrrd;
 pub mod slice;
 pub mod viewer;
