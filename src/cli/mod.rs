@@ -6,6 +6,7 @@
 
 mod case;
 mod completions;
+mod demo;
 mod doctor;
 mod failure;
 mod man;
@@ -14,6 +15,7 @@ mod prep;
 mod report;
 mod run;
 mod session;
+mod synth;
 
 pub use failure::{Failure, Reject};
 pub use session::{GlobalOptions, Session};
@@ -33,9 +35,11 @@ pub struct Hgm {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::Args),
     Prep(prep::Args),
     Run(run::Args),
     Phantom(phantom::Args),
+    Synth(synth::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -47,9 +51,11 @@ pub fn main() -> ExitCode {
     let hgm = Hgm::parse();
     let json = hgm.global.json;
     let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
+        Command::Demo(args) => demo::run(&args, &session),
         Command::Prep(args) => prep::run(&args, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
+        Command::Synth(args) => synth::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),

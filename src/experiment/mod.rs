@@ -1,5 +1,6 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
+pub mod counter_rng;
 pub mod estimate;
 pub mod observed;
 pub mod outcome;
@@ -9,3 +10,4 @@ pub mod resection;
 pub mod rmse;
 pub mod sample;
 pub mod sweep;
+pub mod synth;

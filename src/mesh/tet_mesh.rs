@@ -128,7 +128,39 @@ impl TetMesh {
     /// The part of the mesh whose labels `keep` accepts, nodes renumbered in order, sets restricted (a facet stays
     /// when all its nodes stay). `None` when nothing is left. Also returns, for every new node, its old number.
     pub fn restricted(&self, keep: impl Fn(u8) -> bool) -> Option<(Self, Vec<u32>)> {
-        let kept: Vec<usize> = (0..self.tets.len()).filter(|&t| keep(self.labels[t])).collect();
+        self.part(|t| keep(self.labels[t]))
+    }
+
+    /// The largest part whose tetrahedra hang together through faces, as [`TetMesh::restricted`] returns it. What hangs
+    /// on by an edge or a corner alone can turn about it without effort: no equilibrium would hold it.
+    pub fn largest_face_connected_part(&self) -> Option<(Self, Vec<u32>)> {
+        let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * self.tets.len());
+        for (t, tet) in self.tets.iter().enumerate() {
+            for face in TET_FACES {
+                let mut key = face.map(|c| tet[c]);
+                key.sort_unstable();
+                faces.push((key, t as u32));
+            }
+        }
+        faces.sort_unstable();
+        let mut root: Vec<u32> = (0..self.tets.len() as u32).collect();
+        for pair in faces.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            let (a, b) = (root_of(&mut root, pair[0].1), root_of(&mut root, pair[1].1));
+            root[a.max(b) as usize] = a.min(b);
+        }
+        let mut count = vec![0usize; self.tets.len()];
+        for t in 0..self.tets.len() as u32 {
+            count[root_of(&mut root, t) as usize] += 1;
+        }
+        // The first of equals, so that the answer does not depend on how ties are broken.
+        let most = count.iter().copied().max()?;
+        let largest = count.iter().position(|&c| c == most)? as u32;
+        let belongs: Vec<bool> = (0..self.tets.len() as u32).map(|t| root_of(&mut root, t) == largest).collect();
+        self.part(|t| belongs[t])
+    }
+
+    fn part(&self, keep: impl Fn(usize) -> bool) -> Option<(Self, Vec<u32>)> {
+        let kept: Vec<usize> = (0..self.tets.len()).filter(|&t| keep(t)).collect();
         let mut new_number = vec![u32::MAX; self.nodes_mm.len()];
         for &t in &kept {
             for n in self.tets[t] {
@@ -153,6 +185,14 @@ impl TetMesh {
         }
         Some((part, old_number))
     }
+}
+
+fn root_of(root: &mut [u32], mut t: u32) -> u32 {
+    while root[t as usize] != t {
+        root[t as usize] = root[root[t as usize] as usize];
+        t = root[t as usize];
+    }
+    t
 }
 
 fn signed_volume(nodes: &[[f64; 3]], tet: &[u32; 4]) -> f64 {
@@ -192,6 +232,16 @@ mod tests {
         assert_eq!((part.tets().len(), old.as_slice()), (1, [1, 2, 3, 4].as_slice()));
         assert_eq!(part.node_sets["tip"], [3]);
         assert!(mesh.restricted(|_| false).is_none());
+    }
+
+    #[test]
+    fn what_hangs_on_by_an_edge_is_no_part_of_the_body() {
+        let mut nodes = two_tets().nodes_mm().to_vec();
+        nodes.extend([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]);
+        // The third tet shares only the edge 0-3 with the first.
+        let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3], [1, 2, 3, 4], [0, 5, 6, 3]], vec![2, 2, 2]).unwrap();
+        let (part, old) = mesh.largest_face_connected_part().unwrap();
+        assert_eq!((part.tets().len(), old.len()), (2, 5));
     }
 
     #[test]

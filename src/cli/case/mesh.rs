@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Sulci and fissures up to twice this width are closed in the mesh.
@@ -78,6 +78,7 @@ pub fn mesh(
         let tags = tag_boundary_sets(&mut whole, &tag_settings).reject()?;
         let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
         let (rest, _) = whole.restricted(tissue).context("the mesh holds no grey or white matter").reject()?;
+        let (rest, _) = rest.largest_face_connected_part().context("the mesh holds no tetrahedra").reject()?;
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
         produced.files.push(("mesh/rest.msh".to_owned(), msh::encode(&rest)?));

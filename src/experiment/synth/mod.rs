@@ -1,0 +1,315 @@
+//! A synthetic patient: a pre- and a post-operative scan and the truth behind them.
+//!
+//! The template's brain gets a head, a random anatomy and two poses; the front of one temporal lobe is taken out and the
+//! brain sags. What is known exactly goes out beside the scans: the rigid transform, the masks, the displacement.
+
+mod field;
+mod files;
+mod head;
+mod resection;
+mod sag;
+mod sag_fem;
+mod scan;
+mod settings;
+
+pub use settings::{SagKind, SynthError, SynthSettings};
+
+use crate::experiment::counter_rng::{CounterRng, SmoothNoise};
+use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
+use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::segment::{atlas, label};
+use field::Field;
+use head::{FLUID, Head};
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use resection::Resection;
+use scan::{Bias, Storage};
+use serde::Serialize;
+
+/// The patient's own frame, near the template's: what both scanners' frames are poses of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patient;
+
+impl Frame for Patient {
+    const NAME: &'static str = "patient";
+}
+
+/// The scans and the truth.
+#[derive(Clone, Debug)]
+pub struct SyntheticPatient {
+    /// The pre-operative T1.
+    pub pre: Volume<i16, Pre>,
+    /// The post-operative T1.
+    pub post: Volume<i16, Post>,
+    /// Maps a point of the pre-operative scan to the post-operative one (without the sag).
+    pub post_from_pre: RigidTransform<Pre, Post>,
+    /// Brain before the operation.
+    pub brain_pre: Mask<Pre>,
+    /// Brain after the operation, without the cavity.
+    pub brain_post: Mask<Post>,
+    /// Labels of the brain before the operation.
+    pub tissue_pre: LabelMap<Pre>,
+    /// Lateral and third ventricles before the operation.
+    pub ventricles_pre: Mask<Pre>,
+    /// Lateral and third ventricles after the operation.
+    pub ventricles_post: Mask<Post>,
+    /// What was taken out.
+    pub resected_pre: Mask<Pre>,
+    /// Where it was, after the sag.
+    pub cavity_post: Mask<Post>,
+    /// Displacement of the brain in mm along the axes of the pre-operative scan, without the pose; 0 outside.
+    pub displacement_pre: Volume<[f32; 3], Pre>,
+    /// The same in numbers.
+    pub truth: Truth,
+}
+
+/// The numbers behind a synthetic patient.
+#[derive(Clone, Debug, Serialize)]
+pub struct Truth {
+    /// Everything that decides the patient.
+    pub settings: SynthSettings,
+    /// Rows of the 4x4 matrix that maps a point of the pre-operative scan to the post-operative one.
+    pub post_from_pre: [[f64; 4]; 4],
+    /// Rows of the 4x4 matrix that maps a point of the pre-operative scan to the patient's frame, near the template's.
+    pub patient_from_pre: [[f64; 4]; 4],
+    /// Rotation of `post_from_pre` in degrees.
+    pub rotation_deg: f64,
+    /// Mean shift of the brain from pre to post by the poses in mm.
+    pub brain_shift_mm: f64,
+    /// Direction of gravity along the axes of the pre-operative scan.
+    pub gravity_pre: [f64; 3],
+    /// Volume of the brain before the operation.
+    pub brain_cc: f64,
+    /// Volume of the resected region before the operation.
+    pub resected_cc: f64,
+    /// Volume of the cavity after the operation.
+    pub cavity_cc: f64,
+    /// Volume of the ventricles before the operation.
+    pub ventricles_pre_cc: f64,
+    /// Volume of the ventricles after the operation.
+    pub ventricles_post_cc: f64,
+    /// Largest displacement of brain that stays, in mm.
+    pub largest_displacement_mm: f64,
+    /// Mean displacement of brain that stays, in mm.
+    pub mean_displacement_mm: f64,
+}
+
+/// The point of the template that looks like point `p` of the patient.
+fn in_template(anatomy: &Field, p: Point3<f64>) -> Position<Mni> {
+    Position::from_point(p + anatomy.at(p))
+}
+
+/// Centre of voxel number `n`.
+fn centre<F: Frame>(grid: &Grid<F>, n: usize) -> Point3<f64> {
+    grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm
+}
+
+/// Everything in the patient's frame.
+struct Anatomy {
+    head: Head,
+    warp: Field,
+    resection: Resection,
+    sag: Option<Field>,
+    content: Content,
+}
+
+/// What fills the cavity, by height against gravity in mm.
+struct Content {
+    down: Vector3<f64>,
+    blood_below_mm: f64,
+    air_above_mm: f64,
+    wall_blood: Option<SmoothNoise>,
+}
+
+impl Anatomy {
+    fn label(&self, p: Point3<f64>) -> u8 {
+        self.head.labels.nearest(in_template(&self.warp, p)).unwrap_or(label::BACKGROUND)
+    }
+
+    fn intensity(&self, p: Point3<f64>) -> f64 {
+        self.head.t1.trilinear(in_template(&self.warp, p)).map_or(0.0, f64::from)
+    }
+
+    fn in_skull(&self, p: Point3<f64>) -> bool {
+        self.head.skull_mm.trilinear(in_template(&self.warp, p)).is_some_and(|d| d < 0.0)
+    }
+
+    /// Where the point of the operated patient was before.
+    fn before(&self, x: Point3<f64>) -> Point3<f64> {
+        self.sag.as_ref().map_or(x, |sag| sag.origin_of(x))
+    }
+
+    fn intensity_after(&self, x: Point3<f64>) -> f64 {
+        if !self.in_skull(x) {
+            return self.intensity(x);
+        }
+        let p = self.before(x);
+        let wall_mm = self.resection.distance_mm(p);
+        let cavity = (0.5 - wall_mm).clamp(0.0, 1.0);
+        // Where brain has left the skull's wall, fluid takes its place.
+        let tissue = |()| if self.in_skull(p) { self.intensity(p) } else { f64::from(FLUID) };
+        match cavity {
+            0.0 => tissue(()),
+            1.0 => self.content.at(x, -wall_mm),
+            part => part * self.content.at(x, -wall_mm) + (1.0 - part) * tissue(()),
+        }
+    }
+}
+
+impl Content {
+    fn at(&self, x: Point3<f64>, depth_mm: f64) -> f64 {
+        let fluid = f64::from(FLUID) + 3.0;
+        let fall_mm = x.coords.dot(&self.down);
+        if fall_mm < self.air_above_mm {
+            return 3.0;
+        }
+        // Blood settles: brighter towards the bottom.
+        if fall_mm > self.blood_below_mm {
+            return fluid + (110.0 * (fall_mm - self.blood_below_mm + 2.0) / 8.0).clamp(0.0, 125.0);
+        }
+        match &self.wall_blood {
+            Some(noise) if depth_mm < 2.5 + 2.0 * noise.at(x.into()) && noise.at((x * 1.7).into()) > -0.15 => 168.0,
+            _ => fluid,
+        }
+    }
+}
+
+/// Makes the patient. The same settings give the same values on any number of threads.
+///
+/// # Errors
+/// [`SynthError`] for settings out of range, a lobe too small for the resection, or a finite-element sag that fails.
+pub fn synthesize(settings: &SynthSettings) -> Result<SyntheticPatient, SynthError> {
+    settings.check()?;
+    let anatomy = operate(settings)?;
+    let stream = |n| CounterRng::new(settings.seed, n);
+    let (pre_rng, post_rng) = (stream(401), stream(402));
+    let pre_from_patient = scan::pose::<Pre>(pre_rng, settings.rotation_deg, settings.translation_mm);
+    let post_from_patient = scan::pose::<Post>(post_rng, settings.rotation_deg, settings.translation_mm);
+    let (patient_from_pre, patient_from_post) = (pre_from_patient.inverse(), post_from_patient.inverse());
+    let s = settings.spacing_mm;
+    let pre_grid = scan::field_of_view(&pre_from_patient, [s; 3], 0.0, Storage::Sagittal, pre_rng);
+    let post_spacing = [s, s, settings.post_slice_mm];
+    let post_grid =
+        scan::field_of_view(&post_from_patient, post_spacing, settings.post_oblique_deg, Storage::Axial, post_rng);
+
+    let bias = |rng| Bias::new(rng, settings.bias_fraction);
+    let noise = |n| (stream(n), settings.noise_fraction);
+    let pre = scan::scan(pre_grid, &patient_from_pre, |p| anatomy.intensity(p), &bias(pre_rng), noise(403));
+    let post = scan::scan(post_grid, &patient_from_post, |x| anatomy.intensity_after(x), &bias(post_rng), noise(404));
+
+    // Label and displacement of what was at a voxel before the operation.
+    let at_pre = |n: usize| patient_from_pre.apply(Position::from_point(centre(&pre_grid, n))).mm;
+    let tissue_pre: LabelMap<Pre> = per_voxel(pre_grid, |n| anatomy.label(at_pre(n)));
+    let resected_pre: Mask<Pre> =
+        per_voxel(pre_grid, |n| tissue_pre.data[n] > 0 && anatomy.resection.distance_mm(at_pre(n)) < 0.0);
+    let stays = |n: usize| tissue_pre.data[n] > 0 && !resected_pre.data[n];
+    let displacement_pre = per_voxel(pre_grid, |n| {
+        let Some(sag) = anatomy.sag.as_ref().filter(|_| stays(n)) else { return [0.0; 3] };
+        let d = pre_from_patient.rotation * sag.at(at_pre(n));
+        // To a 1024th of a mm: exact in 32 bits, and it packs well.
+        [d.x, d.y, d.z].map(|x| ((x * 1024.0).round() / 1024.0) as f32)
+    });
+    // What is at a voxel after it: 255 for the cavity.
+    const CAVITY: u8 = 255;
+    let after: LabelMap<Post> = per_voxel(post_grid, |n| {
+        let x = patient_from_post.apply(Position::from_point(centre(&post_grid, n))).mm;
+        if !anatomy.in_skull(x) {
+            return label::BACKGROUND;
+        }
+        let p = anatomy.before(x);
+        if anatomy.resection.distance_mm(p) < 0.0 { CAVITY } else { anatomy.label(p) }
+    });
+
+    let post_from_pre = patient_from_pre.then(&post_from_patient);
+    let brain_pre = tissue_pre.map(|l| l > 0);
+    let ventricles_pre = tissue_pre.map(|l| l == label::VENTRICLE);
+    let brain_post = after.map(|l| l > 0 && l != CAVITY);
+    let ventricles_post = after.map(|l| l == label::VENTRICLE);
+    let cavity_post = after.map(|l| l == CAVITY);
+    let lengths = (0..pre_grid.len())
+        .filter(|&n| stays(n))
+        .map(|n| displacement_pre.data[n].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt());
+    let (largest, sum, count) = lengths.fold((0f64, 0.0, 0.0), |(l, s, c), d| (l.max(d), s + d, c + 1.0));
+    let brain_points = (0..pre_grid.len()).filter(|&n| brain_pre.data[n]).map(|n| centre(&pre_grid, n));
+    let (shift, points) = brain_points
+        .fold((0.0, 0.0), |(s, c), p| (s + (post_from_pre.apply(Position::from_point(p)).mm - p).norm(), c + 1.0));
+    let rows = |m: nalgebra::Matrix4<f64>| std::array::from_fn(|r| std::array::from_fn(|c| rounded(m[(r, c)])));
+    let truth = Truth {
+        settings: settings.clone(),
+        post_from_pre: rows(post_from_pre.to_matrix()),
+        patient_from_pre: rows(patient_from_pre.to_matrix()),
+        rotation_deg: rounded(post_from_pre.rotation.angle().to_degrees()),
+        brain_shift_mm: rounded(shift / f64::max(points, 1.0)),
+        gravity_pre: <[f64; 3]>::from(pre_from_patient.rotation * sag::gravity(settings.seed)).map(rounded),
+        brain_cc: rounded(brain_pre.volume_cc()),
+        resected_cc: rounded(resected_pre.volume_cc()),
+        cavity_cc: rounded(cavity_post.volume_cc()),
+        ventricles_pre_cc: rounded(ventricles_pre.volume_cc()),
+        ventricles_post_cc: rounded(ventricles_post.volume_cc()),
+        largest_displacement_mm: rounded(largest),
+        mean_displacement_mm: rounded(sum / f64::max(count, 1.0)),
+    };
+    Ok(SyntheticPatient {
+        pre,
+        post,
+        post_from_pre,
+        brain_pre,
+        brain_post,
+        tissue_pre,
+        ventricles_pre,
+        ventricles_post,
+        resected_pre,
+        cavity_post,
+        displacement_pre,
+        truth,
+    })
+}
+
+/// Nine decimals: more than any use needs, fewer than machines differ in.
+fn rounded(x: f64) -> f64 {
+    (x * 1e9).round() / 1e9
+}
+
+fn per_voxel<T: Copy + Send, F: Frame>(grid: Grid<F>, value: impl Fn(usize) -> T + Sync + Send) -> Volume<T, F> {
+    Volume::from_data(grid, (0..grid.len()).into_par_iter().map(value).collect())
+}
+
+/// Head, anatomy, resection and sag.
+fn operate(settings: &SynthSettings) -> Result<Anatomy, SynthError> {
+    let head = head::head_around(atlas::template(), settings.seed);
+    let wide = Grid::<Patient>::axis_aligned([64, 72, 68], [4.0; 3], [-126.0, -160.0, -140.0]);
+    let warp = field::random_anatomy(wide, settings.seed, settings.anatomy_mm);
+    let brain_grid = Grid::<Patient>::axis_aligned([186, 234, 192], [1.0; 3], [-92.5, -134.5, -88.5]);
+    let labels: LabelMap<Patient> = per_voxel(brain_grid, |n| {
+        head.labels.nearest(in_template(&warp, centre(&brain_grid, n))).unwrap_or(label::BACKGROUND)
+    });
+    let resection = resection::resect(&labels, &warp, settings)?;
+    let sag = match settings.sag {
+        SagKind::None => None,
+        SagKind::Smooth => Some(sag::smooth(&head, &warp, &resection, settings)),
+        SagKind::Fem => Some(sag_fem::by_finite_elements(&labels, &warp, &resection, settings)?),
+    };
+    let content = content(&resection, sag.as_ref(), settings);
+    Ok(Anatomy { head, warp, resection, sag, content })
+}
+
+/// Levels of air and blood: a fifth of the cavity each.
+fn content(resection: &Resection, sag: Option<&Field>, settings: &SynthSettings) -> Content {
+    let down = sag::gravity(settings.seed);
+    let grid = resection.wall_mm.grid;
+    let mut falls: Vec<f64> = (0..grid.len())
+        .filter(|&n| resection.wall_mm.data[n] < 0.0)
+        .map(|n| {
+            let p = centre(&grid, n);
+            (p + sag.map_or(Vector3::zeros(), |sag| sag.at(p))).coords.dot(&down)
+        })
+        .collect();
+    falls.sort_unstable_by(f64::total_cmp);
+    let level = |part: f64| falls.get((part * falls.len() as f64) as usize).copied();
+    Content {
+        down,
+        blood_below_mm: level(0.8).filter(|_| settings.blood).unwrap_or(f64::INFINITY),
+        air_above_mm: level(0.2).filter(|_| settings.air).unwrap_or(f64::NEG_INFINITY),
+        wall_blood: settings.blood.then(|| SmoothNoise::new(CounterRng::new(settings.seed, 302), 7.0)),
+    }
+}

@@ -1,0 +1,150 @@
+//! What a synthetic patient is made of.
+
+use crate::segment::atlas::Side;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// How the brain's sag after the resection is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SagKind {
+    /// No movement: the post-operative brain is the pre-operative one with a hole.
+    None,
+    /// A smooth analytic field: along gravity, strongest at the cavity, zero at the skull.
+    Smooth,
+    /// Finite elements under gravity with the materials of [`SynthSettings`].
+    Fem,
+}
+
+/// Everything that decides the bytes of a synthetic patient.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SynthSettings {
+    /// Seed of anatomy, poses, bias and noise.
+    pub seed: u64,
+    /// The operated temporal lobe.
+    pub side: Side,
+    /// Volume to be resected, in cubic centimetres.
+    pub resection_cc: f64,
+    /// Voxel size of both scans in mm.
+    pub spacing_mm: f64,
+    /// Slice thickness of the post-operative scan in mm (at least `spacing_mm`; 3 to 5 is a thick clinical slice).
+    pub post_slice_mm: f64,
+    /// Tilt of the post-operative slices out of the scanner's axes in degrees.
+    pub post_oblique_deg: f64,
+    /// Largest rotation of the head in either scan in degrees (up to 15).
+    pub rotation_deg: f64,
+    /// Largest shift of the head in either scan in mm (up to 20).
+    pub translation_mm: f64,
+    /// Typical size of the smooth change of anatomy from the template in mm.
+    pub anatomy_mm: f64,
+    /// Bias field: relative half range of the multiplicative shading.
+    pub bias_fraction: f64,
+    /// Standard deviation of the Gaussian noise in either channel over the white matter intensity (Rician magnitude).
+    pub noise_fraction: f64,
+    /// How the sag is made.
+    pub sag: SagKind,
+    /// Largest displacement of the smooth sag in mm.
+    pub sag_mm: f64,
+    /// Shear modulus of grey matter for the finite-element sag in Pa.
+    pub grey_pa: f64,
+    /// Shear modulus of white matter for the finite-element sag in Pa.
+    pub white_pa: f64,
+    /// Poisson ratio of both for the finite-element sag.
+    pub poisson_ratio: f64,
+    /// Density the finite-element sag feels gravity with, in kg/m3: tissue less the fluid that still buoys it.
+    pub effective_density_kg_per_m3: f64,
+    /// Blood along the cavity's wall and pooled in its lowest part.
+    pub blood: bool,
+    /// An air pocket in the cavity's highest part.
+    pub air: bool,
+}
+
+impl Default for SynthSettings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            side: Side::Left,
+            resection_cc: 35.0,
+            spacing_mm: 1.0,
+            post_slice_mm: 1.0,
+            post_oblique_deg: 0.0,
+            rotation_deg: 8.0,
+            translation_mm: 10.0,
+            anatomy_mm: 3.0,
+            bias_fraction: 0.15,
+            noise_fraction: 0.02,
+            sag: SagKind::Smooth,
+            sag_mm: 5.0,
+            grey_pa: 1370.0,
+            white_pa: 990.0,
+            poisson_ratio: 0.45,
+            effective_density_kg_per_m3: 300.0,
+            blood: false,
+            air: false,
+        }
+    }
+}
+
+/// Why no patient could be made.
+#[derive(Debug, Error, PartialEq)]
+pub enum SynthError {
+    /// A setting outside of what makes sense.
+    #[error("{name} is {value}; it must lie between {low} and {high}")]
+    Setting {
+        /// The field of [`SynthSettings`].
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least allowed.
+        low: f64,
+        /// The most allowed.
+        high: f64,
+    },
+    /// The lobe is smaller than what is to be taken from it.
+    #[error(
+        "resection_cc is {wanted_cc:.1}; this patient's {side} temporal lobe has {lobe_cc:.1} cc, ask for at most 80 % of it"
+    )]
+    LobeTooSmall {
+        /// What was asked for.
+        wanted_cc: f64,
+        /// What there is.
+        lobe_cc: f64,
+        /// The side.
+        side: Side,
+    },
+    /// The simulated sag failed.
+    #[error(
+        "the finite-element sag failed: {0}; ask for a smaller effective_density_kg_per_m3 or stiffer tissue, or sag = \"smooth\""
+    )]
+    Sag(String),
+}
+
+impl SynthSettings {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// [`SynthError::Setting`] names the first field outside of its range.
+    pub fn check(&self) -> Result<(), SynthError> {
+        let ranges = [
+            ("resection_cc", self.resection_cc, 2.0, 90.0),
+            ("spacing_mm", self.spacing_mm, 0.5, 4.0),
+            ("post_slice_mm", self.post_slice_mm, self.spacing_mm, 8.0),
+            ("post_oblique_deg", self.post_oblique_deg, 0.0, 45.0),
+            ("rotation_deg", self.rotation_deg, 0.0, 15.0),
+            ("translation_mm", self.translation_mm, 0.0, 20.0),
+            ("anatomy_mm", self.anatomy_mm, 0.0, 6.0),
+            ("bias_fraction", self.bias_fraction, 0.0, 0.5),
+            ("noise_fraction", self.noise_fraction, 0.0, 0.2),
+            ("sag_mm", self.sag_mm, 0.0, 10.0),
+            ("grey_pa", self.grey_pa, 50.0, 50_000.0),
+            ("white_pa", self.white_pa, 50.0, 50_000.0),
+            ("poisson_ratio", self.poisson_ratio, 0.0, 0.4999),
+            ("effective_density_kg_per_m3", self.effective_density_kg_per_m3, 0.0, 1100.0),
+        ];
+        match ranges.into_iter().find(|&(_, value, low, high)| !(low..=high).contains(&value)) {
+            Some((name, value, low, high)) => Err(SynthError::Setting { name, value, low, high }),
+            None => Ok(()),
+        }
+    }
+}
