@@ -12,6 +12,7 @@ mod failure;
 mod man;
 mod phantom;
 mod prep;
+mod register;
 mod report;
 mod run;
 mod session;
@@ -43,6 +44,7 @@ enum Command {
     Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
+    Register(register::Args),
     Report(report::Args),
 }
 
@@ -59,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),
+        Command::Register(args) => register::run(&args, &session),
         Command::Report(args) => report::run(&args, &session),
     });
     match outcome {

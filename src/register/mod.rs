@@ -1,13 +1,17 @@
 //! Rigid (and deformable where segmentation needs it) registration.
 
+mod affine;
 mod bfgs;
 mod bspline;
+pub mod deformable;
 mod head;
 mod mutual_information;
 mod pyramid;
 mod rigid;
 mod sample;
 mod search;
+#[cfg(test)]
+mod synthetic_head;
 pub mod transform_text;
 
 pub use rigid::{

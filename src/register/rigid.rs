@@ -6,7 +6,7 @@ use super::head;
 use super::mutual_information::{Bins, Interpolated, Pose};
 use super::pyramid::reduced_to;
 use super::sample::{Draw, draw};
-use super::search::{Level, Optimum, Reach, coarse, optimise, rank};
+use super::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -392,7 +392,7 @@ fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, 
             evaluations: 60,
         };
         let Optimum { pose: found, inverse_hessian: h, evaluations: used } =
-            optimise(&level, &pose, inverse_hessian.take(), stopping);
+            optimise(&level, &pose, Freedom::Rigid, inverse_hessian.take(), stopping);
         pose = found;
         inverse_hessian = Some(h);
         evaluations += used;
@@ -415,11 +415,11 @@ fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, 
 fn refine_all(level: &Level<'_>, poses: &[Pose]) -> Vec<Pose> {
     let stopping =
         Stopping { longest_step_mm: level.spacing_mm, shortest_step_mm: 0.02 * level.spacing_mm, evaluations: 40 };
-    poses.iter().map(|p| optimise(level, p, None, stopping).pose).collect()
+    poses.iter().map(|p| optimise(level, p, Freedom::Rigid, None, stopping).pose).collect()
 }
 
 /// A mask read at the voxels of an image (nearest voxel).
-fn on_grid_of(mask: &Mask<Native>, image: &Volume<f32, Native>) -> Mask<Native> {
+pub(super) fn on_grid_of(mask: &Mask<Native>, image: &Volume<f32, Native>) -> Mask<Native> {
     let to_mask = mask.grid.voxel_from_mm() * image.grid.mm_from_voxel;
     let data = (0..image.grid.len()).map(|n| {
         let v: Vector3<f64> = Vector3::from(image.grid.voxel(n).map(|i| i as f64));
@@ -434,25 +434,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Mni, Position, Post, Pre};
     use crate::image::Grid;
+    use crate::register::synthetic_head::head_value;
     use nalgebra::{Matrix4, Point3};
-
-    /// A head of smooth and sharp parts, defined everywhere, so that it can be imaged at any pose without interpolation:
-    /// scalp, dark skull, a brain of folded tissue, and an eccentric mass that breaks the symmetry.
-    fn head_value(p: Point3<f64>) -> f64 {
-        let ellipsoid = |c: [f64; 3], r: [f64; 3]| {
-            (((p.x - c[0]) / r[0]).powi(2) + ((p.y - c[1]) / r[1]).powi(2) + ((p.z - c[2]) / r[2]).powi(2)).sqrt()
-        };
-        // A soft edge about 1.5 mm wide at radius 1 of a body about 70 mm in size.
-        let soft = |e: f64| 1.0 / (1.0 + ((e - 1.0) * 90.0).exp());
-        let scalp = soft(ellipsoid([0.0, 0.0, 0.0], [78.0, 95.0, 85.0]));
-        let skull = soft(ellipsoid([0.0, 0.0, 2.0], [72.0, 89.0, 79.0]));
-        let brain = soft(ellipsoid([0.0, -2.0, 4.0], [65.0, 81.0, 71.0]));
-        let mass = soft(ellipsoid([32.0, -25.0, 20.0], [16.0, 20.0, 14.0]));
-        let nose = soft(ellipsoid([0.0, 97.0, -30.0], [12.0, 16.0, 18.0]));
-        let folds = (p.x * 0.31).sin() * (p.y * 0.23 + 1.0).sin() * (p.z * 0.27 + p.x * 0.05).cos();
-        let tissue = 620.0 + 140.0 * (3.0 * folds).tanh() - 350.0 * mass;
-        900.0 * (scalp - skull).max(0.0) + 700.0 * nose * (1.0 - scalp) + 120.0 * skull * (1.0 - brain) + brain * tissue
-    }
 
     /// The head as a scanner with this grid sees it at this pose, with noise.
     fn scan<F: Frame>(

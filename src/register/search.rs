@@ -35,12 +35,60 @@ pub(super) struct Optimum {
     pub evaluations: usize,
 }
 
-/// The pose turned by `parameters[0..3] / radius` (axis-angle about the centre) and moved by `parameters[3..6]` mm.
-fn moved(base: &Pose, radius_mm: f64, parameters: &DVector<f64>) -> Pose {
-    let w = Vector3::new(parameters[0], parameters[1], parameters[2]) / radius_mm;
-    let t = Vector3::new(parameters[3], parameters[4], parameters[5]);
-    let turn = Rotation3::from_scaled_axis(w);
-    Pose { linear: turn.matrix() * base.linear, centre: base.centre, target: base.target + t }
+/// What the pose may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Freedom {
+    /// Turn and move: 6 parameters.
+    Rigid,
+    /// Any linear map: 12 parameters.
+    Affine,
+}
+
+impl Freedom {
+    /// The base pose after a motion. All parameters are in mm: the first three move, the others turn (axis-angle) or
+    /// deform, times the radius of the head.
+    fn moved(self, base: &Pose, radius_mm: f64, parameters: &DVector<f64>) -> Pose {
+        let target = base.target + parameters.fixed_rows::<3>(0);
+        let linear = match self {
+            Self::Rigid => *Rotation3::from_scaled_axis(parameters.fixed_rows::<3>(3) / radius_mm).matrix(),
+            Self::Affine => Matrix3::identity() + Matrix3::from_column_slice(&parameters.as_slice()[3..12]) / radius_mm,
+        };
+        Pose { linear: linear * base.linear, target, ..*base }
+    }
+
+    /// Derivative of mutual information with respect to the parameters of [`Self::moved`], from that with respect to the pose
+    /// reached.
+    fn gradient(
+        self,
+        base: &Pose,
+        radius_mm: f64,
+        parameters: &DVector<f64>,
+        at: &Pose,
+        s: &Similarity,
+    ) -> DVector<f64> {
+        let linear: Vec<f64> = match self {
+            Self::Rigid => {
+                // y = turn(w) r: the torque r x force, through the chart's Jacobian.
+                let lever = at.linear * s.moment.transpose();
+                let torque = Vector3::new(
+                    lever[(1, 2)] - lever[(2, 1)],
+                    lever[(2, 0)] - lever[(0, 2)],
+                    lever[(0, 1)] - lever[(1, 0)],
+                );
+                let w: Vector3<f64> = parameters.fixed_rows::<3>(3) / radius_mm;
+                (left_jacobian(w).transpose() * torque).as_slice().to_vec()
+            }
+            Self::Affine => (s.moment * base.linear.transpose()).as_slice().to_vec(),
+        };
+        DVector::from_iterator(3 + linear.len(), s.force.iter().copied().chain(linear.iter().map(|x| x / radius_mm)))
+    }
+
+    fn parameters(self) -> usize {
+        match self {
+            Self::Rigid => 6,
+            Self::Affine => 12,
+        }
+    }
 }
 
 /// Left Jacobian of the rotation group at the rotation vector `w`: exp(w + dw) = exp(J dw) exp(w).
@@ -55,33 +103,27 @@ fn left_jacobian(w: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// Maximises mutual information over rigid motions from a base pose.
+/// Maximises mutual information over motions from a base pose.
 pub(super) fn optimise(
     level: &Level<'_>,
     base: &Pose,
+    freedom: Freedom,
     inverse_hessian: Option<DMatrix<f64>>,
     stopping: Stopping,
 ) -> Optimum {
     let radius_mm = level.samples.radius_mm;
     let floor = 0.25 * level.at(base).known;
-    let minimum = bfgs::minimise(DVector::zeros(6), inverse_hessian, stopping, |parameters| {
-        let pose = moved(base, radius_mm, parameters);
+    let minimum = bfgs::minimise(DVector::zeros(freedom.parameters()), inverse_hessian, stopping, |parameters| {
+        let pose = freedom.moved(base, radius_mm, parameters);
         let s = similarity(&level.samples, &level.other, level.bins, &pose, true);
         if s.known < floor {
             // Sliding out of the other image is not a match.
-            return (f64::INFINITY, DVector::zeros(6));
+            return (f64::INFINITY, DVector::zeros(freedom.parameters()));
         }
-        // dy/dw of y = turn(w) r: the torque r x force, through the chart's Jacobian.
-        let lever = pose.linear * s.moment.transpose();
-        let torque =
-            Vector3::new(lever[(1, 2)] - lever[(2, 1)], lever[(2, 0)] - lever[(0, 2)], lever[(0, 1)] - lever[(1, 0)]);
-        let w = Vector3::new(parameters[0], parameters[1], parameters[2]) / radius_mm;
-        let turn = left_jacobian(w).transpose() * torque / radius_mm;
-        let gradient = [turn.x, turn.y, turn.z, s.force.x, s.force.y, s.force.z];
-        (-s.mutual_information, -DVector::from_row_slice(&gradient))
+        (-s.mutual_information, -freedom.gradient(base, radius_mm, parameters, &pose, &s))
     });
     Optimum {
-        pose: moved(base, radius_mm, &minimum.at),
+        pose: freedom.moved(base, radius_mm, &minimum.at),
         inverse_hessian: minimum.inverse_hessian,
         evaluations: minimum.evaluations,
     }
@@ -118,7 +160,8 @@ pub(super) fn coarse(level: &Level<'_>, guesses: &[Pose], reach: &Reach, keep: u
     let median = ranked[ranked.len() / 2].0;
     ranked.truncate(6 * keep);
     let stopping = Stopping { longest_step_mm: 8.0, shortest_step_mm: 0.3, evaluations: 25 };
-    let refined: Vec<Pose> = ranked.par_iter().map(|(_, pose)| optimise(level, pose, None, stopping).pose).collect();
+    let refined: Vec<Pose> =
+        ranked.par_iter().map(|(_, pose)| optimise(level, pose, Freedom::Rigid, None, stopping).pose).collect();
     let mut best: Vec<Pose> = Vec::new();
     for (_, pose) in rank(level, refined) {
         // Starts that ended in one place count once.

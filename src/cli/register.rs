@@ -1,0 +1,126 @@
+//! `hgm register MOVING FIXED -o XFM`: the rigid motion from one T1 image to another, or to the template.
+
+use super::session::read_input;
+use super::{Failure, Reject, Session};
+use crate::artefact::write_whole;
+use crate::geometry::{Frame, Native, RigidTransform};
+use crate::image::nifti::{self, NiftiImage, ReadOptions};
+use crate::image::{Mask, Volume};
+use crate::register::transform_text::{to_itk_text, to_matrix_text};
+use crate::register::{
+    FitQuality, FitWarning, RigidFit, RigidMasks, RigidSettings, register_rigid, register_to_template,
+};
+use crate::segment::atlas;
+use anyhow::{Context, anyhow};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Find the rigid motion that takes the MOVING image onto the FIXED one
+///
+/// Writes the motion twice: as a 4x4 text (RAS mm, maps a MOVING point to FIXED) and, beside it, as an ITK transform (.tfm)
+/// that other programs read.
+///
+/// Example: hgm register post.nii.gz pre.nii.gz -o from-post_to-pre.txt
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// T1 image to be moved (NIfTI)
+    pub moving: PathBuf,
+    /// T1 image that stays (NIfTI), or the word MNI for the built-in template
+    pub fixed: PathBuf,
+    /// Where to write the 4x4 text; the ITK transform gets the same name with .tfm
+    #[arg(short, long, value_name = "XFM")]
+    pub output: PathBuf,
+    /// Compare only inside this mask of the MOVING image
+    #[arg(long, value_name = "FILE")]
+    pub moving_mask: Option<PathBuf>,
+    /// Compare only inside this mask of the FIXED image
+    #[arg(long, value_name = "FILE")]
+    pub fixed_mask: Option<PathBuf>,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Summary {
+    transform: PathBuf,
+    itk_transform: PathBuf,
+    quality: FitQuality,
+    warnings: Vec<String>,
+}
+
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut settings: RigidSettings = session.settings("register")?;
+    if let Some(seed) = session.options.seed {
+        settings.seed = seed;
+    }
+    let text_path = match args.output.extension() {
+        Some(e) if e == "tfm" => args.output.with_extension("txt"),
+        Some(_) => args.output.clone(),
+        None => args.output.with_extension("txt"),
+    };
+    let itk_path = text_path.with_extension("tfm");
+    if args.output.is_dir() {
+        return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", args.output.display())));
+    }
+    let mut warnings = Vec::new();
+    let (moving, moving_bytes) = image(&args.moving, &mut warnings)?;
+    let moving_mask = args.moving_mask.as_deref().map(|path| mask(path, &moving, &mut warnings)).transpose()?;
+    let names = || format!("{} onto {}", args.moving.display(), args.fixed.display());
+
+    let to_template = args.fixed.as_os_str().eq_ignore_ascii_case("mni") && !args.fixed.exists();
+    let (found, quality, doubts) = if to_template {
+        if args.fixed_mask.is_some() || args.moving_mask.is_some() {
+            return Err(Failure::Rejected(anyhow!(
+                "masks do not go with MNI: the template's own brain is used; leave them out"
+            )));
+        }
+        parts(register_to_template(&moving, &atlas::template().t1_f32(), &settings).with_context(names).reject()?)
+    } else {
+        let (fixed, fixed_bytes) = image(&args.fixed, &mut warnings)?;
+        if fixed_bytes == moving_bytes {
+            warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
+        }
+        let fixed_mask = args.fixed_mask.as_deref().map(|path| mask(path, &fixed, &mut warnings)).transpose()?;
+        let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
+        parts(register_rigid(&moving, &fixed, masks, &settings).with_context(names).reject()?)
+    };
+
+    let refused = doubts.iter().find(|w| matches!(w, FitWarning::LowSimilarity { .. })).cloned();
+    warnings.extend(doubts.iter().map(ToString::to_string));
+    write_whole(&text_path, to_matrix_text(&found).as_bytes())?;
+    write_whole(&itk_path, to_itk_text(&found).as_bytes())?;
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
+    let shown = format!("{}\n{}", text_path.display(), itk_path.display());
+    session.emit(&Summary { transform: text_path, itk_transform: itk_path, quality, warnings }, &shown)?;
+    refused.map_or(Ok(()), |doubt| Err(Failure::QualityGate(anyhow!(doubt))))
+}
+
+/// The fit without its frames: on the command line an image is what it is.
+fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Native>, FitQuality, Vec<FitWarning>) {
+    (fit.fixed_from_moving.relabelled(), fit.quality, fit.warnings)
+}
+
+fn image(path: &Path, warnings: &mut Vec<String>) -> Result<(Volume<f32, Native>, Vec<u8>), Failure> {
+    let bytes = read_input(path)?;
+    let name = path.display().to_string();
+    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &ReadOptions::default()).reject()?;
+    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    Ok((volume, bytes))
+}
+
+fn mask(path: &Path, image: &Volume<f32, Native>, warnings: &mut Vec<String>) -> Result<Mask<Native>, Failure> {
+    let bytes = read_input(path)?;
+    let name = path.display().to_string();
+    let (mask, odd) = nifti::decode_mask(&bytes, &name, &ReadOptions::default()).reject()?;
+    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    if !mask.grid.coincides(&image.grid, 1e-2) {
+        let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
+        return Err(Failure::Rejected(anyhow!(
+            "{name}: the mask's grid ({}) is not its image's ({}) or lies elsewhere: resample the mask onto the image first",
+            dims(mask.grid.dims),
+            dims(image.grid.dims)
+        )));
+    }
+    Ok(mask)
+}

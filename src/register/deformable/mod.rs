@@ -1,0 +1,374 @@
+//! Deformable registration of a template to a head that lies rigidly aligned with it.
+
+mod field;
+mod force;
+mod velocity;
+
+pub use field::DisplacementField;
+
+use super::affine;
+use super::pyramid::reduced_to;
+use super::rigid::on_grid_of;
+use crate::geometry::{Frame, Native, Position};
+use crate::image::{Mask, Volume, morphology};
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+use velocity::{Cell, VectorField};
+
+/// Beyond this distance from the atlas's brain nothing of the head is looked at.
+const WIDE_MM: f64 = 6.0;
+
+/// How the atlas is deformed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DeformableSettings {
+    /// Resolutions in mm, coarse to fine.
+    pub levels_mm: Vec<f64>,
+    /// Most iterations at each resolution.
+    pub iterations: Vec<usize>,
+    /// Smoothing of each update, in voxels of the level (a fluid).
+    pub update_sigma_voxels: f64,
+    /// Smoothing of the velocity after each update, in voxels of the level (an elastic body).
+    pub velocity_sigma_voxels: f64,
+    /// The images are compared over the atlas's brain widened by this much.
+    pub margin_mm: f64,
+    /// A level ends when five iterations have raised the mean local correlation by less than this.
+    pub least_gain: f64,
+}
+
+impl Default for DeformableSettings {
+    fn default() -> Self {
+        Self {
+            levels_mm: vec![8.0, 4.0, 2.0],
+            iterations: vec![40, 40, 20],
+            update_sigma_voxels: 1.5,
+            velocity_sigma_voxels: 0.5,
+            margin_mm: 4.0,
+            least_gain: 2e-3,
+        }
+    }
+}
+
+/// A deformation from atlas to subject with its inverse. Both fields are in mm, in the frame the images share.
+#[derive(Clone, Debug)]
+pub struct AtlasFit<F: Frame> {
+    /// Where in the atlas a subject point lies: reads atlas maps onto the subject.
+    pub atlas_from_subject: DisplacementField<F>,
+    /// Where in the subject an atlas point lies: carries landmarks.
+    pub subject_from_atlas: DisplacementField<F>,
+    /// Figures of the fit.
+    pub quality: DeformableQuality,
+}
+
+/// Figures of a deformable fit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeformableQuality {
+    /// Mean local correlation over the brain after the affine fit, and at the end.
+    pub correlation: [f64; 2],
+    /// Smallest Jacobian determinant of the map from atlas to subject over the brain; positive means no fold.
+    pub smallest_jacobian: f64,
+    /// Largest Jacobian determinant.
+    pub largest_jacobian: f64,
+    /// Largest distance in mm between a brain point and itself after a round trip.
+    pub round_trip_mm: f64,
+    /// Iterations done at each level.
+    pub iterations: Vec<usize>,
+}
+
+/// Why an atlas could not be fitted.
+#[derive(Debug, Error, PartialEq)]
+pub enum DeformableError {
+    /// The atlas is zero everywhere.
+    #[error("the atlas has no voxel above zero: give a skull-stripped template")]
+    EmptyAtlas,
+    /// Too little is known.
+    #[error(
+        "only {:.0} % of the atlas's brain lies in known parts of the image: the field of view or the mask leaves too little to fit", known * 100.0
+    )]
+    TooLittleKnown {
+        /// Fraction known.
+        known: f64,
+    },
+    /// A setting has no meaning.
+    #[error("the deformable registration setting `{name}` is {value}: it must be {rule}")]
+    Setting {
+        /// The setting's name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+}
+
+/// Deforms a skull-stripped atlas onto a head with its skull.
+///
+/// `subject` and `atlas` share a frame: the subject has been brought to the atlas by a rigid registration. Voxels of
+/// `left_out` (on any grid in that frame), such as a cavity, and voxels that are not finite say nothing; the map there
+/// follows its surroundings. First an affine fit by mutual information, then a stationary velocity field driven by local
+/// correlation over the atlas's brain and a narrow rim, coarse to fine. The skull is never compared with the atlas's empty
+/// outside beyond that rim.
+///
+/// # Errors
+/// [`DeformableError`] when there is nothing to fit or a setting is out of range.
+pub fn fit_atlas<F: Frame>(
+    subject: &Volume<f32, F>,
+    atlas: &Volume<f32, F>,
+    left_out: Option<&Mask<F>>,
+    settings: &DeformableSettings,
+) -> Result<AtlasFit<F>, DeformableError> {
+    check_settings(settings)?;
+    let brain = atlas.map(|x| x > 0.0);
+    let brain_box = brain.bounding_box().ok_or(DeformableError::EmptyAtlas)?;
+    // Room for the rim and for the velocity to fade.
+    let around = brain_box.grown(&atlas.grid, 12.0);
+    let region: Mask<Native> = morphology::dilate(&brain, settings.margin_mm).cropped(&around).relabelled();
+    let wide: Mask<Native> = morphology::dilate(&brain, WIDE_MM).cropped(&around).relabelled();
+    let atlas: Volume<f32, Native> = atlas.cropped(&around).relabelled();
+    let brain: Mask<Native> = brain.cropped(&around).relabelled();
+
+    let subject: Volume<f32, Native> = subject.clone().relabelled();
+    let left_out = left_out.map(|m| on_grid_of(&m.clone().relabelled(), &subject));
+    let is_known = |n: usize| subject.data[n].is_finite() && left_out.as_ref().is_none_or(|m| !m.data[n]);
+    let known: Mask<Native> = Volume::from_data(subject.grid, (0..subject.data.len()).map(is_known).collect());
+    let subject = subject.map(|x| if x.is_finite() { x } else { 0.0 });
+
+    let pose = affine::head_from_template(&atlas, &wide, &subject, Some(&known));
+    let shift = pose.target - pose.linear * pose.centre;
+
+    let mut velocity: Option<VectorField> = None;
+    let finest_mm = settings.levels_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let near_subject = reduced_to(&subject, finest_mm);
+    let mut quality = DeformableQuality {
+        correlation: [0.0; 2],
+        smallest_jacobian: 0.0,
+        largest_jacobian: 0.0,
+        round_trip_mm: 0.0,
+        iterations: Vec::new(),
+    };
+    for (level, (&spacing_mm, &iterations)) in settings.levels_mm.iter().zip(&settings.iterations).enumerate() {
+        let fixed = reduced_to(&atlas, spacing_mm);
+        let near = near_brain(&near_subject, &wide, velocity.as_ref(), &pose.linear, &shift);
+        let moving = reduced_to(&near, spacing_mm);
+        let inside = on_grid_of(&region, &fixed);
+        let grid = fixed.grid;
+        let mut v = velocity.take().map_or_else(|| VectorField::zeros(&grid), |v| v.on(&grid));
+
+        // Level voxel -> affine -> subject voxel, as a linear map on (voxel + displacement).
+        let mut head_from_atlas = pose.linear.to_homogeneous();
+        head_from_atlas.fixed_view_mut::<3, 1>(0, 3).copy_from(&shift);
+        let to_moving = moving.grid.voxel_from_mm() * head_from_atlas * grid.mm_from_voxel;
+        let to_known = known.grid.voxel_from_mm() * head_from_atlas * grid.mm_from_voxel;
+        let noise = noise_of(&fixed, &moving, &inside);
+
+        let mut course: Vec<f64> = Vec::new();
+        for iteration in 0..=iterations {
+            let displacement = v.exponential(0.8);
+            let seen: Vec<(f32, f32)> = (0..grid.len())
+                .into_par_iter()
+                .map(|n| {
+                    if !inside.data[n] {
+                        return (0.0, 0.0);
+                    }
+                    let x = grid.voxel(n);
+                    let p: Point3<f64> =
+                        Point3::from([0, 1, 2].map(|a| x[a] as f64 + f64::from(displacement.components[a][n])));
+                    let k = to_known.transform_point(&p);
+                    if !known.get(k.x.round() as isize, k.y.round() as isize, k.z.round() as isize).unwrap_or(false) {
+                        return (0.0, 0.0);
+                    }
+                    let m = to_moving.transform_point(&p);
+                    (Cell::at(moving.grid.dims, [m.x as f32, m.y as f32, m.z as f32]).of(&moving.data), 1.0)
+                })
+                .collect();
+            let (warped, weight): (Vec<f32>, Vec<f32>) = seen.into_iter().unzip();
+            if level == 0 && iteration == 0 {
+                let both = weight.iter().filter(|&&w| w > 0.0).count();
+                let known = both as f64 / inside.count().max(1) as f64;
+                if known < 0.3 {
+                    return Err(DeformableError::TooLittleKnown { known });
+                }
+            }
+            let (update, correlation) = force::force(&grid, &fixed.data, &warped, &weight, noise);
+            quality.correlation[1] = correlation;
+            if level == 0 && iteration == 0 {
+                quality.correlation[0] = correlation;
+            }
+            course.push(correlation);
+            let stalled = iteration >= 5 && correlation < course[iteration - 5] + settings.least_gain;
+            if iteration == iterations || stalled {
+                break;
+            }
+            let update = update.smoothed(settings.update_sigma_voxels * spacing_mm);
+            v.add(&update);
+            v = v.smoothed(settings.velocity_sigma_voxels * spacing_mm);
+        }
+        quality.iterations.push(course.len().saturating_sub(1));
+        velocity = Some(v);
+    }
+
+    let v = velocity.unwrap_or_else(|| VectorField::zeros(&atlas.grid));
+    let forward = v.exponential(0.1);
+    let backward = v.scaled(-1.0).exponential(0.1);
+    let subject_from_atlas = DisplacementField::<F>::after_flow(&forward, &pose.linear, &shift);
+    let atlas_from_subject = DisplacementField::<F>::before_flow(&backward, &pose.linear, &shift);
+    let brain = on_grid_of(&brain, &Volume::filled(forward.grid, 0f32));
+    let range = subject_from_atlas.jacobian_range(&brain);
+    (quality.smallest_jacobian, quality.largest_jacobian) = range;
+    quality.round_trip_mm = (0..brain.data.len())
+        .into_par_iter()
+        .filter(|&n| brain.data[n])
+        .map(|n| {
+            let x: Position<F> =
+                Position::from_point(brain.grid.position(Point3::from(brain.grid.voxel(n).map(|i| i as f64))).mm);
+            atlas_from_subject.apply(subject_from_atlas.apply(x)).distance_mm(&x)
+        })
+        .reduce(|| 0.0, f64::max);
+    Ok(AtlasFit { atlas_from_subject, subject_from_atlas, quality })
+}
+
+/// The subject with everything zero that does not lie in the template's region under the present map: the scalp would
+/// otherwise blur into the brain's rim at coarse levels, where the atlas has nothing.
+fn near_brain(
+    subject: &Volume<f32, Native>,
+    region: &Mask<Native>,
+    velocity: Option<&VectorField>,
+    linear: &Matrix3<f64>,
+    shift_mm: &Vector3<f64>,
+) -> Volume<f32, Native> {
+    let still = VectorField::zeros(&region.grid);
+    let inverse = velocity.map_or(still, |v| v.clone().scaled(-1.0).exponential(0.8));
+    let atlas_from_subject = DisplacementField::<Native>::before_flow(&inverse, linear, shift_mm);
+    let mut out = subject.clone();
+    let grid = subject.grid;
+    out.data.par_iter_mut().enumerate().for_each(|(n, x)| {
+        let p = grid.position(Point3::from(grid.voxel(n).map(|i| i as f64)));
+        if !region.nearest(atlas_from_subject.apply(p)).unwrap_or(false) {
+            *x = 0.0;
+        }
+    });
+    out
+}
+
+fn check_settings(s: &DeformableSettings) -> Result<(), DeformableError> {
+    let refuse = |name, value, rule| Err(DeformableError::Setting { name, value, rule });
+    if s.levels_mm.is_empty() || s.levels_mm.iter().any(|&l| !(0.5..=16.0).contains(&l)) {
+        return refuse("levels_mm", s.levels_mm.first().copied().unwrap_or(0.0), "one or more of 0.5 to 16 mm");
+    }
+    if s.iterations.len() != s.levels_mm.len() {
+        return refuse("iterations", s.iterations.len() as f64, "one number for each of levels_mm");
+    }
+    if !(0.5..=5.0).contains(&s.update_sigma_voxels) {
+        return refuse("update_sigma_voxels", s.update_sigma_voxels, "0.5 to 5 voxels");
+    }
+    if !(0.0..=5.0).contains(&s.velocity_sigma_voxels) {
+        return refuse("velocity_sigma_voxels", s.velocity_sigma_voxels, "0 to 5 voxels");
+    }
+    if !(0.0..=20.0).contains(&s.margin_mm) {
+        return refuse("margin_mm", s.margin_mm, "0 to 20 mm");
+    }
+    if !(0.0..=1.0).contains(&s.least_gain) {
+        return refuse("least_gain", s.least_gain, "0 to 1");
+    }
+    Ok(())
+}
+
+/// Contrast below which a window is taken for noise: 3 % of each image's range over the brain.
+fn noise_of(fixed: &Volume<f32, Native>, moving: &Volume<f32, Native>, inside: &Mask<Native>) -> [f32; 2] {
+    let span = |image: &Volume<f32, Native>| {
+        let [low, high] = super::head::range_inside(image, inside);
+        0.03 * (high - low)
+    };
+    [span(fixed), span(moving)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mni;
+    use crate::image::Grid;
+    use crate::register::synthetic_head::{brain_value, head_value};
+
+    /// Where in the atlas a subject point lies: a head 6 % larger with a local bulge of up to 5 mm.
+    fn truth(p: Point3<f64>) -> Point3<f64> {
+        let q = Point3::from(p.coords / 1.06 + Vector3::new(1.0, -2.0, 1.5));
+        let bulge = (-(q - Point3::new(-20.0, 10.0, 25.0)).norm_squared() / 700.0).exp();
+        q + Vector3::new(-5.0, 3.0, 2.0) * bulge
+    }
+
+    fn imaged(grid: &Grid<Mni>, value: impl Fn(Point3<f64>) -> f64) -> Volume<f32, Mni> {
+        let data =
+            (0..grid.len()).map(|n| value(grid.position(Point3::from(grid.voxel(n).map(|i| i as f64))).mm) as f32);
+        Volume::from_data(*grid, data.collect())
+    }
+
+    fn atlas_and_subject() -> (Volume<f32, Mni>, Volume<f32, Mni>) {
+        let grid = Grid::axis_aligned([84, 104, 92], [2.0; 3], [-83.0, -103.0, -91.0]);
+        let atlas = imaged(&grid, |p| if brain_value(p) < 30.0 { 0.0 } else { brain_value(p) });
+        let subject = imaged(&grid, |p| (1.0 + 0.002 * p.x) * (1.3 * head_value(truth(p)) + 20.0));
+        (atlas, subject)
+    }
+
+    fn mean_error_mm(atlas: &Volume<f32, Mni>, fit: &AtlasFit<Mni>, skip: impl Fn(Point3<f64>) -> bool) -> f64 {
+        let errors = (0..atlas.grid.len()).step_by(11).filter_map(|n| {
+            let p = atlas.grid.position(Point3::from(atlas.grid.voxel(n).map(|i| i as f64)));
+            let goal = truth(p.mm);
+            let inside = brain_value(goal) > 100.0 && !skip(p.mm);
+            inside.then(|| (fit.atlas_from_subject.apply(p).mm - goal).norm())
+        });
+        let (sum, count) = errors.fold((0.0, 0.0), |(s, c), e| (s + e, c + 1.0));
+        sum / count
+    }
+
+    #[test]
+    fn slow_a_larger_bulging_head_is_found_through_its_skull_and_around_a_cavity() {
+        let (atlas, mut subject) = atlas_and_subject();
+        let settings = DeformableSettings::default();
+        let fit = fit_atlas(&subject, &atlas, None, &settings).unwrap();
+        let error = mean_error_mm(&atlas, &fit, |_| false);
+        let q = &fit.quality;
+        assert!(error < 0.7, "{error} mm {q:?}");
+        assert!(q.smallest_jacobian > 0.2 && q.round_trip_mm < 0.5, "{q:?}");
+
+        // A hole of 40 cc full of something bright, left out by a mask, hardly changes the map around it.
+        let hole = |p: Point3<f64>| (p - Point3::new(35.0, 20.0, -20.0)).norm() < 21.0;
+        let left_out = imaged(&subject.grid, |p| f64::from(u8::from(hole(p)))).map(|x| x > 0.5);
+        for (x, _) in subject.data.iter_mut().zip(&left_out.data).filter(|(_, out)| **out) {
+            *x = 1500.0;
+        }
+        let around = fit_atlas(&subject, &atlas, Some(&left_out), &settings).unwrap();
+        let error = mean_error_mm(&atlas, &around, hole);
+        assert!(error < 0.8, "{error} mm {:?}", around.quality);
+    }
+
+    #[test]
+    fn the_map_does_not_depend_on_the_number_of_threads() {
+        let (atlas, subject) = atlas_and_subject();
+        let settings =
+            DeformableSettings { levels_mm: vec![8.0, 4.0], iterations: vec![6, 4], ..DeformableSettings::default() };
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| fit_atlas(&subject, &atlas, None, &settings)).unwrap()
+        };
+        let (one, three) = (on(1), on(3));
+        assert_eq!(one.quality, three.quality);
+        let p = Position::<Mni>::new(-20.0, 10.0, 25.0);
+        assert_eq!(one.atlas_from_subject.apply(p), three.atlas_from_subject.apply(p));
+    }
+
+    #[test]
+    fn an_empty_atlas_a_blind_mask_and_wrong_settings_are_refused() {
+        let grid = Grid::<Mni>::axis_aligned([24; 3], [4.0; 3], [-46.0; 3]);
+        let flat = Volume::filled(grid, 0f32);
+        let ball = imaged(&grid, |p| if p.coords.norm() < 30.0 { 100.0 + p.x } else { 0.0 });
+        let usual = DeformableSettings::default();
+        assert_eq!(fit_atlas(&ball, &flat, None, &usual).unwrap_err(), DeformableError::EmptyAtlas);
+        let all = Volume::filled(grid, true);
+        let blind = fit_atlas(&ball, &ball, Some(&all), &usual).unwrap_err();
+        assert!(matches!(blind, DeformableError::TooLittleKnown { .. }), "{blind}");
+        let wrong = DeformableSettings { iterations: vec![1], ..usual };
+        assert!(fit_atlas(&ball, &ball, None, &wrong).unwrap_err().to_string().contains("`iterations` is 1"));
+    }
+}
