@@ -2,6 +2,7 @@
 
 mod damaged_files;
 mod fem;
+mod job;
 mod mesh_files;
 mod nifti_guard;
 mod pipelines;

@@ -1,0 +1,138 @@
+//! The whole job from the command line: exit codes, messages, resume, the same bytes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// The optimised program where the test runner names one, else the one built with the tests.
+fn hgm() -> Command {
+    Command::new(std::env::var_os("HGM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_hgm").into()))
+}
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("sample-data").join(name)
+}
+
+fn output(arguments: &[&str]) -> Output {
+    hgm().args(arguments).output().unwrap()
+}
+
+/// Every file below a folder by its relative name.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().display().to_string();
+                found.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn start(case: &Path, threads: &str) -> Child {
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let mut command = hgm();
+    command.args(["run", pre.to_str().unwrap(), post.to_str().unwrap(), "-o", case.to_str().unwrap()]);
+    command.args(["--mesher", "lattice", "--cells", "8000", "--threads", threads]);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// Kills the job as soon as this file is there.
+fn kill_when_there(mut job: Child, file: &Path) {
+    let begin = Instant::now();
+    while !file.exists() {
+        assert!(begin.elapsed() < Duration::from_secs(600), "{} never came", file.display());
+        assert!(job.try_wait().unwrap().is_none(), "the job ended before {}", file.display());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    job.kill().unwrap();
+    job.wait().unwrap();
+}
+
+#[test]
+fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    assert!(start(&whole, "2").wait().unwrap().success());
+    kill_when_there(start(&broken, "1"), &broken.join("anat/pre_space-MNI_T1w.nii.gz"));
+    kill_when_there(start(&broken, "1"), &broken.join("sim/sample-02.vtu"));
+    let kept = std::fs::metadata(broken.join("mesh/rest.vtu")).unwrap().modified().unwrap();
+    assert!(start(&broken, "1").wait().unwrap().success());
+    let again = std::fs::metadata(broken.join("mesh/rest.vtu")).unwrap().modified().unwrap();
+    assert_eq!(kept, again, "a finished stage is skipped");
+
+    let (whole, broken) = (contents(&whole), contents(&broken));
+    assert_eq!(whole.keys().collect::<Vec<_>>(), broken.keys().collect::<Vec<_>>());
+    for (name, bytes) in &whole {
+        assert!(!name.ends_with(".part"), "{name} was left half-written");
+        assert!(*bytes == broken[name], "{name} differs");
+    }
+    let page = String::from_utf8(whole["report.html"].clone()).unwrap();
+    assert!(page.len() < 10_000_000 && page.contains("not a medical device"));
+    assert!(!page.contains(folder.path().to_str().unwrap()), "no path in the page");
+}
+
+#[test]
+fn slow_the_phantom_finds_the_sample_nearest_to_what_went_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("phantom");
+    let arguments = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "--json", "-o"];
+    let output = output(&[arguments.as_slice(), &[out.to_str().unwrap()]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let outcome: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let samples = outcome["samples"].as_array().unwrap();
+    let rmse = |n: usize| samples[n]["rmse_mm"]["all"].as_f64().unwrap();
+    let modulus = |n: usize| samples[n]["shear_modulus_pa"]["brain"].as_f64().unwrap();
+    let nearest =
+        (0..9).min_by(|&a, &b| (modulus(a) / 333.28).ln().abs().total_cmp(&(modulus(b) / 333.28).ln().abs())).unwrap();
+    assert_eq!(outcome["best_sample"], samples[nearest]["id"]);
+    assert!(rmse(nearest) < rmse(nearest - 1) && rmse(nearest) < rmse(nearest + 1));
+    assert!(rmse(9) < 1e-4, "the reference's own modulus leaves {} mm", rmse(9));
+}
+
+#[test]
+fn a_scan_that_cannot_be_used_ends_with_3_names_the_file_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let good = std::fs::read(sample("pre.nii.gz")).unwrap();
+    let mut flipped = good.clone();
+    flipped[good.len() / 2] ^= 1;
+    let files: [(&str, Vec<u8>); 4] = [
+        ("truncated.nii.gz", good[..good.len() / 3].to_vec()),
+        ("flipped.nii.gz", flipped),
+        ("text.nii", b"not an image".to_vec()),
+        ("same.nii.gz", good.clone()),
+    ];
+    let pre = sample("pre.nii.gz").to_str().unwrap().to_owned();
+    for (name, bytes) in &files {
+        std::fs::write(path(name), bytes).unwrap();
+        let result = output(&["run", &pre, &path(name), "-o", &path("case")]);
+        let message = String::from_utf8_lossy(&result.stderr).into_owned();
+        assert_eq!(result.status.code(), Some(3), "{name}: {message}");
+        assert!(message.contains(name), "{message}");
+        assert!(!folder.path().join("case").exists(), "{name}: something was written");
+    }
+    let missing = output(&["run", &pre, &path("nowhere.nii.gz"), "-o", &path("case")]);
+    assert_eq!(missing.status.code(), Some(3));
+}
+
+#[test]
+fn wrong_settings_and_options_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("settings.toml");
+    std::fs::write(&config, "[phantom]\nforse = 3\n").unwrap();
+    let out = folder.path().join("out");
+    let result = output(&["--config", config.to_str().unwrap(), "phantom", "-o", out.to_str().unwrap()]);
+    let message = String::from_utf8_lossy(&result.stderr).into_owned();
+    assert_eq!(result.status.code(), Some(3), "{message}");
+    assert!(message.contains("forse") && message.contains("[phantom]"), "{message}");
+    assert_eq!(output(&["phantom", "--tissues", "3"]).status.code(), Some(2));
+    assert_eq!(output(&["doctor", "--threads", "0"]).status.code(), Some(3));
+}
