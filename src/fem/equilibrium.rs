@@ -158,6 +158,7 @@ impl Model {
             there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
         let rhs = self.free_part(&difference);
         let mut answer = vec![[0.0; 3]; rhs.len()];
+        solver.prepare(&tangent);
         solver.solve(&tangent, &rhs, &mut answer, 1e-3);
         let mut predicted = u.to_vec();
         self.add_free(&mut predicted, 1.0, &answer);
@@ -220,10 +221,12 @@ impl Model {
             let forcing = forcing_term(size, last_size, last_forcing, settings.relative_residual / relative);
             (last_size, last_forcing) = (size, forcing);
             let mut step = vec![[0.0; 3]; rhs.len()];
+            solver.prepare(&tangent);
             let mut report = solver.solve(&tangent, &rhs, &mut step, forcing);
             if report.negative_curvature && !project {
                 // Not a minimum's neighbourhood: with projected elements the step certainly goes down.
                 tangent = self.tangent(u, laws, forces, true);
+                solver.prepare(&tangent);
                 let again = solver.solve(&tangent, &rhs, &mut step, forcing);
                 report = LinearReport { iterations: report.iterations + again.iterations, ..again };
                 project = true;

@@ -35,6 +35,17 @@ pub enum FemError {
     Setting { key: String, value: f64, rule: &'static str },
     #[error("part of the mesh ({nodes} nodes, among them node {node}) is held nowhere: fix a set there or remove it")]
     Loose { nodes: usize, node: usize },
+    #[error("the displacement to start from has {found} nodes, the mesh {nodes}: take one from a run on the same mesh")]
+    StartLength { found: usize, nodes: usize },
+    #[error("the displacement to start from is not a finite number at node {node}: leave it out and start from rest")]
+    StartNotFinite { node: usize },
+    #[error("there is no {what} to differentiate by: name a material of the scenario and a parameter of its law")]
+    NoParameter { what: String },
+    #[error(
+        "the tangent at this state is not positive definite: sensitivities exist at a stable equilibrium only; \
+         solve with the same materials first"
+    )]
+    UnstableState,
     #[error(
         "no equilibrium beyond {percent:.1} % of the load: {reason}; the worst element is cell {cell} \
          (volume ratio {jacobian:.3}). Lower the load, raise the shear modulus or repair the mesh there"

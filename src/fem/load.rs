@@ -4,6 +4,7 @@ use super::scenario::{CsfLevel, Loads};
 use super::units::{METRES_PER_MM, metres};
 use super::{FemError, element::cross};
 use crate::mesh::TetMesh;
+use serde::{Deserialize, Serialize};
 
 /// The nodes that loads are shared among: the corners, or corners and mid-edge nodes of quadratic tetrahedra.
 pub(super) struct Sharing<'a> {
@@ -107,12 +108,33 @@ fn size(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// All loads as forces on the nodes, N.
-pub(super) fn nodal_forces_n(sharing: &Sharing, loads: &Loads) -> Result<Vec<[f64; 3]>, FemError> {
+/// One of a scenario's loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Load {
+    /// The weight, less what the fluid carries.
+    Weight,
+    /// `loads.patch[n]`.
+    Patch(usize),
+    /// `loads.pressure[n]`.
+    Pressure(usize),
+}
+
+/// A load with its forces on the nodes, N.
+pub(super) type NodalForces = (Load, Vec<[f64; 3]>);
+
+/// Every load as forces on the nodes.
+pub(super) fn nodal_forces_n(sharing: &Sharing, loads: &Loads) -> Result<Vec<NodalForces>, FemError> {
     let mesh = sharing.mesh;
-    let mut forces = vec![[0.0; 3]; sharing.nodes()];
-    add_weight_n(sharing, loads, &mut forces);
-    for patch in &loads.patch {
+    let none = || vec![[0.0; 3]; sharing.nodes()];
+    let mut parts = Vec::new();
+    if loads.gravity_m_per_s2 != [0.0; 3] {
+        let mut forces = none();
+        add_weight_n(sharing, loads, &mut forces);
+        parts.push((Load::Weight, forces));
+    }
+    for (n, patch) in loads.patch.iter().enumerate() {
+        let mut forces = none();
         let facets = facets_of(mesh, &patch.set)?;
         let areas: Vec<f64> = facets.iter().map(|&f| size(area_m2(mesh, f))).collect();
         let whole: f64 = areas.iter().sum();
@@ -121,14 +143,17 @@ pub(super) fn nodal_forces_n(sharing: &Sharing, loads: &Loads) -> Result<Vec<[f6
                 (0..3).for_each(|i| forces[n as usize][i] += patch.force_n[i] * area / (3.0 * whole));
             }
         }
+        parts.push((Load::Patch(n), forces));
     }
-    for pressure in &loads.pressure {
+    for (n, pressure) in loads.pressure.iter().enumerate() {
+        let mut forces = none();
         for facet in facets_of(mesh, &pressure.set)? {
             let area = area_m2(mesh, facet);
             for n in sharing.of_facet(facet) {
                 (0..3).for_each(|i| forces[n as usize][i] -= pressure.pressure_pa * area[i] / 3.0);
             }
         }
+        parts.push((Load::Pressure(n), forces));
     }
-    Ok(forces)
+    Ok(parts)
 }

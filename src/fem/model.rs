@@ -5,12 +5,12 @@ use super::element::{
     At, Dilation, ElementKind, Elements, Kernel, NodalPressure, Partition, tet4, tet10, with_mid_edge_nodes,
 };
 use super::linear::Tangent;
-use super::load::{Sharing, nodal_forces_n};
+use super::load::{NodalForces, Sharing, nodal_forces_n};
 use super::order::{Graph, reverse_cuthill_mckee};
 use super::scenario::Scenario;
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
-use super::{FemError, Outcome};
+use super::{FemError, Outcome, State};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use std::collections::BTreeMap;
@@ -33,8 +33,10 @@ pub struct Model {
     pub(super) held_components: Option<Vec<[bool; 3]>>,
     /// Nodes that are moved: components and displacement, m.
     pub(super) prescribed: Vec<(u32, [bool; 3], [f64; 3])>,
-    /// Loads in solver numbering, N.
+    /// All loads together in solver numbering, N.
     pub(super) load_n: Vec<[f64; 3]>,
+    /// Each load on its own in solver numbering, N.
+    pub(super) load_parts: Vec<NodalForces>,
     /// Undeformed nodes in solver numbering, m.
     pub(super) nodes_m: Vec<[f64; 3]>,
     /// Material names in the order the elements count them.
@@ -42,6 +44,8 @@ pub struct Model {
     /// Solver number of every node of the mesh (mid-edge nodes behind them).
     number: Vec<u32>,
     corners: usize,
+    /// Ends of the mid-edge nodes, in mesh numbering.
+    edges: Vec<[u32; 2]>,
     warnings: Vec<String>,
 }
 
@@ -241,7 +245,7 @@ impl Model {
         }
 
         let sharing = Sharing { mesh, quadratic: quadratic.as_ref().map(|(tets, edges)| (&tets[..], &edges[..])) };
-        let load = nodal_forces_n(&sharing, &scenario.loads)?;
+        let loads = nodal_forces_n(&sharing, &scenario.loads)?;
 
         let graph = match &quadratic {
             Some((tets, _)) => Graph::of_elements(nodes, tets),
@@ -282,7 +286,16 @@ impl Model {
             }
         };
         let nodes_m: Vec<[f64; 3]> = order.iter().map(|&old| position(old)).collect();
-        let load_n = order.iter().map(|&old| load[old as usize]).collect();
+        let mut load_n = vec![[0.0; 3]; nodes];
+        let load_parts: Vec<NodalForces> = loads
+            .into_iter()
+            .map(|(load, forces)| (load, order.iter().map(|&old| forces[old as usize]).collect()))
+            .collect();
+        for (_, forces) in &load_parts {
+            for (sum, force) in load_n.iter_mut().zip(forces) {
+                (0..3).for_each(|i| sum[i] += force[i]);
+            }
+        }
         let pattern = Arc::new(BlockPattern::new(&renumbered(&graph, &order, &number), &row_of));
 
         let body = match &quadratic {
@@ -327,6 +340,8 @@ impl Model {
             held_components,
             prescribed,
             load_n,
+            load_parts,
+            edges: edges.to_vec(),
             nodes_m,
             names,
             number,
@@ -340,8 +355,36 @@ impl Model {
         self.node_of_row.len()
     }
 
+    /// A displacement of the mesh's nodes (mm) as a state to start from.
+    ///
+    /// # Errors
+    /// [`FemError::StartLength`] and [`FemError::StartNotFinite`].
+    pub fn state(&self, displacement_mm: &[[f64; 3]]) -> Result<State, FemError> {
+        let (found, nodes) = (displacement_mm.len(), self.corners);
+        if found != nodes {
+            return Err(FemError::StartLength { found, nodes });
+        }
+        if let Some(node) = displacement_mm.iter().position(|u| u.iter().any(|v| !v.is_finite())) {
+            return Err(FemError::StartNotFinite { node });
+        }
+        let mut u = vec![[0.0; 3]; self.nodes_m.len()];
+        for (mm, &new) in displacement_mm.iter().zip(&self.number) {
+            u[new as usize] = metres(*mm);
+        }
+        for (&[a, b], &new) in self.edges.iter().zip(&self.number[self.corners..]) {
+            let [a, b] = [a, b].map(|n| metres(displacement_mm[n as usize]));
+            u[new as usize] = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
+        }
+        Ok(State { u })
+    }
+
     pub(super) fn laws(&self, materials: &Materials) -> Result<Laws, FemError> {
         check_materials(materials)?;
+        self.unchecked_laws(materials)
+    }
+
+    /// Laws of materials that may break the rules for files, as steps of differences do.
+    pub(super) fn unchecked_laws(&self, materials: &Materials) -> Result<Laws, FemError> {
         let missing = |name: &String| {
             let label = self.scenario.label_number(name).unwrap_or(0);
             FemError::NoMaterial { cell: 0, label, name: name.clone() }
@@ -388,6 +431,13 @@ impl Model {
     /// Nodes of the mesh in mm from solver nodes in m.
     pub(super) fn to_mesh_mm(&self, u: &[[f64; 3]]) -> Vec<[f64; 3]> {
         (0..self.corners).map(|n| millimetres(u[self.number[n] as usize])).collect()
+    }
+
+    /// Vectors on the mesh's nodes in solver numbering; mid-edge nodes get zero.
+    pub(super) fn solver_numbering(&self, of_nodes: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut all = vec![[0.0; 3]; self.nodes_m.len()];
+        of_nodes.iter().zip(&self.number).for_each(|(v, &new)| all[new as usize] = *v);
+        all
     }
 
     /// The answer at a state: u in m, internal forces in N.

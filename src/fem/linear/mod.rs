@@ -30,6 +30,9 @@ pub(super) struct LinearReport {
 
 /// Solves `tangent x = rhs` until |rhs - tangent x| <= tolerance |rhs|.
 pub(super) trait LinearSolver: Send {
+    /// Takes up a new tangent; to be called before the first solve with it.
+    fn prepare(&mut self, tangent: &Tangent);
+
     /// `x` comes back as the best solution found, also when the report says that it was not reached; on negative
     /// curvature it is a descent direction.
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport;
@@ -80,5 +83,5 @@ impl Tangent {
 /// The solver a model's settings ask for.
 pub(super) fn automatic(model: &Model) -> Box<dyn LinearSolver> {
     let blocks = model.scenario.solver.linear != LinearMethod::PcgJacobi;
-    Box::new(Pcg { blocks, most_iterations: 20_000 + 10 * model.free_nodes() })
+    Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes()))
 }

@@ -9,9 +9,19 @@ use super::{LinearReport, LinearSolver, Tangent};
 /// Conjugate gradients with a Jacobi or block-Jacobi preconditioner.
 pub(in super::super) struct Pcg {
     /// 3 x 3 blocks of the diagonal, or its entries only.
-    pub blocks: bool,
+    blocks: bool,
     /// Give up after this many iterations.
-    pub most_iterations: usize,
+    most_iterations: usize,
+    /// The tangent in single precision.
+    single: Option<Packed<f32>>,
+    /// The tangent in double precision, once a solve has needed it.
+    double: Option<Packed<f64>>,
+}
+
+/// The tangent and its preconditioner in one precision.
+struct Packed<T> {
+    operator: Operator<T>,
+    preconditioner: BlockJacobi<T>,
 }
 
 /// One inner run that solves A x = b to `tolerance` |b|.
@@ -103,24 +113,28 @@ fn conjugate_gradients<T: Real>(
     Inner { iterations: most_iterations, reached: false, negative_curvature: false }
 }
 
-impl Pcg {
-    fn refine<T: Real>(
-        &self,
+impl<T: Real> Packed<T> {
+    fn new(tangent: &Tangent, blocks: bool) -> Self {
+        Self { operator: Operator::new(tangent), preconditioner: BlockJacobi::new(tangent, blocks) }
+    }
+
+    fn refine(
+        &mut self,
+        most_iterations: usize,
         tangent: &Tangent,
         rhs: &[[f64; 3]],
         x: &mut [[f64; 3]],
         tolerance: f64,
         finest: f64,
     ) -> LinearReport {
-        let mut operator = Operator::<T>::new(tangent);
-        let preconditioner = BlockJacobi::<T>::new(tangent, self.blocks);
+        let Self { operator, preconditioner } = self;
         let mut report = LinearReport::default();
         let whole = reduce::norm(rhs);
         let mut residual = rhs.to_vec();
         let mut product = vec![[0.0; 3]; rhs.len()];
         x.fill([0.0; 3]);
         let mut size = whole;
-        while size > 0.0 && report.iterations < self.most_iterations {
+        while size > 0.0 && report.iterations < most_iterations {
             // Scaled to one, so that single precision keeps its range.
             let scale = 1.0 / size;
             let b: Vec<Lanes<T>> = residual
@@ -129,8 +143,8 @@ impl Pcg {
                 .collect();
             let mut step = vec![[T::default(); 4]; rhs.len()];
             let wanted = (tolerance * whole / size).max(finest);
-            let most = self.most_iterations - report.iterations;
-            let inner = conjugate_gradients(&mut operator, &preconditioner, &b, &mut step, wanted, most);
+            let most = most_iterations - report.iterations;
+            let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, wanted, most);
             report.iterations += inner.iterations;
             for (x, s) in x.iter_mut().zip(&step) {
                 (0..3).for_each(|i| x[i] += size * s[i].wide());
@@ -162,14 +176,28 @@ impl Pcg {
     }
 }
 
+impl Pcg {
+    pub(in super::super) fn new(blocks: bool, most_iterations: usize) -> Self {
+        Self { blocks, most_iterations, single: None, double: None }
+    }
+}
+
 impl LinearSolver for Pcg {
+    fn prepare(&mut self, tangent: &Tangent) {
+        self.single = Some(Packed::new(tangent, self.blocks));
+        self.double = None;
+    }
+
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
-        let single = self.refine::<f32>(tangent, rhs, x, tolerance, 1e-5);
+        let (blocks, most) = (self.blocks, self.most_iterations);
+        let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks));
+        let single = single.refine(most, tangent, rhs, x, tolerance, 1e-5);
         if single.reached {
             return single;
         }
         // Too ill-conditioned for single precision, or truly indefinite: double precision decides.
-        let mut double = self.refine::<f64>(tangent, rhs, x, tolerance, 1e-13);
+        let double = self.double.get_or_insert_with(|| Packed::new(tangent, blocks));
+        let mut double = double.refine(most, tangent, rhs, x, tolerance, 1e-13);
         double.iterations += single.iterations;
         double
     }

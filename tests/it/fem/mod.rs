@@ -2,4 +2,5 @@
 
 mod meshes;
 mod refusals;
+mod sensitivities;
 mod statics;

@@ -1,0 +1,201 @@
+//! How the displacement changes with a parameter: tangent solves at an equilibrium.
+//!
+//! At equilibrium R(u, theta) = f_int(u, theta) - f_ext(theta) = 0, so K du/dln(theta) = -dR/dln(theta) with the
+//! tangent K of the last state (Haftka and Guerdal, "Elements of Structural Optimization", ch. 7). One column costs one
+//! linear solve; one scalar of u costs one solve for all its parameters (the adjoint).
+
+use super::linear::{self, LinearSolver, Tangent};
+use super::load::Load;
+use super::model::{Materials, Model};
+use super::units::millimetres;
+use super::{FemError, State, reduce};
+use crate::material::law::Parameter;
+use serde::{Deserialize, Serialize};
+
+/// What a displacement is differentiated by; always the logarithm of it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum By {
+    /// A parameter of the material of a label: `Parameter::Stiffness` of a neo-Hookean tissue is its shear modulus at
+    /// fixed Poisson's ratio.
+    Material {
+        /// Label name, a key of the scenario's materials.
+        name: String,
+        /// Parameter of its law.
+        parameter: Parameter,
+    },
+    /// One load.
+    Load(Load),
+    /// Everything that moves the body: all loads and all prescribed displacements together.
+    AllLoads,
+}
+
+/// Relative step of differences in a parameter. Forces are linear in all moduli, so only Ogden's exponents see it.
+const STEP: f64 = 1.0 / 512.0;
+
+/// Relative residual of the tangent solves.
+const TOLERANCE: f64 = 1e-10;
+
+impl Model {
+    /// du / dln(parameter) at an equilibrium, mm per unit of the logarithm: one vector per node for each entry of
+    /// `by`. `materials` are those the state was solved with.
+    ///
+    /// # Errors
+    /// [`FemError::NoParameter`] and [`FemError::UnstableState`].
+    pub fn sensitivities(
+        &self,
+        materials: &Materials,
+        state: &State,
+        by: &[By],
+    ) -> Result<Vec<Vec<[f64; 3]>>, FemError> {
+        let mut at = Linearised::new(self, materials, state)?;
+        by.iter()
+            .map(|by| {
+                let rhs = self.free_part(&at.driving_force(by)?);
+                let step = at.solve(&rhs)?;
+                let mut change = vec![[0.0; 3]; state.u.len()];
+                if *by == By::AllLoads {
+                    self.move_prescribed(&mut change, 1.0);
+                }
+                self.add_free(&mut change, 1.0, &step);
+                Ok(self.to_mesh_mm(&change))
+            })
+            .collect()
+    }
+
+    /// dg / dln(parameter) of one scalar g(u) for each entry of `by`, in the unit of g: one linear solve for all of
+    /// them. `slope_per_mm` is dg/du, one vector per node of the mesh, per mm.
+    ///
+    /// # Errors
+    /// As [`Model::sensitivities`], and [`FemError::StartLength`] for a slope of another length.
+    pub fn adjoint(
+        &self,
+        materials: &Materials,
+        state: &State,
+        slope_per_mm: &[[f64; 3]],
+        by: &[By],
+    ) -> Result<Vec<f64>, FemError> {
+        self.state(slope_per_mm)?;
+        let slope = self.solver_numbering(&slope_per_mm.iter().map(|v| millimetres(*v)).collect::<Vec<_>>());
+        let mut at = Linearised::new(self, materials, state)?;
+        let weights = at.solve(&self.free_part(&slope))?;
+        by.iter()
+            .map(|by| {
+                let mut sum = reduce::dot(&weights, &self.free_part(&at.driving_force(by)?));
+                if *by == By::AllLoads {
+                    let mut moved = vec![[0.0; 3]; state.u.len()];
+                    self.move_prescribed(&mut moved, 1.0);
+                    sum += reduce::dot(&slope, &moved);
+                }
+                Ok(sum)
+            })
+            .collect()
+    }
+}
+
+/// A model with its tangent at a state.
+struct Linearised<'a> {
+    model: &'a Model,
+    materials: &'a Materials,
+    u: &'a [[f64; 3]],
+    tangent: Tangent,
+    solver: Box<dyn LinearSolver>,
+}
+
+impl<'a> Linearised<'a> {
+    fn new(model: &'a Model, materials: &'a Materials, state: &'a State) -> Result<Self, FemError> {
+        let laws = model.laws(materials)?;
+        let mut forces = vec![[0.0; 3]; state.u.len()];
+        let tangent = model.tangent(&state.u, &laws, &mut forces, false);
+        let mut solver = linear::automatic(model);
+        solver.prepare(&tangent);
+        Ok(Self { model, materials, u: &state.u, tangent, solver })
+    }
+
+    fn solve(&mut self, rhs: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, FemError> {
+        let mut x = vec![[0.0; 3]; rhs.len()];
+        let report = self.solver.solve(&self.tangent, rhs, &mut x, TOLERANCE);
+        if report.negative_curvature { Err(FemError::UnstableState) } else { Ok(x) }
+    }
+
+    /// -dR / dln(parameter) on all nodes, N.
+    fn driving_force(&self, by: &By) -> Result<Vec<[f64; 3]>, FemError> {
+        match by {
+            By::Load(load) => {
+                let found = self.model.load_parts.iter().find(|(part, _)| part == load);
+                let missing = || FemError::NoParameter { what: format!("load {load:?}") };
+                found.map(|(_, forces)| forces.clone()).ok_or_else(missing)
+            }
+            By::AllLoads => {
+                if self.model.prescribed.is_empty() {
+                    return Ok(self.model.load_n.clone());
+                }
+                // The part K_fc u_c of moved nodes, by differences of the internal forces along their way.
+                let along = |factor: f64| {
+                    let mut moved = self.u.to_vec();
+                    self.model.move_prescribed(&mut moved, 1.0 + factor);
+                    self.forces(self.materials, &moved)
+                };
+                let slope = derivative(along, 1.0 / 4096.0, true)?;
+                let both = self.model.load_n.iter().zip(&slope);
+                Ok(both.map(|(l, s)| [0, 1, 2].map(|i| l[i] - s[i])).collect())
+            }
+            By::Material { name, parameter } => {
+                let what = || format!("parameter {parameter:?} of `{name}`");
+                let material = self.materials.get(name).ok_or_else(|| FemError::NoParameter { what: what() })?;
+                let with = |factor: f64| {
+                    let changed = material.scaled(*parameter, factor);
+                    let changed = changed.ok_or_else(|| FemError::NoParameter { what: what() })?;
+                    let mut materials = self.materials.clone();
+                    materials.insert(name.clone(), changed);
+                    self.forces(&materials, self.u)
+                };
+                let mut slope = match parameter {
+                    // Forces are linear in lambda, and lambda is steep in nu close to 1/2.
+                    Parameter::PoissonRatio => {
+                        let (mu, nu) = (material.shear_modulus_pa(), material.poisson_ratio());
+                        let lambda = material.lame_lambda_pa();
+                        let step = STEP * (lambda + mu);
+                        let ratio = |lambda: f64| 0.5 * lambda / (lambda + mu);
+                        let (above, below) = (ratio(lambda + step), ratio(lambda));
+                        if nu == 0.0 {
+                            return Ok(vec![[0.0; 3]; self.u.len()]);
+                        }
+                        let (f1, f0) = (with(above / nu)?, with(below / nu)?);
+                        let rate = nu * 2.0 * mu / (1.0 - 2.0 * nu).powi(2) / step;
+                        f1.iter().zip(&f0).map(|(a, b)| [0, 1, 2].map(|i| rate * (a[i] - b[i]))).collect()
+                    }
+                    Parameter::OgdenAlpha(_) => derivative(|e| with(1.0 + e), STEP, true)?,
+                    _ => derivative(|e| with(1.0 + e), STEP, false)?,
+                };
+                slope.iter_mut().flatten().for_each(|v| *v = -*v);
+                Ok(slope)
+            }
+        }
+    }
+
+    fn forces(&self, materials: &Materials, u: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, FemError> {
+        let laws = self.model.unchecked_laws(materials)?;
+        let mut forces = vec![[0.0; 3]; u.len()];
+        self.model.body.assemble(u, &laws, &self.model.partition, &mut forces, None, false);
+        Ok(forces)
+    }
+}
+
+/// df/dx at 0 by central differences; of fourth order when f is not linear.
+fn derivative(
+    f: impl Fn(f64) -> Result<Vec<[f64; 3]>, FemError>,
+    step: f64,
+    fourth_order: bool,
+) -> Result<Vec<[f64; 3]>, FemError> {
+    let slope = |step: f64| -> Result<Vec<[f64; 3]>, FemError> {
+        let (above, below) = (f(step)?, f(-step)?);
+        Ok(above.iter().zip(&below).map(|(a, b)| [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step))).collect())
+    };
+    let near = slope(step)?;
+    if !fourth_order {
+        return Ok(near);
+    }
+    let far = slope(2.0 * step)?;
+    Ok(near.iter().zip(&far).map(|(n, f)| [0, 1, 2].map(|i| (4.0 * n[i] - f[i]) / 3.0)).collect())
+}
