@@ -74,7 +74,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     settings.post_slice_mm = args.slice_mm.unwrap_or(settings.post_slice_mm);
     settings.check().reject()?;
 
-    let stage = Stage::new("synth", 1, &args.output, &settings).frame("pre, post").seed(settings.seed);
+    let stage = Stage::new("synth", 2, &args.output, &settings).frame("pre, post").seed(settings.seed);
     let outcome = stage.run(session.options.force, || {
         let patient = synthesize(&settings)?;
         let facts = serde_json::to_value(&patient.truth).unwrap_or_default();

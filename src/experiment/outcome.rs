@@ -203,6 +203,9 @@ pub struct MeshOutcome {
     /// Smallest dihedral angle, degrees.
     #[serde(default)]
     pub dihedral_min_deg: Option<f64>,
+    /// First percentile of the smallest dihedral angle of each tetrahedron, degrees.
+    #[serde(default)]
+    pub dihedral_percentile_1_deg: Option<f64>,
     /// Tetrahedra with a dihedral angle below 10 degrees, percent.
     #[serde(default)]
     pub dihedral_below_10_percent: Option<f64>,
@@ -218,6 +221,18 @@ pub struct MeshOutcome {
     /// Smallest scaled Jacobian (1 is regular).
     #[serde(default)]
     pub scaled_jacobian_min: Option<f64>,
+    /// Volume against the label map, percent of its voxels, per label name.
+    #[serde(default)]
+    pub volume_error_percent: BTreeMap<String, f64>,
+    /// Dice overlap with the label map per label name.
+    #[serde(default)]
+    pub dice: BTreeMap<String, f64>,
+    /// Mean distance between the outer surface and the border of the labelled voxels, mm.
+    #[serde(default)]
+    pub surface_distance_mean_mm: Option<f64>,
+    /// 95th percentile of that distance, mm.
+    #[serde(default)]
+    pub surface_distance_95_mm: Option<f64>,
 }
 
 /// Why a text is not an outcome.

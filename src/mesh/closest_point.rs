@@ -118,7 +118,7 @@ fn squared_distance_to_box(p: Point3<f64>, node: &Node) -> f64 {
 }
 
 /// Ericson, "Real-Time Collision Detection" (2005), section 5.1.5: by the Voronoi regions of the triangle.
-fn closest_on_triangle(p: Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
+pub(super) fn closest_on_triangle(p: Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {

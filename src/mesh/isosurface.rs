@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 /// The six tetrahedra of a cube around its main diagonal (Kuhn): neighbouring cubes agree on shared faces, so the
 /// surface has no cracks and no edge with more than two triangles. Corner number = i + 2 j + 4 k.
-const KUHN: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
+pub(super) const KUHN: [[usize; 4]; 6] =
+    [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
 /// The surface `image = level` by marching tetrahedra (Doi and Koide, IEICE Trans. E74, 1991), outward where the
 /// image falls below the level, in mm. Outside the grid the image counts as below the level, so it is always closed.

@@ -110,6 +110,22 @@ impl LabelField {
         &self.frame_from_box
     }
 
+    /// The same fields with a constant added to each: interfaces move towards fields with less.
+    pub(crate) fn shifted(&self, by: &[f64]) -> Self {
+        let mut shifted = self.clone();
+        let count = self.labels.len();
+        let each = shifted.values.par_chunks_mut(count * 4096).zip(shifted.largest.par_chunks_mut(4096));
+        each.for_each(|(values, largest)| {
+            for (value, best) in values.chunks_mut(count).zip(largest) {
+                for k in 0..count {
+                    value[k] += by[k] as f32;
+                }
+                *best = argmax(value);
+            }
+        });
+        shifted
+    }
+
     /// Corner voxel and weights along the axes; `None` outside the box.
     #[inline]
     fn cell(&self, p: &Vector3<f64>) -> Option<(usize, [f64; 3])> {

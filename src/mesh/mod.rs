@@ -7,6 +7,7 @@ pub mod format;
 mod isosurface;
 mod label_field;
 mod optimise;
+pub mod quality;
 mod repair;
 mod tet_mesh;
 mod tri_mesh;

@@ -9,6 +9,7 @@ use crate::image::LabelMap;
 use crate::mesh::engine::{Engine, EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
+use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::{label, with_closed_sulci};
 use crate::tag::{TagSettings, tag_boundary_sets};
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Sulci and fissures up to twice this width are closed in the mesh.
@@ -100,7 +101,7 @@ pub fn mesh(
             centroid_mm: Some(set.centroid_mm),
         });
         let facts_of_mesh = MeshFacts {
-            mesh: outcome(&rest, settings.engine),
+            mesh: outcome(&rest, &whole, &body, &settings),
             sets: sets.collect(),
             implausible: tags.warnings.clone(),
         };
@@ -135,16 +136,31 @@ pub fn mesh_settings(
     Ok(settings)
 }
 
-fn outcome(mesh: &TetMesh, engine: Engine) -> MeshOutcome {
+/// Size and shape of what is simulated, and how well the `whole` mesh it was cut from fills its label map.
+pub fn outcome<F: Frame>(mesh: &TetMesh, whole: &TetMesh, map: &LabelMap<F>, settings: &MeshSettings) -> MeshOutcome {
+    let named = |l: u8| label::name(l).map_or_else(|| l.to_string(), str::to_owned);
     let mut volume_cc = BTreeMap::new();
     for (t, &l) in mesh.labels().iter().enumerate() {
-        *volume_cc.entry(label::name(l).unwrap_or("unknown").to_owned()).or_insert(0.0) += mesh.volume_mm3(t) / 1000.0;
+        *volume_cc.entry(named(l)).or_insert(0.0) += mesh.volume_mm3(t) / 1000.0;
     }
+    let shape = shape_quality(mesh);
+    let fit = fidelity(whole, map, &settings.without);
+    let border = surface_distance(whole, map, &settings.without);
     MeshOutcome {
-        engine: engine.name().to_owned(),
+        engine: settings.engine.name().to_owned(),
         nodes: mesh.nodes_mm().len(),
         tets: mesh.tets().len(),
         volume_cc,
-        ..MeshOutcome::default()
+        dihedral_min_deg: Some(shape.dihedral_min_deg),
+        dihedral_percentile_1_deg: Some(shape.dihedral_percentile_1_deg),
+        dihedral_below_10_percent: Some(shape.dihedral_below_10_percent),
+        dihedral_counts: shape.dihedral_counts,
+        radius_ratio_min: Some(shape.radius_ratio_min),
+        radius_ratio_mean: Some(shape.radius_ratio_mean),
+        scaled_jacobian_min: Some(shape.scaled_jacobian_min),
+        volume_error_percent: fit.labels.iter().map(|l| (named(l.label), l.volume_error_percent)).collect(),
+        dice: fit.labels.iter().map(|l| (named(l.label), l.dice)).collect(),
+        surface_distance_mean_mm: border.map(|d| d.mean_mm),
+        surface_distance_95_mm: border.map(|d| d.percentile_95_mm),
     }
 }

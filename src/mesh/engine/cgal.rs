@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Facet angle (degrees), and facet size, facet distance, cell radius-edge ratio and cell size as multiples of the edge.
-const CRITERIA: [f64; 5] = [25.0, 1.0, 0.3, 2.5, 1.0];
+const CRITERIA: [f64; 5] = [25.0, 0.95, 0.35, 2.0, 0.95];
 
 /// The request of `hgm-cgal-mesher`; its source describes the protocol.
 fn request(field: &LabelField, edge: &EdgeField, seeds: &[Point]) -> Vec<u8> {

@@ -214,7 +214,13 @@ pub fn mesh_labels<F: Frame>(
         let centre_mm = centre_of_mass(&field);
         return Err(EngineError::TooSmall { engine: name, centre_mm, volume_mm3, edge_mm });
     }
-    optimise::optimise(&mut complex, &field, &settings.optimise);
+    let mut wanted_mm3 = vec![0.0; field.labels().len()];
+    for label in &map.data {
+        if let Ok(k) = field.labels().binary_search(label) {
+            wanted_mm3[k] += map.grid.voxel_volume_mm3();
+        }
+    }
+    optimise::optimise(&mut complex, &field, &wanted_mm3, &settings.optimise);
     repair::separate(&mut complex);
     let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
     Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
@@ -260,6 +266,7 @@ mod tests {
     use super::*;
     use crate::geometry::Mni;
     use crate::image::Grid;
+    use crate::mesh::quality::{shape_quality, surface_distance};
 
     /// A ball of radius 20 mm in a shell of radius 30 mm, off centre in a mirrored, shifted grid.
     pub(super) fn ball_in_shell() -> LabelMap<Mni> {
@@ -289,11 +296,12 @@ mod tests {
         let [shell_mm3, inner_mm3] = volumes(&mesh);
         assert!((inner_mm3 / ball(20.0) - 1.0).abs() < 0.01, "{inner_mm3}");
         assert!((shell_mm3 / (ball(30.0) - ball(20.0)) - 1.0).abs() < 0.01, "{shell_mm3}");
-        let worst = (0..mesh.tets().len()).map(|t| {
-            let [a, b, c, d] = mesh.tets()[t].map(|n| Point::from(mesh.nodes_mm()[n as usize]));
-            optimise::min_sine(&a, &b, &c, &d)
-        });
-        assert!(worst.fold(1.0, f64::min) > 15f64.to_radians().sin());
+        let shape = shape_quality(&mesh);
+        assert!(shape.dihedral_min_deg > 15.0 && shape.non_manifold_outer_edges == 0, "{shape:?}");
+        assert!(shape.radius_ratio_min > 0.1 && shape.radius_ratio_mean > 0.7, "{shape:?}");
+        assert!(shape.scaled_jacobian_min > 0.05, "{shape:?}");
+        let border = surface_distance(&mesh, &ball_in_shell(), &[]).unwrap();
+        assert!(border.mean_mm < 0.5 && border.percentile_95_mm < 1.0, "{border:?}");
     }
 
     #[test]

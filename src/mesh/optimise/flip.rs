@@ -5,7 +5,7 @@
 //! the ring is then triangulated on each side of the new diagonal, which is a flip of the interface itself, allowed
 //! where it moves the interface by less than [`Limits::interface_shift`] of the edge length.
 
-use super::complex::{Complex, EDGES, Point, Ring, min_sine};
+use super::complex::{Complex, EDGES, Point, Ring, quality};
 use crate::mesh::TET_FACES;
 
 /// What a change may do.
@@ -45,11 +45,11 @@ fn triangulate(complex: &Complex, chain: &[u32], a: u32, b: u32, beat: f64) -> O
                 if rest <= top || rest <= beat {
                     continue;
                 }
-                let with_b = min_sine(&p[i], &p[k], &p[j], &pb);
+                let with_b = quality(&p[i], &p[k], &p[j], &pb);
                 if with_b <= top {
                     continue;
                 }
-                let quality = rest.min(with_b).min(min_sine(&p[i], &p[j], &p[k], &pa));
+                let quality = rest.min(with_b).min(quality(&p[i], &p[j], &p[k], &pa));
                 if quality > top {
                     (top, at) = (quality, k);
                 }
@@ -168,7 +168,7 @@ pub(crate) fn face_to_edge(complex: &mut Complex, t: u32, corner: usize) -> Opti
     let fresh: [[u32; 4]; 3] = std::array::from_fn(|n| [d, e, face[n], face[(n + 1) % 3]]);
     for tet in &fresh {
         let [a, b, c, d] = complex.points(tet);
-        if min_sine(&a, &b, &c, &d) <= beat {
+        if quality(&a, &b, &c, &d) <= beat {
             return None;
         }
     }
@@ -201,7 +201,7 @@ pub(crate) fn collapse(
         }
         let moved = tet.map(|v| if v == a { b } else { v });
         let p: [Point; 4] = moved.map(|v| complex.x[v as usize]);
-        if min_sine(&p[0], &p[1], &p[2], &p[3]) <= beat {
+        if quality(&p[0], &p[1], &p[2], &p[3]) <= beat {
             return None;
         }
         fresh.push((moved, complex.field[t as usize]));

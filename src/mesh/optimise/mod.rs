@@ -1,13 +1,15 @@
 //! The quality pass of every engine: fit interfaces to the label fields, then raise the worst tets.
 //!
 //! Vertices move (pattern search; along interfaces on interfaces), edges and faces flip, edges collapse. Each change is
-//! taken only when the worst tet of the cavity gets better, so the worst of the mesh never gets worse. Tets are visited
-//! in an order that depends on the mesh only.
+//! taken only when the worst tet of the cavity gets better, so the worst of the mesh never gets worse. Other sweeps raise
+//! the mean, and the last ones give every label its volume. Tets are visited in an order that depends on the mesh only.
 
 mod complex;
 mod fit;
 mod flip;
+mod relax;
 mod smooth;
+mod volume;
 
 use complex::GONE;
 pub(crate) use complex::{Complex, Point, min_sine};
@@ -17,7 +19,7 @@ use flip::Limits;
 
 /// What the quality pass aims at.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct OptimiseSettings {
     /// Dihedral angles are raised until all are at least this, in degrees.
     pub target_angle_deg: f64,
@@ -27,16 +29,18 @@ pub struct OptimiseSettings {
     pub rounds: usize,
     /// Fit sweeps per round.
     pub sweeps: usize,
+    /// Sweeps per round, and at the very end inside the labels, that raise the mean radius ratio.
+    pub relaxing: usize,
 }
 
 impl Default for OptimiseSettings {
     fn default() -> Self {
-        Self { target_angle_deg: 18.0, fit_floor_deg: 20.0, rounds: 3, sweeps: 4 }
+        Self { target_angle_deg: 18.0, fit_floor_deg: 20.0, rounds: 2, sweeps: 2, relaxing: 4 }
     }
 }
 
-/// Fits and improves in place.
-pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, settings: &OptimiseSettings) {
+/// Fits and improves in place; field k shall fill `wanted_mm3[k]`.
+pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, wanted_mm3: &[f64], settings: &OptimiseSettings) {
     let target = settings.target_angle_deg.to_radians().sin();
     let floor = settings.fit_floor_deg.to_radians().sin();
     raise(complex, target, 3);
@@ -44,12 +48,16 @@ pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, settings: &Opt
         for _ in 0..settings.sweeps {
             fit::sweep(complex, field, floor);
         }
+        for _ in 0..settings.relaxing {
+            relax::sweep(complex, target, false);
+        }
         raise(complex, target, 3);
     }
     raise(complex, target, 6);
     // The last word: places as near the interface as the target allows.
-    for _ in 0..2 {
-        fit::sweep(complex, field, target);
+    volume::match_volumes(complex, field, wanted_mm3, target);
+    for _ in 0..settings.relaxing {
+        relax::sweep(complex, target, true);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Moving a vertex to raise the worst quality around it.
 
-use super::complex::{Complex, Point, min_sine};
+use super::complex::{Complex, Point, quality};
 use super::flip::interface_normals;
 use nalgebra::{Matrix3, Vector3};
 
@@ -40,7 +40,7 @@ impl Link {
                 // The face opposite corner c, seen from outside, is turned around for (v, p, q, r).
                 let [p, q, r] = crate::mesh::TET_FACES[corner].map(|c| complex.x[tet[c] as usize]);
                 let face = [p, q, r];
-                (min_sine(&complex.x[v as usize], &face[0], &face[1], &face[2]), face)
+                (quality(&complex.x[v as usize], &face[0], &face[1], &face[2]), face)
             })
             .collect();
         // Worst first, so that a bad candidate is refused early.
@@ -52,7 +52,7 @@ impl Link {
     fn quality(&self, p: &Point, enough: f64) -> f64 {
         let mut worst = f64::MAX;
         for [a, b, c] in &self.faces {
-            worst = worst.min(min_sine(p, a, b, c));
+            worst = worst.min(quality(p, a, b, c));
             if worst <= enough {
                 return worst;
             }
@@ -62,7 +62,7 @@ impl Link {
 }
 
 /// Sum of n n^T A over the interface facets at a vertex, divided by the area: squared normal shift per squared shift.
-fn quadric(complex: &Complex, v: u32) -> Matrix3<f64> {
+pub(super) fn quadric(complex: &Complex, v: u32) -> Matrix3<f64> {
     let (mut sum, mut area) = (Matrix3::zeros(), 0.0);
     for (normal, _) in interface_normals(complex, v) {
         let a = normal.norm().max(f64::MIN_POSITIVE);

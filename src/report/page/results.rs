@@ -186,6 +186,7 @@ pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
             ("nodes".to_owned(), count(m.nodes)),
             ("tetrahedra".to_owned(), count(m.tets)),
             ("smallest dihedral angle".to_owned(), optional(m.dihedral_min_deg, 3, "°")),
+            ("1 % of tetrahedra have one below".to_owned(), optional(m.dihedral_percentile_1_deg, 3, "°")),
             ("tetrahedra below 10°".to_owned(), optional(m.dihedral_below_10_percent, 2, "%")),
             ("radius ratio, mean".to_owned(), optional(m.radius_ratio_mean, 3, "")),
             ("radius ratio, smallest".to_owned(), optional(m.radius_ratio_min, 3, "")),
@@ -193,6 +194,17 @@ pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
         ];
         for (name, cc) in &m.volume_cc {
             rows.push((format!("volume, {}", escape(&tissue_name(name))), format!("{} cc", number(*cc, 4))));
+        }
+        for (name, percent) in &m.volume_error_percent {
+            let name = format!("volume against the label map, {}", escape(&tissue_name(name)));
+            rows.push((name, format!("{} %", fixed(*percent, 2))));
+        }
+        for (name, dice) in &m.dice {
+            rows.push((format!("Dice with the label map, {}", escape(&tissue_name(name))), fixed(*dice, 3)));
+        }
+        if let (Some(mean), Some(far)) = (m.surface_distance_mean_mm, m.surface_distance_95_mm) {
+            let figures = format!("{} / {} mm", fixed(mean, 2), fixed(far, 2));
+            rows.push(("distance to the border of the labels, mean / 95 %".to_owned(), figures));
         }
         let rows: Vec<_> = rows.into_iter().map(|(name, value)| (false, vec![name, value])).collect();
         let quality = table("Mesh", &["measure".to_owned(), "value".to_owned()], &rows);
