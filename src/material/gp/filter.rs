@@ -187,7 +187,12 @@ pub fn negative_log_likelihood(parameters: &Hyperparameters, data: &TrainingData
     run(parameters, data, &data_stops(data), &mut Nothing) + within_groups(parameters, data)
 }
 
-/// Same, and what the backward pass needs.
-pub(super) fn recorded(parameters: &Hyperparameters, data: &TrainingData, record: &mut impl Record) -> f64 {
-    run(parameters, data, &data_stops(data), record) + within_groups(parameters, data)
+/// Same over the data's own stops, and what a backward pass needs.
+pub(super) fn recorded(
+    parameters: &Hyperparameters,
+    data: &TrainingData,
+    stops: &[Stop],
+    record: &mut impl Record,
+) -> f64 {
+    run(parameters, data, stops, record) + within_groups(parameters, data)
 }

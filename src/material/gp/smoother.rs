@@ -94,21 +94,25 @@ impl Adjoint {
         (on_f, on_g)
     }
 
-    /// Through an update of f_task: Lambda <- e e^T / S + C^T Lambda C with C = I - K e^T, and likewise lambda.
-    fn back_through_update(&mut self, task: usize, update: &Update) {
+    /// Through an update of f_task: Lambda <- e e^T / S + C^T Lambda C with C = I - K e^T, and likewise lambda. Returns
+    /// the smoothed score of the observation and its precision, (K^-1 y)_i and (K^-1)_ii of the dense covariance K.
+    pub fn back_through_update(&mut self, task: usize, update: &Update) -> (f64, f64) {
         let gain = |v: Half| v.map(|x| x / update.variance);
         let (kf, kg) = (gain(update.cov_f), gain(update.cov_g));
         let (lf, lg) = self.times(&kf, &kg);
         let dot = |a: &Half, b: &Half| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let quadratic = dot(&kf, &lf) + dot(&kg, &lg);
         let along = dot(&kf, &self.f) + dot(&kg, &self.g);
-        self.f[task] -= along + update.innovation / update.variance;
+        let score = along + update.innovation / update.variance;
+        let precision = quadratic + 1.0 / update.variance;
+        self.f[task] -= score;
         for i in 0..TASKS {
             self.ff[task][i] -= lf[i];
             self.ff[i][task] -= lf[i];
             self.fg[task][i] -= lg[i];
         }
-        self.ff[task][task] += quadratic + 1.0 / update.variance;
+        self.ff[task][task] += precision;
+        (score, precision)
     }
 }
 
