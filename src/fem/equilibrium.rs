@@ -9,6 +9,7 @@
 use super::linear::{LinearReport, LinearSolver};
 use super::model::{Laws, Materials, Model};
 use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, linear, reduce};
+use crate::material::law::Material;
 
 /// A displacement field to start from: the solution of a neighbouring problem on the same model.
 #[derive(Clone, Debug)]
@@ -50,7 +51,7 @@ impl Model {
     ) -> Result<(Outcome, State), FemError> {
         let laws = self.laws(materials)?;
         let mut record = ConvergenceRecord::default();
-        let mut solver = linear::automatic(self);
+        let mut solver = linear::for_model(self, largest_ratio(materials));
         let nodes = self.nodes_m.len();
         let mut forces = vec![[0.0; 3]; nodes];
         let load_scale = reduce::norm(&self.free_part(&self.load_n));
@@ -289,6 +290,11 @@ impl Model {
             .sum();
         held.sqrt()
     }
+}
+
+/// The largest Poisson's ratio among materials.
+pub(super) fn largest_ratio(materials: &Materials) -> f64 {
+    materials.values().map(Material::poisson_ratio).fold(0.0, f64::max)
 }
 
 /// What stays the same during one load step.

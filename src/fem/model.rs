@@ -2,19 +2,21 @@
 //! every solve.
 
 use super::element::{
-    At, Dilation, ElementKind, Elements, Kernel, NodalPressure, Partition, tet4, tet10, with_mid_edge_nodes,
+    At, ElementKind, Elements, Kernel, NODAL_SHARE, NodalGradient, NodalTangent, Partition, tet4, tet10,
+    with_mid_edge_nodes,
 };
-use super::linear::Tangent;
+use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
 use super::order::{Graph, reverse_cuthill_mckee};
 use super::scenario::Scenario;
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, Outcome, State};
-use crate::material::law::Material;
+use crate::material::Hyperelastic;
+use crate::material::law::{Material, Parameter};
 use crate::mesh::TetMesh;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Materials by label name.
 pub type Materials = BTreeMap<String, Material>;
@@ -30,7 +32,7 @@ pub struct Model {
     /// Node of every row.
     pub(super) node_of_row: Vec<u32>,
     /// Components held on rows that are otherwise free.
-    pub(super) held_components: Option<Vec<[bool; 3]>>,
+    pub(super) held_components: Option<Arc<Vec<[bool; 3]>>>,
     /// Nodes that are moved: components and displacement, m.
     pub(super) prescribed: Vec<(u32, [bool; 3], [f64; 3])>,
     /// All loads together in solver numbering, N.
@@ -47,32 +49,30 @@ pub struct Model {
     /// Ends of the mid-edge nodes, in mesh numbering.
     edges: Vec<[u32; 2]>,
     warnings: Vec<String>,
+    /// Elimination order of the direct solver, found when first needed.
+    symbolic: OnceLock<Option<Arc<Symbolic>>>,
 }
 
 /// Elements of one kind.
 pub(super) enum Body {
     Tet4(Elements<4, 1>),
-    Tet4NodalPressure(Elements<4, 1>, Box<NodalPressure>),
+    Tet4Nodal(Elements<4, 1>, Box<NodalGradient>),
     Tet10(Elements<10, 4>),
 }
 
 /// Materials made ready for the elements of a model.
 pub(super) struct Laws {
-    pub materials: Vec<Material>,
     kernels: Vec<Kernel>,
+    /// What the nodes evaluate, for elements with averaged deformation.
+    nodal: Vec<Box<dyn Hyperelastic>>,
 }
-
-/// The part of lambda that the nodal-pressure element averages; the rest stays in the elements.
-pub(super) const AVERAGED_SHARE: f64 = 1.0;
 
 impl Body {
     pub(super) fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {
         match self {
             Self::Tet4(elements) => elements.energy(u, &laws.kernels),
             Self::Tet10(elements) => elements.energy(u, &laws.kernels),
-            Self::Tet4NodalPressure(elements, nodal) => {
-                elements.energy(u, &laws.kernels) + nodal.energy(elements, u, &laws.materials, AVERAGED_SHARE)
-            }
+            Self::Tet4Nodal(elements, nodal) => elements.energy(u, &laws.kernels) + nodal.energy(u, &laws.nodal),
         }
     }
 
@@ -85,27 +85,36 @@ impl Body {
         forces: &mut [[f64; 3]],
         matrix: Option<&mut BlockMatrix>,
         project: bool,
-    ) -> Option<Dilation> {
-        let at = At { u, kernels: &laws.kernels, pressure_pa: None, project };
+    ) {
+        let at = At { u, kernels: &laws.kernels, more_stress_pa: None, project };
         match self {
             Self::Tet4(elements) => elements.assemble(at, partition, forces, matrix),
             Self::Tet10(elements) => elements.assemble(at, partition, forces, matrix),
-            Self::Tet4NodalPressure(elements, nodal) => {
-                let (pressures, second) = nodal.pressures(elements, u, &laws.materials, AVERAGED_SHARE);
-                let with_matrix = matrix.is_some();
-                elements.assemble(At { pressure_pa: Some(&pressures), ..at }, partition, forces, matrix);
-                return with_matrix.then(|| nodal.dilation(elements, u, &second, project));
+            Self::Tet4Nodal(elements, nodal) => {
+                let stresses = nodal.stresses(u, &laws.nodal);
+                elements.assemble(At { more_stress_pa: Some(&stresses), ..at }, partition, forces, matrix);
             }
         }
-        None
+    }
+
+    /// The part of the tangent that is not in the matrix.
+    fn nodal_tangent(
+        &self,
+        u: &[[f64; 3]],
+        laws: &Laws,
+        held: Option<Arc<Vec<[bool; 3]>>>,
+        project: bool,
+    ) -> Option<NodalTangent> {
+        match self {
+            Self::Tet4Nodal(_, nodal) => Some(nodal.tangent(u, &laws.nodal, held, project)),
+            _ => None,
+        }
     }
 
     /// Per cell of the mesh: mean and least volume ratio, mean energy density.
     pub(super) fn state(&self, u: &[[f64; 3]], laws: &Laws) -> Vec<[f64; 3]> {
         let (cells, state) = match self {
-            Self::Tet4(elements) | Self::Tet4NodalPressure(elements, _) => {
-                (&elements.cell, elements.state(u, &laws.kernels))
-            }
+            Self::Tet4(elements) | Self::Tet4Nodal(elements, _) => (&elements.cell, elements.state(u, &laws.kernels)),
             Self::Tet10(elements) => (&elements.cell, elements.state(u, &laws.kernels)),
         };
         let mut by_cell = vec![[0.0; 3]; state.len()];
@@ -268,7 +277,7 @@ impl Model {
         }
         let held_components = {
             let of_rows: Vec<[bool; 3]> = node_of_row.iter().map(|&n| held[order[n as usize] as usize]).collect();
-            of_rows.iter().any(|h| *h != [false; 3]).then_some(of_rows)
+            of_rows.iter().any(|h| *h != [false; 3]).then(|| Arc::new(of_rows))
         };
         let prescribed = order
             .iter()
@@ -298,26 +307,23 @@ impl Model {
         }
         let pattern = Arc::new(BlockPattern::new(&renumbered(&graph, &order, &number), &row_of));
 
-        let body = match &quadratic {
-            Some((tets, _)) => {
-                let (tets, materials, cells) = sorted(tets, &number, &material_of_cell);
-                let points = tet10(&nodes_m, &tets);
-                Body::Tet10(Elements::new(tets, points, materials, cells, &row_of, &pattern))
-            }
-            None => {
-                let (tets, materials, cells) = sorted(mesh.tets(), &number, &material_of_cell);
-                let points = tet4(&nodes_m, &tets);
-                let elements = Elements::new(tets, points, materials, cells, &row_of, &pattern);
-                if scenario.solver.element == ElementKind::Tet4NodalPressure {
-                    let nodal = Box::new(NodalPressure::new(&elements, &row_of));
-                    Body::Tet4NodalPressure(elements, nodal)
-                } else {
-                    Body::Tet4(elements)
-                }
+        let body = if let Some((tets, _)) = &quadratic {
+            let (tets, materials, cells) = sorted(tets, &number, &material_of_cell);
+            let points = tet10(&nodes_m, &tets);
+            Body::Tet10(Elements::new(tets, points, materials, cells, &row_of, &pattern))
+        } else {
+            let (tets, materials, cells) = sorted(mesh.tets(), &number, &material_of_cell);
+            let points = tet4(&nodes_m, &tets);
+            let elements = Elements::new(tets, points, materials, cells, &row_of, &pattern);
+            if scenario.solver.element == ElementKind::Tet4Nodal {
+                let nodal = Box::new(NodalGradient::new(&elements, &row_of));
+                Body::Tet4Nodal(elements, nodal)
+            } else {
+                Body::Tet4(elements)
             }
         };
         let partition = match &body {
-            Body::Tet4(e) | Body::Tet4NodalPressure(e, _) => e.partition(&row_of, &pattern),
+            Body::Tet4(e) | Body::Tet4Nodal(e, _) => e.partition(&row_of, &pattern),
             Body::Tet10(e) => e.partition(&row_of, &pattern),
         };
         let mut warnings = Vec::new();
@@ -326,7 +332,7 @@ impl Model {
             if stiffest > 0.47 {
                 warnings.push(format!(
                     "tet4 locks at Poisson's ratio {stiffest}: displacements come out too small; \
-                     `element = \"tet4-nodal-pressure\"` does not"
+                     `element = \"tet4-nodal\"` does not"
                 ));
             }
         }
@@ -347,12 +353,26 @@ impl Model {
             number,
             corners,
             warnings,
+            symbolic: OnceLock::new(),
         })
     }
 
     /// Number of free nodes (three unknowns each).
     pub fn free_nodes(&self) -> usize {
         self.node_of_row.len()
+    }
+
+    /// Elimination order of the direct solver; `None` when there is not enough memory.
+    pub(super) fn symbolic(&self) -> Option<Arc<Symbolic>> {
+        let new = || {
+            let rings = match &self.body {
+                Body::Tet4Nodal(_, nodal) => Some(nodal.rings()),
+                _ => None,
+            };
+            let positions: Vec<[f64; 3]> = self.node_of_row.iter().map(|&n| self.nodes_m[n as usize]).collect();
+            Symbolic::new(&self.pattern, rings, &positions).map(Arc::new)
+        };
+        self.symbolic.get_or_init(new).clone()
     }
 
     /// A displacement of the mesh's nodes (mm) as a state to start from.
@@ -394,34 +414,34 @@ impl Model {
             .iter()
             .map(|name| materials.get(name).cloned().ok_or_else(|| missing(name)))
             .collect::<Result<_, _>>()?;
-        let pointwise = match self.body {
-            Body::Tet4NodalPressure(..) => 1.0 - AVERAGED_SHARE,
-            _ => 1.0,
-        };
-        let kernels = materials.iter().map(|m| Kernel::new(m, pointwise)).collect();
-        Ok(Laws { materials, kernels })
+        let part = |m: &Material, part: f64| m.scaled(Parameter::Stiffness, part).unwrap_or_else(|| m.clone());
+        Ok(match self.body {
+            Body::Tet4Nodal(..) => Laws {
+                kernels: materials.iter().map(|m| Kernel::new(&part(m, 1.0 - NODAL_SHARE), 0.0)).collect(),
+                nodal: materials.iter().map(|m| part(m, NODAL_SHARE).law_with_lambda(m.lame_lambda_pa())).collect(),
+            },
+            _ => Laws {
+                kernels: materials.iter().map(|m| Kernel::new(m, m.lame_lambda_pa())).collect(),
+                nodal: Vec::new(),
+            },
+        })
     }
 
     /// Tangent at u; also fills the internal forces of all nodes.
     pub(super) fn tangent(&self, u: &[[f64; 3]], laws: &Laws, forces: &mut [[f64; 3]], project: bool) -> Tangent {
         let mut matrix = BlockMatrix::zero(Arc::clone(&self.pattern));
-        let mut dilation = self.body.assemble(u, laws, &self.partition, forces, Some(&mut matrix), project);
+        self.body.assemble(u, laws, &self.partition, forces, Some(&mut matrix), project);
         if let Some(held) = &self.held_components {
             matrix.hold_components(held);
-            if let Some(d) = &mut dilation {
-                for (row, value) in d.rows.iter().zip(&mut d.values) {
-                    (0..3).filter(|&i| held[*row as usize][i]).for_each(|i| value[i] = 0.0);
-                }
-            }
         }
-        Tangent { matrix, dilation }
+        Tangent { matrix, nodal: self.body.nodal_tangent(u, laws, self.held_components.clone(), project) }
     }
 
     /// Entries of the free rows; held components are zero.
     pub(super) fn free_part(&self, of_nodes: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut rows: Vec<[f64; 3]> = self.node_of_row.iter().map(|&n| of_nodes[n as usize]).collect();
         if let Some(held) = &self.held_components {
-            for (row, held) in rows.iter_mut().zip(held) {
+            for (row, held) in rows.iter_mut().zip(&**held) {
                 (0..3).filter(|&i| held[i]).for_each(|i| row[i] = 0.0);
             }
         }
@@ -460,8 +480,8 @@ impl Model {
             [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
         };
         let mut density: Vec<f64> = state.iter().map(|s| s[2]).collect();
-        if let Body::Tet4NodalPressure(elements, nodal) = &self.body {
-            let averaged = nodal.energy_density(elements, u, &laws.materials, AVERAGED_SHARE);
+        if let Body::Tet4Nodal(elements, nodal) = &self.body {
+            let averaged = nodal.energy_density(u, &laws.nodal);
             elements.cell.iter().zip(averaged).for_each(|(&cell, extra)| density[cell as usize] += extra);
         }
         let mut warnings = self.warnings.clone();

@@ -136,6 +136,8 @@ pub enum LinearMethod {
     PcgJacobi,
     /// Conjugate gradients, 3 x 3 block-diagonal preconditioner.
     PcgBlockJacobi,
+    /// Factor LL^T on a nested-dissection ordering, kept as a preconditioner while the tangent changes little.
+    Direct,
 }
 
 /// How equilibrium is found.

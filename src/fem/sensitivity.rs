@@ -4,6 +4,7 @@
 //! tangent K of the last state (Haftka and Guerdal, "Elements of Structural Optimization", ch. 7). One column costs one
 //! linear solve; one scalar of u costs one solve for all its parameters (the adjoint).
 
+use super::equilibrium::largest_ratio;
 use super::linear::{self, LinearSolver, Tangent};
 use super::load::Load;
 use super::model::{Materials, Model};
@@ -107,7 +108,7 @@ impl<'a> Linearised<'a> {
         let laws = model.laws(materials)?;
         let mut forces = vec![[0.0; 3]; state.u.len()];
         let tangent = model.tangent(&state.u, &laws, &mut forces, false);
-        let mut solver = linear::automatic(model);
+        let mut solver = linear::for_model(model, largest_ratio(materials));
         solver.prepare(&tangent);
         Ok(Self { model, materials, u: &state.u, tangent, solver })
     }

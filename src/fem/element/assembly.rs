@@ -6,7 +6,7 @@
 use super::super::reduce::CHUNK;
 use super::super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::Point;
-use super::kernel::{Kernel, cofactors};
+use super::kernel::{Kernel, M3, cofactors};
 use rayon::prelude::*;
 
 /// Elements with `K` nodes and `Q` points, ordered so that neighbours in the list share nodes in memory.
@@ -32,8 +32,8 @@ pub(in super::super) struct At<'a> {
     /// Displacements, m.
     pub u: &'a [[f64; 3]],
     pub kernels: &'a [Kernel],
-    /// Pressure of every element that averages its volume, Pa.
-    pub pressure_pa: Option<&'a [f64]>,
+    /// Stress that every element has besides its own, Pa.
+    pub more_stress_pa: Option<&'a [M3]>,
     /// Make element tangents positive semi-definite.
     pub project: bool,
 }
@@ -131,7 +131,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
         forces: &mut [[f64; 3]],
         matrix: Option<&mut BlockMatrix>,
     ) {
-        let At { u, kernels, pressure_pa, project } = at;
+        let At { u, kernels, more_stress_pa, project } = at;
         let mut blocks: &mut [[f64; 9]] = matrix.map_or(&mut [], |m| &mut m.blocks);
         let with_blocks = !blocks.is_empty();
         let mut forces = forces;
@@ -151,13 +151,13 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
                 let e = e as usize;
                 let local = self.local(e, u);
                 let kernel = &kernels[usize::from(self.material[e])];
-                let pressure = pressure_pa.map_or(0.0, |p| p[e]);
+                let more = more_stress_pa.map(|m| &m[e]);
                 let owned = self.nodes[e].map(|n| part.nodes.contains(&(n as usize)));
                 let positions = &self.positions[e];
                 for point in &self.points[e] {
                     let h = Self::gradient(point, &local);
-                    let stress = if with_blocks {
-                        kernel.stiffness(&h, pressure, &point.gradients, point.weight_m3, project, |a, b, block| {
+                    let mut stress = if with_blocks {
+                        kernel.stiffness(&h, &point.gradients, point.weight_m3, project, |a, b, block| {
                             if owned[a] && positions[a][b] != HELD {
                                 let target = &mut blocks[(positions[a][b] - first_block) as usize];
                                 for i in 0..9 {
@@ -174,8 +174,11 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
                             }
                         })
                     } else {
-                        kernel.stress(&h, pressure)
+                        kernel.stress(&h)
                     };
+                    if let Some(more) = more {
+                        stress.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(s, m)| *s += m);
+                    }
                     for a in (0..K).filter(|&a| owned[a]) {
                         let g = point.gradients[a].map(|v| v * point.weight_m3);
                         let force = &mut forces[self.nodes[e][a] as usize - part.nodes.start];
@@ -205,10 +208,5 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
             [mean_j / volume, least_j, energy / volume]
         };
         (0..self.nodes.len()).into_par_iter().with_min_len(CHUNK).map(one).collect()
-    }
-
-    /// Volume ratio minus one and cofactors of F at the first point of every element.
-    pub(in super::super) fn dilatation(&self, element: usize, u: &[[f64; 3]]) -> ([[f64; 3]; 3], f64) {
-        cofactors(&Self::gradient(&self.points[element][0], &self.local(element, u)))
     }
 }

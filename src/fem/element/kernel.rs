@@ -16,12 +16,11 @@ pub(in super::super) enum Kernel {
 }
 
 /// Row-major 3 x 3, as small as the hot loop likes it.
-type M3 = [[f64; 3]; 3];
+pub(in super::super) type M3 = [[f64; 3]; 3];
 
 impl Kernel {
-    /// A material with the part `pointwise` of its lambda evaluated at the points.
-    pub(in super::super) fn new(material: &Material, pointwise: f64) -> Self {
-        let lambda = pointwise * material.lame_lambda_pa();
+    /// A material with this lambda (Pa): its own, or 0 where its volume term is evaluated elsewhere.
+    pub(in super::super) fn new(material: &Material, lambda: f64) -> Self {
         match material {
             Material::NeoHookean { shear_modulus_pa, compression_resistance_pa, inversion_threshold, .. }
                 if *compression_resistance_pa == 0.0 && *inversion_threshold == 0.0 =>
@@ -50,19 +49,15 @@ impl Kernel {
         }
     }
 
-    /// First Piola-Kirchhoff stress, Pa, with `pressure` (Pa, positive in tension) added on the volume.
+    /// First Piola-Kirchhoff stress, Pa.
     #[inline(always)]
-    pub(super) fn stress(&self, h: &M3, pressure: f64) -> M3 {
+    pub(super) fn stress(&self, h: &M3) -> M3 {
         match self {
             Self::NeoHookean { mu, lambda } => {
                 let (cof, j_minus_1) = cofactors(h);
-                neo_hookean_stress(*mu, lambda * j_minus_1.ln_1p(), pressure, h, &cof, 1.0 + j_minus_1)
+                neo_hookean_stress(*mu, lambda * j_minus_1.ln_1p(), h, &cof, 1.0 + j_minus_1)
             }
-            Self::General(law) => {
-                let stress = law.first_piola_kirchhoff_pa(&matrix(h));
-                let (cof, _) = cofactors(h);
-                std::array::from_fn(|r| std::array::from_fn(|c| stress[(r, c)] + pressure * cof[r][c]))
-            }
+            Self::General(law) => rows(&law.first_piola_kirchhoff_pa(&matrix(h))),
         }
     }
 
@@ -72,7 +67,6 @@ impl Kernel {
     pub(super) fn stiffness<const K: usize>(
         &self,
         h: &M3,
-        pressure: f64,
         gradients: &[[f64; 3]; K],
         weight: f64,
         project: bool,
@@ -82,18 +76,17 @@ impl Kernel {
             Self::NeoHookean { mu, lambda } => {
                 let (cof, j_minus_1) = cofactors(h);
                 let (j, volume_stress) = (1.0 + j_minus_1, lambda * j_minus_1.ln_1p());
-                let stress = neo_hookean_stress(*mu, volume_stress, pressure, h, &cof, j);
-                let mut exchange = mu - volume_stress - pressure * j;
+                let stress = neo_hookean_stress(*mu, volume_stress, h, &cof, j);
+                let mut exchange = mu - volume_stress;
                 if project {
                     exchange = projected_exchange(exchange, *mu, h);
                 }
-                let outer = (lambda + pressure * j).max(if project { 0.0 } else { f64::NEG_INFINITY });
                 let inverse_j = 1.0 / j;
                 let spatial: [[f64; 3]; K] = std::array::from_fn(|a| {
                     let g = &gradients[a];
                     [0, 1, 2].map(|r| (cof[r][0] * g[0] + cof[r][1] * g[1] + cof[r][2] * g[2]) * inverse_j)
                 });
-                let (c1, c2, c3) = (weight * mu, weight * exchange, weight * outer);
+                let (c1, c2, c3) = (weight * mu, weight * exchange, weight * lambda);
                 for a in 0..K {
                     let ga = &gradients[a];
                     let (x, y) = (spatial[a].map(|v| c2 * v), spatial[a].map(|v| c3 * v));
@@ -116,9 +109,7 @@ impl Kernel {
             }
             Self::General(law) => {
                 let h = matrix(h);
-                let f = Matrix3::identity() + h;
                 let mut tangent = law.tangent_pa(&h);
-                add_pressure_tangent(&mut tangent, pressure, &f);
                 if project {
                     tangent = projected(&tangent);
                 }
@@ -141,24 +132,21 @@ impl Kernel {
                         put(a, b, &block);
                     }
                 }
-                let stress = law.first_piola_kirchhoff_pa(&h);
-                let (cof, _) = cofactors(&rows(&h));
-                std::array::from_fn(|r| std::array::from_fn(|c| stress[(r, c)] + pressure * cof[r][c]))
+                rows(&law.first_piola_kirchhoff_pa(&h))
             }
         }
     }
 }
 
-/// mu (F - F^-T) + (lambda ln J + p J) F^-T, the first bracket as H + F^-T H^T: nothing cancels near rest.
+/// mu (F - F^-T) + lambda ln J F^-T, the first bracket as H + F^-T H^T: nothing cancels near rest.
 #[inline(always)]
-fn neo_hookean_stress(mu: f64, volume_stress: f64, pressure: f64, h: &M3, cof: &M3, j: f64) -> M3 {
+fn neo_hookean_stress(mu: f64, volume_stress: f64, h: &M3, cof: &M3, j: f64) -> M3 {
     let inverse_j = 1.0 / j;
     let g = cof.map(|row| row.map(|v| v * inverse_j));
-    let volume = volume_stress + pressure * j;
     std::array::from_fn(|r| {
         std::array::from_fn(|c| {
             let turned = g[r][0] * h[c][0] + g[r][1] * h[c][1] + g[r][2] * h[c][2];
-            mu * (h[r][c] + turned) + volume * g[r][c]
+            mu * (h[r][c] + turned) + volume_stress * g[r][c]
         })
     })
 }
@@ -208,30 +196,13 @@ fn projected_exchange(exchange: f64, mu: f64, h: &M3) -> f64 {
 }
 
 /// Eigenvalues below zero become zero (Teran, Sifakis, Irving and Fedkiw, SCA 2005).
-fn projected(tangent: &Tangent) -> Tangent {
+pub(super) fn projected(tangent: &Tangent) -> Tangent {
     let eigen = SymmetricEigen::new(*tangent);
     if eigen.eigenvalues.iter().all(|&v| v >= 0.0) {
         return *tangent;
     }
     let q = eigen.eigenvectors;
     q * Tangent::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0))) * q.transpose()
-}
-
-/// Adds p d2J/dF2; entry (a b, c d) is p e_acm e_bdn F_mn.
-fn add_pressure_tangent(tangent: &mut Tangent, pressure: f64, f: &Matrix3<f64>) {
-    if pressure == 0.0 {
-        return;
-    }
-    let even = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
-    for (a, c, m) in even {
-        for (b, d, n) in even {
-            let v = pressure * f[(m, n)];
-            tangent[(a + 3 * b, c + 3 * d)] += v;
-            tangent[(c + 3 * d, a + 3 * b)] += v;
-            tangent[(a + 3 * d, c + 3 * b)] -= v;
-            tangent[(c + 3 * b, a + 3 * d)] -= v;
-        }
-    }
 }
 
 fn matrix(h: &M3) -> Matrix3<f64> {
@@ -250,9 +221,9 @@ mod tests {
     const H: M3 = [[0.12, -0.05, 0.08], [0.03, -0.09, 0.06], [-0.07, 0.1, 0.05]];
     const GRADIENTS: [[f64; 3]; 4] = [[-1.1, -0.4, -1.0], [0.7, 0.1, 0.2], [0.3, 0.9, -0.2], [0.1, -0.6, 1.0]];
 
-    fn blocks(kernel: &Kernel, pressure: f64, project: bool) -> (M3, Vec<[f64; 9]>) {
+    fn blocks(kernel: &Kernel, h: &M3, project: bool) -> (M3, Vec<[f64; 9]>) {
         let mut all = vec![[0.0; 9]; 16];
-        let stress = kernel.stiffness(&H, pressure, &GRADIENTS, 2.0, project, |a, b, block| all[4 * a + b] = *block);
+        let stress = kernel.stiffness(h, &GRADIENTS, 2.0, project, |a, b, block| all[4 * a + b] = *block);
         (stress, all)
     }
 
@@ -260,27 +231,27 @@ mod tests {
     fn the_fast_path_is_the_general_path() {
         let fast = Kernel::NeoHookean { mu: 1000.0, lambda: 9000.0 };
         let general = Kernel::General(Box::new(NeoHookean::new(1000.0, 0.45)));
-        for pressure in [0.0, -350.0] {
-            let (f, g) = (blocks(&fast, pressure, false), blocks(&general, pressure, false));
-            for (a, b) in f.1.iter().flatten().zip(g.1.iter().flatten()) {
-                assert!((a - b).abs() < 1e-8, "{a} {b}");
-            }
-            for (a, b) in f.0.iter().flatten().zip(g.0.iter().flatten()) {
-                assert!((a - b).abs() < 1e-9, "{a} {b}");
-            }
-            assert_eq!(fast.stress(&H, pressure), f.0);
+        let (f, g) = (blocks(&fast, &H, false), blocks(&general, &H, false));
+        for (a, b) in f.1.iter().flatten().zip(g.1.iter().flatten()) {
+            assert!((a - b).abs() < 1e-8, "{a} {b}");
         }
+        for (a, b) in f.0.iter().flatten().zip(g.0.iter().flatten()) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+        assert_eq!(fast.stress(&H), f.0);
         assert!((fast.energy(&H) - general.energy(&H)).abs() < 1e-10);
     }
 
     #[test]
     fn projection_leaves_no_negative_curvature() {
-        for pressure in [-9000.0, 9000.0] {
+        // Squeezed and swollen states, where the tangent of the law is indefinite.
+        for size in [-0.4, 0.8] {
+            let h: M3 = std::array::from_fn(|r| std::array::from_fn(|c| H[r][c] + if r == c { size } else { 0.0 }));
             for kernel in [
                 Kernel::NeoHookean { mu: 1000.0, lambda: 9000.0 },
                 Kernel::General(Box::new(NeoHookean::new(1000.0, 0.45))),
             ] {
-                let (_, blocks) = blocks(&kernel, pressure, true);
+                let (_, blocks) = blocks(&kernel, &h, true);
                 let dense = SMatrix::<f64, 12, 12>::from_fn(|row, col| {
                     let (a, b, r, c) = (row / 3, col / 3, row % 3, col % 3);
                     if a <= b { blocks[4 * a + b][3 * c + r] } else { blocks[4 * b + a][3 * r + c] }

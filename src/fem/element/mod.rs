@@ -6,13 +6,13 @@
 
 mod assembly;
 mod kernel;
-mod nodal_pressure;
+mod nodal;
 mod tet10;
 mod tet4;
 
 pub(super) use assembly::{At, Elements, Partition};
 pub(super) use kernel::Kernel;
-pub(super) use nodal_pressure::{Dilation, NodalPressure};
+pub(super) use nodal::{NODAL_SHARE, NodalGradient, NodalTangent, Rings};
 pub(super) use tet4::tet4;
 pub(super) use tet10::{tet10, with_mid_edge_nodes};
 
@@ -25,8 +25,9 @@ pub enum ElementKind {
     /// Linear tetrahedron, one point; locks towards nu = 0.5.
     #[default]
     Tet4,
-    /// Linear tetrahedron whose volume term is averaged over the elements of a tissue around each node: no locking.
-    Tet4NodalPressure,
+    /// Linear tetrahedron with deformation averaged over the elements of a tissue around each node: no locking.
+    #[serde(alias = "tet4-nodal-pressure")]
+    Tet4Nodal,
     /// Quadratic tetrahedron with straight edges, four points: the oracle, several times dearer.
     Tet10,
 }

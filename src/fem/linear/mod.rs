@@ -1,20 +1,25 @@
 //! Solvers for the symmetric linear systems of Newton's method, behind one interface; one file per method.
 
 mod block_jacobi;
+mod direct;
+mod dissection;
+mod factor;
 mod operator;
 mod pcg;
 
+pub(super) use direct::Direct;
+pub(super) use factor::Symbolic;
 pub(super) use pcg::Pcg;
 
-use super::element::Dilation;
+use super::element::NodalTangent;
 use super::model::Model;
 use super::scenario::LinearMethod;
 use super::sparse::BlockMatrix;
 
-/// A tangent: sparse blocks and, for elements with averaged volume, a low-rank part on top.
+/// A tangent: sparse blocks and, for elements with averaged deformation, the nodes' part on top.
 pub(super) struct Tangent {
     pub matrix: BlockMatrix,
-    pub dilation: Option<Dilation>,
+    pub nodal: Option<NodalTangent>,
 }
 
 /// How a linear solve went.
@@ -39,49 +44,47 @@ pub(super) trait LinearSolver: Send {
 }
 
 impl Tangent {
-    /// y = (K + sum_a w_a b_a b_a^T) x in double precision.
+    /// y = K x in double precision.
     pub(super) fn product(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         self.matrix.product(x, y);
-        if let Some(dilation) = &self.dilation {
-            let inner: Vec<f64> = (0..dilation.weights.len())
-                .map(|g| {
-                    let range = dilation.row_start[g]..dilation.row_start[g + 1];
-                    let sum: f64 = dilation.rows[range.clone()]
-                        .iter()
-                        .zip(&dilation.values[range])
-                        .map(|(&r, v)| (0..3).map(|i| v[i] * x[r as usize][i]).sum::<f64>())
-                        .sum();
-                    dilation.weights[g] * sum
-                })
-                .collect();
-            for (row, out) in y.iter_mut().enumerate() {
-                for &(g, at) in &dilation.group_positions[dilation.group_start[row]..dilation.group_start[row + 1]] {
-                    let v = dilation.values[at as usize];
-                    (0..3).for_each(|i| out[i] += inner[g as usize] * v[i]);
-                }
-            }
+        if let Some(nodal) = &self.nodal {
+            nodal.add_product(x, y);
         }
     }
 
     /// The 3 x 3 diagonal block of a row, column-major.
     pub(super) fn diagonal_block(&self, row: usize) -> [f64; 9] {
         let mut block = self.matrix.blocks[self.matrix.pattern.diagonal[row] as usize];
-        if let Some(dilation) = &self.dilation {
-            for &(g, at) in &dilation.group_positions[dilation.group_start[row]..dilation.group_start[row + 1]] {
-                let (v, w) = (dilation.values[at as usize], dilation.weights[g as usize]);
-                for c in 0..3 {
-                    for r in 0..3 {
-                        block[3 * c + r] += w * v[r] * v[c];
-                    }
-                }
-            }
+        if let Some(nodal) = &self.nodal {
+            nodal.add_diagonal_block(row, &mut block);
         }
         block
     }
 }
 
-/// The solver a model's settings ask for.
-pub(super) fn automatic(model: &Model) -> Box<dyn LinearSolver> {
-    let blocks = model.scenario.solver.linear != LinearMethod::PcgJacobi;
-    Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes()))
+/// Poisson's ratio from which a factor is cheaper than conjugate gradients with a Jacobi preconditioner. Measured on
+/// brain5k (tet4, CPU-s by factor and by iteration): .23 and .11 at nu = .45, .29 and .35 at .499; Cook's membrane of
+/// n = 16 (averaged element): .6 and 18 at .4999.
+const STIFF_RATIO: f64 = 0.4985;
+
+/// Most free nodes for which that holds: a factor's work grows with the square of their number, an iteration's with
+/// the power 4/3.
+const MOST_FACTORED: usize = 12_000;
+
+/// The solver a model's settings ask for, with materials up to this Poisson's ratio.
+pub(super) fn for_model(model: &Model, largest_ratio: f64) -> Box<dyn LinearSolver> {
+    let method = model.scenario.solver.linear;
+    let iterative = |blocks| Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes()));
+    match method {
+        LinearMethod::PcgJacobi => return iterative(false),
+        LinearMethod::PcgBlockJacobi => return iterative(true),
+        LinearMethod::Auto if largest_ratio < STIFF_RATIO || model.free_nodes() > MOST_FACTORED => {
+            return iterative(true);
+        }
+        LinearMethod::Auto | LinearMethod::Direct => (),
+    }
+    match model.symbolic() {
+        Some(symbolic) => Box::new(Direct::new(symbolic)),
+        None => iterative(true),
+    }
 }

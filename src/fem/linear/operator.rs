@@ -1,5 +1,6 @@
 //! The tangent packed for the iteration: single or double precision, four lanes per node.
 
+use super::super::element::{NodalTangent, Rings};
 use super::super::sparse::BlockPattern;
 use super::Tangent;
 use rayon::prelude::*;
@@ -53,18 +54,73 @@ pub(super) struct Operator<T> {
     pattern: Arc<BlockPattern>,
     /// Column-major blocks, nine after nine, and one value more: a column is read as four lanes.
     packed: Vec<T>,
-    dilation: Option<PackedDilation<T>>,
+    nodal: Option<PackedNodal<T>>,
 }
 
-struct PackedDilation<T> {
-    row_start: Vec<usize>,
-    rows: Vec<u32>,
-    values: Vec<Lanes<T>>,
-    /// Square root of weights is not taken: weights may be negative.
-    weights: Vec<T>,
-    group_start: Vec<usize>,
-    group_positions: Vec<(u32, u32)>,
-    inner: Vec<T>,
+/// The nodes' part: gradients and moduli of every group, and the stresses of the product under way.
+struct PackedNodal<T> {
+    rings: Arc<Rings>,
+    held: Option<Arc<Vec<[bool; 3]>>>,
+    gradients: Vec<Lanes<T>>,
+    gradients_of_row: Vec<Lanes<T>>,
+    /// Nine columns of three lanes each.
+    moduli: Vec<[[Lanes<T>; 3]; 9]>,
+    stresses: Vec<[Lanes<T>; 3]>,
+}
+
+impl<T: Real> PackedNodal<T> {
+    fn new(tangent: &NodalTangent) -> Self {
+        let lanes = |v: &[f64; 3]| [T::of(v[0]), T::of(v[1]), T::of(v[2]), T::default()];
+        let column =
+            |column: &[f64; 9]| std::array::from_fn(|c| lanes(&[column[3 * c], column[3 * c + 1], column[3 * c + 2]]));
+        Self {
+            rings: Arc::clone(&tangent.rings),
+            held: tangent.held.clone(),
+            gradients: tangent.rings.gradients.iter().map(lanes).collect(),
+            gradients_of_row: tangent.rings.gradients_of_row.iter().map(lanes).collect(),
+            moduli: tangent.moduli.iter().map(|m| std::array::from_fn(|k| column(&m.as_chunks::<9>().0[k]))).collect(),
+            stresses: vec![[[T::default(); 4]; 3]; tangent.moduli.len()],
+        }
+    }
+
+    /// Stress of every group for the displacements p.
+    fn stretch(&mut self, p: &[Lanes<T>]) {
+        let (rings, gradients, moduli) = (&*self.rings, &self.gradients, &self.moduli);
+        by_rows(&mut self.stresses, |first, stresses| {
+            for (g, out) in (first..).zip(stresses) {
+                let range = rings.row_start[g]..rings.row_start[g + 1];
+                let mut h = [[T::default(); 4]; 3];
+                for (&row, b) in rings.rows[range.clone()].iter().zip(&gradients[range]) {
+                    let x = &p[row as usize];
+                    for c in 0..3 {
+                        add_scaled(&mut h[c], x, b[c]);
+                    }
+                }
+                let mut stress = [[T::default(); 4]; 3];
+                for (k, column) in moduli[g].iter().enumerate() {
+                    for c in 0..3 {
+                        add_scaled(&mut stress[c], &column[c], h[k / 3][k % 3]);
+                    }
+                }
+                *out = stress;
+            }
+        });
+    }
+
+    /// Force on a row.
+    #[inline(always)]
+    fn add_force(&self, row: usize, sum: &mut Lanes<T>) {
+        let range = self.rings.group_start[row]..self.rings.group_start[row + 1];
+        let mut force = [T::default(); 4];
+        for (&g, b) in self.rings.groups[range.clone()].iter().zip(&self.gradients_of_row[range]) {
+            let stress = &self.stresses[g as usize];
+            for c in 0..3 {
+                add_scaled(&mut force, &stress[c], b[c]);
+            }
+        }
+        let held = self.held.as_ref().map_or([false; 3], |h| h[row]);
+        (0..3).filter(|&i| !held[i]).for_each(|i| sum[i] += force[i]);
+    }
 }
 
 /// Runs `f(first row, rows)` over slices, on threads when there are any.
@@ -88,16 +144,8 @@ impl<T: Real> Operator<T> {
         let mut packed: Vec<T> = Vec::with_capacity(9 * tangent.matrix.blocks.len() + 1);
         packed.extend(tangent.matrix.blocks.iter().flatten().map(|&v| T::of(v)));
         packed.push(T::default());
-        let dilation = tangent.dilation.as_ref().map(|d| PackedDilation {
-            row_start: d.row_start.clone(),
-            rows: d.rows.clone(),
-            values: d.values.iter().map(|v| [T::of(v[0]), T::of(v[1]), T::of(v[2]), T::default()]).collect(),
-            weights: d.weights.iter().map(|&w| T::of(w)).collect(),
-            group_start: d.group_start.clone(),
-            group_positions: d.group_positions.clone(),
-            inner: vec![T::default(); d.weights.len()],
-        });
-        Self { pattern: Arc::clone(&tangent.matrix.pattern), packed, dilation }
+        let nodal = tangent.nodal.as_ref().map(PackedNodal::new);
+        Self { pattern: Arc::clone(&tangent.matrix.pattern), packed, nodal }
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -107,23 +155,10 @@ impl<T: Real> Operator<T> {
     /// y = A p.
     pub(super) fn apply(&mut self, p: &[Lanes<T>], y: &mut [Lanes<T>]) {
         let (pattern, packed) = (&*self.pattern, &self.packed);
-        if let Some(d) = &mut self.dilation {
-            let (row_start, rows, values, weights) = (&d.row_start, &d.rows, &d.values, &d.weights);
-            by_rows(&mut d.inner, |first, inner| {
-                for (g, out) in (first..).zip(inner) {
-                    let range = row_start[g]..row_start[g + 1];
-                    let mut sum = [T::default(); 4];
-                    for (&row, v) in rows[range.clone()].iter().zip(&values[range]) {
-                        let x = &p[row as usize];
-                        for lane in 0..4 {
-                            sum[lane] += v[lane] * x[lane];
-                        }
-                    }
-                    *out = (sum[0] + sum[1] + sum[2]) * weights[g];
-                }
-            });
+        if let Some(nodal) = &mut self.nodal {
+            nodal.stretch(p);
         }
-        let dilation = self.dilation.as_ref();
+        let nodal = self.nodal.as_ref();
         by_rows(y, |first, rows| {
             for (row, out) in (first..).zip(rows) {
                 let range = pattern.row_start[row]..pattern.row_start[row + 1];
@@ -136,10 +171,8 @@ impl<T: Real> Operator<T> {
                     add_scaled(&mut sum, &block[3..7], x[1]);
                     add_scaled(&mut sum, &block[6..10], x[2]);
                 }
-                if let Some(d) = dilation {
-                    for &(g, at) in &d.group_positions[d.group_start[row]..d.group_start[row + 1]] {
-                        add_scaled(&mut sum, &d.values[at as usize], d.inner[g as usize]);
-                    }
+                if let Some(nodal) = nodal {
+                    nodal.add_force(row, &mut sum);
                 }
                 // The fourth lane held the neighbour block's first entry.
                 sum[3] = T::default();

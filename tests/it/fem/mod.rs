@@ -1,5 +1,6 @@
 //! The solver against closed forms, identities and other people's figures.
 
+mod cook;
 mod meshes;
 mod refusals;
 mod sensitivities;

@@ -116,8 +116,8 @@ fn sensitivities_with_moved_nodes_are_the_slopes_of_solutions() {
 }
 
 #[test]
-fn sensitivities_of_averaged_pressure_are_the_slopes_of_solutions() {
-    agree_with_differences(&format!("{SCENARIO}element = 'tet4-nodal-pressure'\n"));
+fn sensitivities_of_averaged_deformation_are_the_slopes_of_solutions() {
+    agree_with_differences(&format!("{SCENARIO}element = 'tet4-nodal'\n"));
 }
 
 #[test]
