@@ -9,11 +9,12 @@
 //! # Ok::<(), hgm::material::meta_model::FitError>(())
 //! ```
 
-use super::gp::{Hyperparameters, TissuePrior, posterior};
-use super::literature::{Curves, table};
+use super::gp::{Hyperparameters, JointPosterior, Spread, TissuePrior, joint_posterior, posterior};
+use super::literature::{Curves, LiteratureModel, table};
 use super::meta_model::{Fit, FitError, MetaModel, MetaModelSettings, Search, fit};
 use super::task::{Task, stretches};
 use super::training::TrainingData;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// How samples are made.
@@ -104,6 +105,43 @@ pub fn sample_prior(
     sd_levels.iter().map(sample).collect()
 }
 
+/// What the Gaussian process over these studies says of one task, over its window, with covariances between stretches.
+pub fn joint_tissue_prior(task: Task, studies: &[LiteratureModel], settings: &SampleSettings) -> JointPosterior {
+    let data = TrainingData::from_literature(studies, settings.curves);
+    let [low, high] = task.stretch_window();
+    joint_posterior(&settings.hyperparameters, &data, task, &stretches(low, high, settings.stretches))
+}
+
+/// A material fitted to a random curve.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DrawnMaterial {
+    /// Number of the draw.
+    pub draw: u64,
+    /// Small-strain shear modulus, Pa.
+    pub shear_modulus_pa: f64,
+    /// The fitted law.
+    pub fit: Fit,
+}
+
+/// Materials fitted to draws 0, 1, ... of whole curves; draw n is the same whatever their number.
+///
+/// # Errors
+/// As [`sample_shear_moduli`].
+pub fn draw_materials(
+    joint: &JointPosterior,
+    draws: u64,
+    seed: u64,
+    spread: Spread,
+    settings: &SampleSettings,
+) -> Result<Vec<DrawnMaterial>, FitError> {
+    let one = |draw: u64| {
+        let targets = joint.draw(seed, draw, spread);
+        let fit = fit(settings.model, &joint.prior.stretches, &targets, &settings.meta_model)?;
+        Ok(DrawnMaterial { draw, shear_modulus_pa: fit.shear_modulus_pa, fit })
+    };
+    (0..draws).into_par_iter().map(one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,5 +199,37 @@ mod tests {
             assert!(samples.windows(2).all(|pair| pair[0].shear_modulus_pa < pair[1].shear_modulus_pa));
             assert!(samples.iter().all(|sample| sample.fit.stability.everywhere() && sample.fit.converged));
         }
+    }
+
+    #[test]
+    fn every_draw_is_fitted_by_a_stable_law() {
+        let cases = [
+            (MetaModel::NeoHookean, 10_000, Task::HYPERELASTIC_WHITE),
+            (MetaModel::MooneyRivlin, 300, Task::HYPERELASTIC_GREY),
+            (MetaModel::Ogden, 300, Task::HYPERELASTIC_HEALTHY),
+        ];
+        for (model, draws, task) in cases {
+            let settings = SampleSettings { stretches: 101, model, ..SampleSettings::default() };
+            let joint = joint_tissue_prior(task, &table(), &settings);
+            let materials = draw_materials(&joint, draws, 11, Spread::Study, &settings).unwrap();
+            let stable = |m: &&DrawnMaterial| m.fit.stability.everywhere() && m.shear_modulus_pa > 0.0;
+            assert_eq!(materials.iter().filter(stable).count() as u64, draws, "{model}");
+        }
+    }
+
+    #[test]
+    fn moduli_of_draws_spread_around_that_of_the_mean_curve() {
+        let settings = SampleSettings { stretches: 101, ..SampleSettings::default() };
+        let joint = joint_tissue_prior(Task::HYPERELASTIC_WHITE, &table(), &settings);
+        let middle = sample_prior(&joint.prior, &[0.0], &settings).unwrap()[0].shear_modulus_pa;
+        let mut moduli: Vec<f64> = draw_materials(&joint, 999, 5, Spread::Study, &settings)
+            .unwrap()
+            .into_iter()
+            .map(|m| m.shear_modulus_pa)
+            .collect();
+        moduli.sort_by(f64::total_cmp);
+        assert!((moduli[499] / middle - 1.0).abs() < 0.05, "{} {middle}", moduli[499]);
+        // The noise alone has an sd of 0.33 in ln W.
+        assert!(moduli[840] / moduli[499] > 1.25 && moduli[840] / moduli[499] < 1.6);
     }
 }

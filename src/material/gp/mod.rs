@@ -2,6 +2,7 @@
 //! time linear in the number of studies.
 
 mod dense;
+mod draws;
 mod filter;
 mod fit;
 mod gradient;
@@ -10,6 +11,7 @@ mod matern;
 mod smoother;
 
 pub use dense::{dense_negative_log_likelihood, dense_posterior};
+pub use draws::{JointPosterior, Spread, joint_posterior};
 pub use filter::negative_log_likelihood;
 pub use fit::{FitRefusal, FitSettings, HyperparameterFit, StartRecord, fit_hyperparameters};
 pub use gradient::{LikelihoodGradient, negative_log_likelihood_and_gradient};

@@ -1,7 +1,7 @@
 //! Posterior of one task by the modified Bryson-Frazier smoother: no covariance is ever inverted, so kappa = 0 and
 //! vanishing noise are harmless (Bierman, "Fixed interval smoothing with discrete measurements", Int J Control 18, 1973).
 
-use super::filter::{self, Half, Record, State, Update, transposed};
+use super::filter::{self, Half, Record, State, Stop, Update, transposed};
 use super::hyperparameters::{Hyperparameters, TaskMatrix};
 use super::matern::Transition;
 use crate::material::task::{TASKS, Task};
@@ -116,8 +116,29 @@ impl Adjoint {
     }
 }
 
-/// Posterior of one task at these stretches, in any order.
-pub fn posterior(parameters: &Hyperparameters, data: &TrainingData, task: Task, stretches: &[f64]) -> TissuePrior {
+/// What the passes leave at a query.
+pub(super) struct Passed {
+    pub mean: f64,
+    pub variance: f64,
+    /// Covariance of the filtered state with the task's curve.
+    pub row: (Half, Half),
+    /// Lambda times it: what later data take away.
+    pub taken: (Half, Half),
+}
+
+/// Both passes over the data and the queries.
+pub(super) struct Smoothed {
+    pub stops: Vec<Stop>,
+    /// Stop of each query.
+    pub place: Vec<usize>,
+    /// At each stop that is a query.
+    pub passed: Vec<Option<Passed>>,
+    /// By number of the input.
+    pub updates: Vec<Update>,
+}
+
+/// Runs both passes for one task.
+pub(super) fn smooth(parameters: &Hyperparameters, data: &TrainingData, task: Task, stretches: &[f64]) -> Smoothed {
     let (stops, place) = filter::stops(data, stretches);
     let mut wanted = vec![false; stops.len()];
     for stop in &place {
@@ -126,16 +147,16 @@ pub fn posterior(parameters: &Hyperparameters, data: &TrainingData, task: Task, 
     let mut trace = Trace { wanted, states: vec![None; stops.len()], updates: Vec::new() };
     filter::run(parameters, data, &stops, &mut trace);
     let mut adjoint = Adjoint::zero();
-    let mut found = vec![(0.0, 0.0); stops.len()];
+    let mut passed: Vec<Option<Passed>> = stops.iter().map(|_| None).collect();
     let t = task.index();
     for (index, stop) in stops.iter().enumerate().rev() {
         if let Some(state) = &trace.states[index] {
-            let (row_f, row_g) = (&state.ff[t], &state.fg[t]);
+            let (row_f, row_g) = (state.ff[t], state.fg[t]);
             let dot = |a: &Half, b: &Half| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-            let (lf, lg) = adjoint.times(row_f, row_g);
-            let mean = state.f[t] - dot(row_f, &adjoint.f) - dot(row_g, &adjoint.g);
-            let variance = state.ff[t][t] - dot(row_f, &lf) - dot(row_g, &lg);
-            found[index] = (mean, variance.max(0.0));
+            let (lf, lg) = adjoint.times(&row_f, &row_g);
+            let mean = state.f[t] - dot(&row_f, &adjoint.f) - dot(&row_g, &adjoint.g);
+            let variance = (state.ff[t][t] - dot(&row_f, &lf) - dot(&row_g, &lg)).max(0.0);
+            passed[index] = Some(Passed { mean, variance, row: (row_f, row_g), taken: (lf, lg) });
         }
         for input in (stop.first_input..stop.end_input).rev() {
             adjoint.back_through_update(data.inputs()[input].task, &trace.updates[input]);
@@ -145,12 +166,26 @@ pub fn posterior(parameters: &Hyperparameters, data: &TrainingData, task: Task, 
             adjoint.back_through(&Transition::over(gap, parameters.lengthscale));
         }
     }
-    let noise = parameters.noise_variance[t];
-    TissuePrior {
-        task,
-        stretches: stretches.to_vec(),
-        mean: place.iter().map(|stop| found[*stop].0).collect(),
-        latent_sd: place.iter().map(|stop| found[*stop].1.sqrt()).collect(),
-        observation_sd: place.iter().map(|stop| (found[*stop].1 + noise).sqrt()).collect(),
+    Smoothed { stops, place, passed, updates: trace.updates }
+}
+
+impl Smoothed {
+    /// The prior of a tissue from the passes.
+    pub fn prior(&self, task: Task, stretches: &[f64], noise_variance: f64) -> TissuePrior {
+        let at = |stop: &usize| self.passed[*stop].as_ref().map_or((f64::NAN, f64::NAN), |p| (p.mean, p.variance));
+        let found: Vec<(f64, f64)> = self.place.iter().map(at).collect();
+        TissuePrior {
+            task,
+            stretches: stretches.to_vec(),
+            mean: found.iter().map(|(mean, _)| *mean).collect(),
+            latent_sd: found.iter().map(|(_, variance)| variance.sqrt()).collect(),
+            observation_sd: found.iter().map(|(_, variance)| (variance + noise_variance).sqrt()).collect(),
+        }
     }
+}
+
+/// Posterior of one task at these stretches, in any order.
+pub fn posterior(parameters: &Hyperparameters, data: &TrainingData, task: Task, stretches: &[f64]) -> TissuePrior {
+    let noise = parameters.noise_variance[task.index()];
+    smooth(parameters, data, task, stretches).prior(task, stretches, noise)
 }
