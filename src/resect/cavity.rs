@@ -1,6 +1,5 @@
 //! The cavity that surgery left, and the tissue that filled it.
 
-use super::intensity::on_the_scale_of;
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, components, fill_holes};
 use crate::image::distance::distance_mm;
@@ -20,7 +19,7 @@ pub struct CavityPair<'a> {
     pub pre_labels: &'a LabelMap<Mni>,
     /// Pre-operative brain.
     pub pre_brain: &'a Mask<Mni>,
-    /// Post-operative intensities.
+    /// Post-operative intensities on the pre-operative scale ([`super::on_the_scale_of`]).
     pub post: &'a Volume<f32, Mni>,
     /// Where the post-operative scan looked: elsewhere is unknown, never cavity.
     pub post_known: &'a Mask<Mni>,
@@ -40,7 +39,13 @@ pub struct CavitySettings {
     pub opening_mm: f64,
     /// How far the boundary may grow from the seed through dark voxels, mm.
     pub growth_mm: f64,
-    /// Gaps (blood, vessels) narrower than twice this are closed, mm.
+    /// How far blood, as bright as tissue but without its folds, is followed from the dark part, mm.
+    pub blood_mm: f64,
+    /// Correlation of the two scans within a window below which the folds of grey and white matter are lost.
+    pub folds_kept: f64,
+    /// Fluid that was there before belongs to the cavity where most tissue within about this distance was lost, mm.
+    pub surroundings_mm: f64,
+    /// Gaps (vessels) narrower than twice this are closed, mm.
     pub closing_mm: f64,
     /// Smallest volume that counts as a cavity, cc.
     pub smallest_cc: f64,
@@ -48,7 +53,17 @@ pub struct CavitySettings {
 
 impl Default for CavitySettings {
     fn default() -> Self {
-        Self { bias_sigma_mm: 25.0, rim_mm: 2.0, opening_mm: 2.0, growth_mm: 8.0, closing_mm: 3.0, smallest_cc: 1.0 }
+        Self {
+            bias_sigma_mm: 25.0,
+            rim_mm: 2.0,
+            opening_mm: 2.0,
+            growth_mm: 8.0,
+            blood_mm: 12.0,
+            folds_kept: 0.4,
+            surroundings_mm: 3.0,
+            closing_mm: 3.0,
+            smallest_cc: 1.0,
+        }
     }
 }
 
@@ -103,8 +118,7 @@ pub enum ResectError {
 pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<CavityFinding, ResectError> {
     let grid = pair.pre.grid;
     let tissue = pair.pre_labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER);
-    let known_tissue = both(&tissue, pair.post_known);
-    let post = on_the_scale_of(pair.pre, pair.post, &known_tissue, settings.bias_sigma_mm);
+    let post = pair.post;
     let border = pair.csf_grey_border as f32;
     let dark = Mask::from_data(
         grid,
@@ -123,15 +137,30 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
         return Err(ResectError::NoCavity { largest_cc: seed.volume_cc(), smallest_cc: settings.smallest_cc });
     }
 
+    let grown = grow(&seed, &both(&dark, pair.pre_brain), settings.growth_mm);
+    let cavity = settled(&grown, pair.pre_brain, settings.closing_mm);
+    let cavity = with_fluid_of(&cavity, &tissue, settings.surroundings_mm);
+    let cavity = both(&cavity, pair.pre_brain);
     let ventricle = pair.pre_labels.map(|l| l == label::VENTRICLE);
-    let growable = without(&both(&dark, pair.pre_brain), &ventricle);
-    let grown = grow(&seed, &growable, settings.growth_mm);
-    let closed = fill_holes(&close(&grown, settings.closing_mm));
-    let smooth = gaussian(&closed.map(|inside| f32::from(u8::from(inside))), 1.0).map(|share| share > 0.5);
-    let cavity = without(&both(&smooth, pair.pre_brain), &ventricle);
     let resected = without(&cavity, &ventricle);
     let side = side_of(&cavity);
     Ok(CavityFinding { cavity, resected, side })
+}
+
+/// Gaps closed, holes filled, stairs smoothed, within the brain.
+pub(super) fn settled(mask: &Mask<Mni>, brain: &Mask<Mni>, closing_mm: f64) -> Mask<Mni> {
+    let closed = fill_holes(&close(mask, closing_mm));
+    both(&gaussian(&closed.map(f32::from), 1.0).map(|share| share > 0.5), brain)
+}
+
+/// Tissue as it stands; fluid that was there before belongs to the cavity where most of the tissue around was lost: a
+/// sulcus or a horn of the ventricle within it, but not the fissure or the ventricle it opens to.
+pub(super) fn with_fluid_of(lost: &Mask<Mni>, tissue: &Mask<Mni>, sigma_mm: f64) -> Mask<Mni> {
+    let all = gaussian(&tissue.map(f32::from), sigma_mm);
+    let gone = gaussian(&both(lost, tissue).map(f32::from), sigma_mm);
+    let fluid_lost = |n: usize| all.data[n] > 1e-3 && gone.data[n] > 0.5 * all.data[n];
+    let belongs = |n: usize| if tissue.data[n] { lost.data[n] } else { fluid_lost(n) };
+    Mask::from_data(lost.grid, (0..lost.data.len()).map(belongs).collect())
 }
 
 /// The finding of a mask (or two) given by hand; what is missing is the other one within the brain.
@@ -163,7 +192,7 @@ pub fn subtract(
 }
 
 /// Layers of one voxel (6-neighbours) from the seed through `allowed`, as many as fit into `limit_mm`.
-fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask<Mni> {
+pub(super) fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask<Mni> {
     let [nx, ny, nz] = seed.grid.dims;
     let [sx, sy, sz] = seed.grid.spacing_mm();
     let mut grown = seed.clone();
@@ -200,11 +229,15 @@ fn side_of(mask: &Mask<Mni>) -> Side {
     if sum < 0.0 { Side::Left } else { Side::Right }
 }
 
-fn both(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
+pub(super) fn both(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
     Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && *b).collect())
 }
 
-fn without(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
+pub(super) fn either(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
+    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a || *b).collect())
+}
+
+pub(super) fn without(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
     Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && !*b).collect())
 }
 
@@ -241,6 +274,7 @@ mod tests {
         let pre = Volume::from_data(grid, (0..grid.len()).map(value).collect());
         let dark = |n: usize| if hole.data[n] { 25.0 } else { value(n) };
         let post = Volume::from_data(grid, (0..grid.len()).map(|n| 2.5 * dark(n)).collect());
+        let post = super::super::on_the_scale_of(&pre, &post, &brain, 25.0);
         Head { pre, labels, brain, post, hole }
     }
 

@@ -58,6 +58,8 @@ pub(super) fn brain_mask(
         known.data[n] && priors.brain_mm.data[n] < reach && (closed.data[n] || priors.brain_mm.data[n] < -2.0 * depth)
     });
     let filled = fill_holes(&solid);
+    // Cisterns and the fourth ventricle reach deep between the lobes; the template leaves them out of its brain.
+    let filled = at_each(t1, |n| filled.data[n] && (tissue.data[n] || priors.brain_mm.data[n] < 0.5));
     // Stairs and single voxels at the surface carry no information.
     let smooth = gaussian(&filled.map(|inside| f32::from(u8::from(inside))), 0.8);
     let mask = at_each(t1, |n| known.data[n] && smooth.data[n] > 0.5);

@@ -25,7 +25,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("image", vec!["geometry", "artefact"]),
         ("register", vec!["geometry", "image"]),
         ("segment", vec!["geometry", "image", "register"]),
-        ("resect", vec!["geometry", "image", "segment"]),
+        ("resect", vec!["geometry", "image", "register", "segment"]),
         ("mesh", vec!["geometry", "image", "segment", "artefact"]),
         ("tag", vec!["geometry", "segment", "mesh"]),
         ("material", vec!["artefact"]),

@@ -10,15 +10,14 @@ use crate::geometry::{Frame, Mni};
 use crate::image::nifti::{self, ReadOptions, encode_i16, encode_mask, encode_u8};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
-use crate::resect::{CavityPair, CavitySettings, Side, apart_from, csf_grey_border, find_cavity, subtract};
+use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, take_pair_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{SegmentOverrides, SegmentSettings, atlas, label, segment_t1};
-use anyhow::anyhow;
+use crate::segment::{atlas, label};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
 const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
 const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";
@@ -80,9 +79,8 @@ pub fn anat(
     after: &Manifest,
     session: &Session,
 ) -> Result<(Manifest, AnatFacts), Failure> {
-    let segment_settings: SegmentSettings = session.settings("segment")?;
-    let cavity_settings: CavitySettings = session.settings("resect")?;
-    let mut stage = Stage::new("anat", VERSION, &case.folder, &(&segment_settings, &cavity_settings))
+    let settings: PairSettings = session.settings("anat")?;
+    let mut stage = Stage::new("anat", VERSION, &case.folder, &settings)
         .input("pre", &scans.pre_bytes)
         .input("post", &scans.post_bytes)
         .after(after)
@@ -98,59 +96,33 @@ pub fn anat(
     let resected = given("resected mask", &overrides.resected_mask)?;
 
     case.run(&stage, "anat", || {
-        let bar = session.progress(4, "images");
+        let bar = session.progress(6, "images");
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let mni_from_post = pre_from_post.then(&mni_from_pre);
         let grid = atlas::template().grid();
         let on_mni = |mask: &GivenMask| mask.on_mni(&grid, &mni_from_pre, &mni_from_post);
-
-        bar.set_message("pre-operative tissue");
-        let brain_on_pre = match &brain {
-            None => None,
-            Some(GivenMask::Pre(mask)) => Some(mask.clone()),
-            Some(GivenMask::Post(mask)) => Some(mask_on(mask, &scans.pre.grid, &pre_from_post.inverse())),
+        let given = GivenMasks {
+            brain: brain.as_ref().map(|mask| match mask {
+                GivenMask::Pre(mask) => mask.clone(),
+                GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
+            }),
+            cavity: cavity.as_ref().map(on_mni),
+            resected: resected.as_ref().map(on_mni),
         };
-        let before =
-            segment_t1(&scans.pre, &mni_from_pre, &SegmentOverrides { brain: brain_on_pre.as_ref() }, &segment_settings)
+        let step = |what: &'static str| {
+            bar.inc(1);
+            bar.set_message(what);
+        };
+        let OperatedBrain { pre: before, post: after, finding: found, post_ventricle, post_brain, .. } =
+            take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &settings, step)
                 .reject()?;
-        bar.inc(1);
-        bar.set_message("post-operative tissue");
-        let after = segment_t1(&scans.post, &mni_from_post, &SegmentOverrides::default(), &segment_settings).reject()?;
-        bar.inc(1);
-
-        bar.set_message("cavity");
-        let pair = CavityPair {
-            pre: &before.t1_mni,
-            pre_labels: &before.labels_mni,
-            pre_brain: &before.brain_mni,
-            post: &after.t1_mni,
-            post_known: &after.known_mni,
-            csf_grey_border: csf_grey_border(&before.tissue_means, &before.tissue_deviations),
-        };
-        let by_hand =
-            subtract(cavity.as_ref().map(on_mni), resected.as_ref().map(on_mni), &before.brain_mni, &before.labels_mni);
-        let found = match by_hand.reject()? {
-            Some(found) => found,
-            None => find_cavity(&pair, &cavity_settings).reject()?,
-        };
-        if found.resected.count() == 0 {
-            return Err(Failure::Rejected(anyhow!("the resected tissue is empty; give --resected-mask")));
-        }
-        bar.inc(1);
 
         bar.set_message("writing");
-        let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &found.cavity, 1.0);
-        if post_ventricle.count() == 0 {
-            return Err(Failure::Rejected(anyhow!(
-                "no ventricle is left on the post-operative scan: it is empty or lies within the cavity; check --cavity-mask"
-            )));
-        }
-        let post_brain = after.brain_mni.clone();
-        let post_brain = apart_from(&post_brain, &found.cavity, 0.0);
         let mut produced = Produced::default();
         let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
         let pre_t1 = resample(&scans.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        let post_t1 = resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        let post_t1 =
+            resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
         write("anat/pre_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&pre_t1.volume)));
         write("anat/post_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&post_t1.volume)));
         write("anat/pre_space-MNI_desc-brain_mask.nii.gz", encode_mask(&before.brain_mni));

@@ -7,6 +7,7 @@ mod velocity;
 pub use field::DisplacementField;
 
 use super::affine;
+use super::mutual_information::Pose;
 use super::pyramid::reduced_to;
 use super::rigid::on_grid_of;
 use crate::geometry::{Frame, Native, Position};
@@ -34,6 +35,8 @@ pub struct DeformableSettings {
     pub velocity_sigma_voxels: f64,
     /// The images are compared over the atlas's brain widened by this much.
     pub margin_mm: f64,
+    /// Whether an affine fit comes first; without it the heads are taken to be one head.
+    pub affine: bool,
     /// A level ends when five iterations have raised the mean local correlation by less than this.
     pub least_gain: f64,
 }
@@ -46,6 +49,7 @@ impl Default for DeformableSettings {
             update_sigma_voxels: 1.5,
             velocity_sigma_voxels: 0.5,
             margin_mm: 4.0,
+            affine: true,
             least_gain: 2e-3,
         }
     }
@@ -135,7 +139,11 @@ pub fn fit_atlas<F: Frame>(
     let known: Mask<Native> = Volume::from_data(subject.grid, (0..subject.data.len()).map(is_known).collect());
     let subject = subject.map(|x| if x.is_finite() { x } else { 0.0 });
 
-    let pose = affine::head_from_template(&atlas, &wide, &subject, Some(&known));
+    let pose = if settings.affine {
+        affine::head_from_template(&atlas, &wide, &subject, Some(&known))
+    } else {
+        Pose { linear: Matrix3::identity(), centre: Vector3::zeros(), target: Vector3::zeros() }
+    };
     let shift = pose.target - pose.linear * pose.centre;
 
     let mut velocity: Option<VectorField> = None;

@@ -1,0 +1,239 @@
+//! A pre- and a post-operative scan taken apart together.
+
+use super::blood::{SaggedPair, with_blood};
+use super::cavity::{both, either};
+use super::{
+    CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, csf_grey_border, find_cavity, on_the_scale_of,
+    subtract,
+};
+use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::image::morphology::dilate;
+use crate::image::resample::{Interpolation, resample};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
+use crate::segment::{
+    AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, label, segment_with_priors,
+};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Everything that steers [`take_pair_apart`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PairSettings {
+    /// Fit of the template to each head.
+    pub deformable: DeformableSettings,
+    /// Fit of the pre-operative brain to the post-operative one.
+    pub sag: DeformableSettings,
+    /// Brain mask, tissue, ventricles.
+    pub segment: SegmentSettings,
+    /// Cavity.
+    pub cavity: CavitySettings,
+}
+
+impl Default for PairSettings {
+    fn default() -> Self {
+        Self {
+            deformable: DeformableSettings::default(),
+            sag: DeformableSettings { affine: false, ..DeformableSettings::default() },
+            segment: SegmentSettings::default(),
+            cavity: CavitySettings::default(),
+        }
+    }
+}
+
+/// Masks the user brings, on the template's grid but for the brain; they win over the computed ones.
+#[derive(Clone, Debug, Default)]
+pub struct GivenMasks {
+    /// The brain on the pre-operative scan.
+    pub brain: Option<Mask<Pre>>,
+    /// The cavity.
+    pub cavity: Option<Mask<Mni>>,
+    /// The resected tissue.
+    pub resected: Option<Mask<Mni>>,
+}
+
+/// Both scans with their labels and what the operation took.
+#[derive(Clone, Debug)]
+pub struct OperatedBrain {
+    /// The pre-operative scan.
+    pub pre: Segmentation<Pre>,
+    /// The post-operative scan.
+    pub post: Segmentation<Post>,
+    /// Cavity, resected tissue, side.
+    pub finding: CavityFinding,
+    /// Where the pre-operative brain lies after the operation, around the cavity; both in the MNI frame reached rigidly.
+    pub sag: AtlasFit<Mni>,
+    /// Ventricles of the post-operative scan, apart from the cavity.
+    pub post_ventricle: Mask<Mni>,
+    /// Brain of the post-operative scan without the cavity.
+    pub post_brain: Mask<Mni>,
+}
+
+/// Why a pair could not be taken apart.
+#[derive(Debug, Error)]
+pub enum PairError {
+    /// The template does not fit the head.
+    #[error("{scan}: {source}")]
+    Atlas {
+        /// `pre` or `post`.
+        scan: &'static str,
+        /// The fit's own words.
+        source: DeformableError,
+    },
+    /// A scan cannot be segmented.
+    #[error("{scan}: {source}")]
+    Segment {
+        /// `pre` or `post`.
+        scan: &'static str,
+        /// The segmentation's own words.
+        source: SegmentError,
+    },
+    /// No cavity, or one outside the brain.
+    #[error(transparent)]
+    Resect(#[from] ResectError),
+    /// Nothing was taken out.
+    #[error("the resected tissue is empty; give --resected-mask")]
+    NothingResected,
+    /// The operation's ventricle cannot be told from the cavity.
+    #[error(
+        "no ventricle is left on the post-operative scan: it is empty or lies within the cavity; check --cavity-mask"
+    )]
+    NoVentricle,
+}
+
+/// Labels both scans with the template's maps carried onto each head, finds the cavity on the post-operative scan and
+/// the tissue that filled it on the pre-operative one.
+///
+/// `step` is told what is being done, five times.
+///
+/// # Errors
+/// [`PairError`], which names the scan.
+pub fn take_pair_apart(
+    pre: &Volume<f32, Pre>,
+    post: &Volume<f32, Post>,
+    pre_from_post: &RigidTransform<Post, Pre>,
+    mni_from_pre: &RigidTransform<Pre, Mni>,
+    given: &GivenMasks,
+    settings: &PairSettings,
+    step: impl Fn(&'static str),
+) -> Result<OperatedBrain, PairError> {
+    let mni_from_post = pre_from_post.then(mni_from_pre);
+    let grid = atlas::template().grid();
+
+    step("pre-operative tissue");
+    let pre_fit = fitted_template(pre, mni_from_pre, &settings.deformable)
+        .map_err(|source| PairError::Atlas { scan: "pre", source })?;
+    let brain = SegmentOverrides { brain: given.brain.as_ref() };
+    let pre_priors = AtlasPriors::through(&grid, |p| Some(pre_fit.atlas_from_subject.apply(p)), MISFIT_MM);
+    let before = segment_with_priors(pre, mni_from_pre, &pre_priors, &brain, &settings.segment)
+        .map_err(|source| PairError::Segment { scan: "pre", source })?;
+
+    step("cavity");
+    let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+    let by_hand = subtract(given.cavity.clone(), given.resected.clone(), &before.brain_mni, &before.labels_mni)?;
+    let tissue = tissue_of(&before.labels_mni);
+    let known_tissue = both(&tissue, &post_on_mni.inside);
+    let post_t1 = on_the_scale_of(
+        &before.t1_mni,
+        &post_on_mni.volume.map(|x| x.max(0.0)),
+        &known_tissue,
+        settings.cavity.bias_sigma_mm,
+    );
+    let border = csf_grey_border(&before.tissue_means, &before.tissue_deviations);
+    let dark_part = |_| {
+        let pair = CavityPair {
+            pre: &before.t1_mni,
+            pre_labels: &before.labels_mni,
+            pre_brain: &before.brain_mni,
+            post: &post_t1,
+            post_known: &post_on_mni.inside,
+            csf_grey_border: border,
+        };
+        find_cavity(&pair, &settings.cavity)
+    };
+    let computed = by_hand.is_none();
+    let mut finding = by_hand.map_or_else(|| dark_part(()), Ok)?;
+
+    step("sag");
+    let sag = fitted_sag(&before, &post_t1, &post_on_mni.inside, &finding.cavity, &settings.sag)
+        .map_err(|source| PairError::Atlas { scan: "post", source })?;
+    if computed {
+        let carried_labels = sag.atlas_from_subject.warp_labels(&before.labels_mni, &grid);
+        let pair = SaggedPair {
+            pre: &sag.atlas_from_subject.warp(&before.t1_mni, &grid, 0.0),
+            tissue: &tissue_of(&carried_labels),
+            brain: &sag.atlas_from_subject.warp_mask(&before.brain_mni, &grid),
+            post: &post_t1,
+            post_known: &post_on_mni.inside,
+            csf_grey_border: border,
+            grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
+        };
+        finding.cavity = with_blood(&finding.cavity, &pair, &settings.cavity);
+    }
+    if given.resected.is_none() {
+        finding.resected = refilled(&finding.cavity, &sag, &before);
+    }
+    if finding.resected.count() == 0 {
+        return Err(PairError::NothingResected);
+    }
+
+    step("post-operative tissue");
+    let on_template = |p| Some(pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
+    let post_priors = AtlasPriors::through(&grid, on_template, MISFIT_MM);
+    let after =
+        segment_with_priors(post, &mni_from_post, &post_priors, &SegmentOverrides::default(), &settings.segment)
+            .map_err(|source| PairError::Segment { scan: "post", source })?;
+    let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
+    if post_ventricle.count() == 0 {
+        return Err(PairError::NoVentricle);
+    }
+    let post_brain = apart_from(&after.brain_mni, &finding.cavity, 0.0);
+    Ok(OperatedBrain { pre: before, post: after, finding, sag, post_ventricle, post_brain })
+}
+
+/// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
+const RIM_MM: f64 = 5.0;
+
+/// What is left of the misfit between the carried template and a head, mm: about a voxel of the fit's finest level.
+const MISFIT_MM: f64 = 1.5;
+
+/// The template deformed onto a head; both in the MNI frame reached rigidly.
+fn fitted_template<F: Frame>(
+    t1: &Volume<f32, F>,
+    mni_from_t1: &RigidTransform<F, Mni>,
+    settings: &DeformableSettings,
+) -> Result<AtlasFit<Mni>, DeformableError> {
+    let template = atlas::template().t1_f32();
+    let affine = mni_from_t1.inverse().to_affine();
+    let on_grid = resample(t1, &template.grid, &affine, Interpolation::Linear, f32::NAN);
+    fit_atlas(&on_grid.volume, &template, None, settings)
+}
+
+/// The pre-operative brain deformed onto the post-operative one around the cavity. Both lie on one grid.
+fn fitted_sag(
+    before: &Segmentation<Pre>,
+    post: &Volume<f32, Mni>,
+    known: &Mask<Mni>,
+    cavity: &Mask<Mni>,
+    settings: &DeformableSettings,
+) -> Result<AtlasFit<Mni>, DeformableError> {
+    // The rim of skull and scalp, which does not move, holds the map at the brain's surface.
+    let near = dilate(&before.brain_mni, RIM_MM);
+    let pre = before.t1_mni.data.iter().zip(&near.data).map(|(t1, near)| if *near { t1.max(1e-3) } else { 0.0 });
+    let post = post.data.iter().zip(&known.data).map(|(t1, known)| if *known { *t1 } else { f32::NAN });
+    let (pre, post) = (Volume::from_data(near.grid, pre.collect()), Volume::from_data(near.grid, post.collect()));
+    // The cavity's own edge is nowhere on the pre-operative scan.
+    fit_atlas(&post, &pre, Some(&dilate(cavity, 1.5)), settings)
+}
+
+/// The tissue that filled the cavity: what lies where it is now, and what lies there once the sag is undone. Tissue closes
+/// in on a cavity, so that neither alone is all of it.
+fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
+    let undone = sag.subject_from_atlas.warp_mask(cavity, &before.brain_mni.grid);
+    both(&either(cavity, &undone), &before.brain_mni)
+}
+
+fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {
+    labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
+}
