@@ -8,6 +8,7 @@ mod case;
 mod completions;
 mod demo;
 mod doctor;
+mod estimate;
 mod failure;
 mod man;
 mod phantom;
@@ -40,6 +41,7 @@ enum Command {
     Prep(prep::Args),
     Run(run::Args),
     Phantom(phantom::Args),
+    Estimate(estimate::Args),
     Synth(synth::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
@@ -57,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Prep(args) => prep::run(&args, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
+        Command::Estimate(args) => estimate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),

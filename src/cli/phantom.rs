@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 /// Raised when the reference's code changes its result.
 const VERSION: u32 = 1;
-const REFERENCE: &str = "sim/reference.vtu";
+use super::case::REFERENCE_STATE as REFERENCE;
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples
 ///

@@ -91,6 +91,11 @@ impl Session {
         }
     }
 
+    /// Whether the settings file has a table of this room.
+    pub fn has_table(&self, room: &str) -> bool {
+        self.config.contains_key(room)
+    }
+
     /// Whether the settings file names this key of this room.
     pub fn has_settings(&self, room: &str, key: &str) -> bool {
         self.config.get(room).and_then(|table| table.get(key)).is_some()

@@ -3,6 +3,7 @@
 //! Lengths in mm, moduli in Pa, areas in mm2, volumes in cc. A figure that could not be computed is absent, never NaN
 //! (JSON has none). Maps are ordered by name, samples in order of their grid: the same experiment gives the same bytes.
 
+use super::estimate::EstimateOutcome;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -32,6 +33,9 @@ pub struct ExperimentOutcome {
     pub samples: Vec<SampleOutcome>,
     /// `id` of the sample with the smallest RMSE.
     pub best_sample: Option<String>,
+    /// The estimate, where one was made.
+    #[serde(default)]
+    pub estimate: Option<EstimateOutcome>,
     /// RMSE of the undeformed mesh per node set, mm: what a sample must beat.
     #[serde(default)]
     pub rest_rmse_mm: BTreeMap<String, f64>,

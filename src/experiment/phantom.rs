@@ -106,6 +106,9 @@ pub fn nearest_sample<'a>(samples: &'a [Sample], reference: &Sample) -> Option<&
 }
 
 #[cfg(test)]
+pub(super) use tests::block;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::experiment::sample::every_combination;

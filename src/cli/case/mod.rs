@@ -4,13 +4,17 @@
 //! the next one the same bytes to start from.
 
 mod anat;
+mod estimate;
 mod mesh;
+mod observed;
 mod registration;
 mod samples;
 mod scans;
 
 pub use anat::{AnatFacts, Anatomy, anat};
+pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, estimate};
 pub use mesh::{MeshFacts, MeshOptions, mesh};
+pub use observed::{observed_surfaces, reference};
 pub use registration::{RegistrationFacts, registration};
 pub use samples::{Sweep, rest_mesh, samples};
 pub use scans::{Overrides, Scans};
@@ -34,6 +38,9 @@ pub const PRE_FROM_POST: &str = "xfm/from-post_to-pre";
 pub const REST_MESH: &str = "mesh/rest.vtu";
 /// The experiment's numbers.
 pub const OUTCOME: &str = "sim/outcome.json";
+
+/// A phantom's reference state.
+pub const REFERENCE_STATE: &str = "sim/reference.vtu";
 
 /// A case folder.
 #[derive(Clone, Debug)]
@@ -60,11 +67,30 @@ impl Case {
         settings: &BTreeMap<&str, serde_json::Value>,
         manifests: &[Manifest],
     ) -> Result<String, Failure> {
-        write_whole(&self.path(OUTCOME), outcome.to_json(OUTCOME)?.as_bytes())?;
-        write_whole(&self.path("sim/samples.csv"), samples_table(outcome).as_bytes())?;
+        self.write_outcome(outcome)?;
         self.write_settings(settings)?;
         self.write_provenance(manifests)?;
         self.write_page()
+    }
+
+    /// `sim/outcome.json` and `sim/samples.csv`.
+    ///
+    /// # Errors
+    /// The disk's, or a figure that is not a number.
+    pub fn write_outcome(&self, outcome: &ExperimentOutcome) -> Result<(), Failure> {
+        write_whole(&self.path(OUTCOME), outcome.to_json(OUTCOME)?.as_bytes())?;
+        Ok(write_whole(&self.path("sim/samples.csv"), samples_table(outcome).as_bytes())?)
+    }
+
+    /// What the stage `anat` said of the masks.
+    ///
+    /// # Errors
+    /// Rejected when the case has not been prepared.
+    pub fn anat_facts(&self) -> Result<AnatFacts, Failure> {
+        const NAME: &str = ".stages/anat.manifest.json";
+        let manifest: Manifest =
+            serde_json::from_slice(&self.read(NAME)?).with_context(|| format!("{NAME}: not a manifest")).reject()?;
+        serde_json::from_value(manifest.facts).with_context(|| format!("{NAME}: facts of another version")).reject()
     }
 
     /// `settings.toml`: every setting that was used, by room.

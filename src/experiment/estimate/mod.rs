@@ -4,12 +4,16 @@
 //! Gaussian over them, then the Laplace approximation of the posterior (MacKay, "Information Theory, Inference, and
 //! Learning Algorithms", chapter 27) and what the data can and cannot tell apart.
 
+mod body;
 mod levenberg_marquardt;
+mod outcome;
 mod posterior;
 
+pub use body::{Body, BodyError, Observation, Solved, Unknown};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
+pub use outcome::{Estimate, EstimateOutcome, Problem, ProblemError, solve_problem};
 pub use posterior::{Identifiability, Posterior, Verdict, laplace};
 
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,6 @@
 //! The report as one HTML file that opens from disk and asks nothing of any other place.
 
+mod estimate;
 mod methods;
 mod parts;
 mod results;
@@ -142,6 +143,7 @@ impl CasePage {
         add("masks", "Masks", (!self.mosaics.is_empty()).then(|| self.mosaics.iter().map(parts::mosaic).collect()));
         add("mesh", "Mesh", self.mesh_section());
         add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(results::samples));
+        add("estimate", "Estimate", outcome.and_then(|o| o.estimate.as_ref()).map(estimate::section));
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
         add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));

@@ -33,7 +33,7 @@ pub fn spread(values: &[f64]) -> String {
 }
 
 /// A table that scrolls on its own when the page is narrow. Cells are HTML.
-fn table(caption: &str, head: &[String], rows: &[(bool, Vec<String>)]) -> String {
+pub fn table(caption: &str, head: &[String], rows: &[(bool, Vec<String>)]) -> String {
     let mut html = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
         escape(caption)

@@ -1,0 +1,180 @@
+//! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
+
+use super::{Case, Failure, Reject, facts};
+use crate::artefact::{Manifest, Produced, Stage};
+use crate::cli::Session;
+use crate::experiment::estimate::{
+    Estimate, EstimateOutcome, EstimateSettings, LogPrior, Observation, Problem, Unknown, solve_problem,
+};
+use crate::experiment::outcome::SampleOutcome;
+use crate::experiment::phantom::neo_hookean;
+use crate::experiment::prior::{PriorSettings, log_prior};
+use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::sweep::Reference;
+use crate::fem::Scenario;
+use crate::geometry::{Frame, Mni};
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, vtu};
+use serde::{Deserialize, Serialize};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+/// Name of the estimate among the samples.
+pub const ESTIMATE: &str = "estimate";
+/// Its numbers.
+pub const ESTIMATE_JSON: &str = "sim/estimate.json";
+
+/// How the estimate is posed; the table `[estimate]` of the settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EstimateOptions {
+    /// The descent; its noise is the noise floor's where that is known.
+    pub descent: EstimateSettings,
+    /// Errors of a segmented surface are alike over this distance, mm: nodes nearer to each other count as one.
+    pub correlation_mm: f64,
+    /// Also estimate the effective density, with the prior below.
+    pub density: bool,
+    /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
+    pub density_log_sd: f64,
+    /// Noise of a phantom's displacements, mm: they are known to the solver's residual.
+    pub phantom_noise_mm: f64,
+}
+
+impl Default for EstimateOptions {
+    fn default() -> Self {
+        Self {
+            descent: EstimateSettings::default(),
+            correlation_mm: 5.0,
+            density: false,
+            density_log_sd: 0.56,
+            phantom_noise_mm: 0.01,
+        }
+    }
+}
+
+/// What an estimate needs of its case.
+pub struct EstimateInput<'a> {
+    /// The rest mesh and its file's bytes.
+    pub mesh: (&'a TetMesh, &'a [u8]),
+    /// Loads, supports, solver.
+    pub scenario: &'a Scenario,
+    /// The tissues whose moduli are estimated.
+    pub tissues: &'a [Tissue],
+    /// Poisson's ratio of all of them.
+    pub poisson_ratio: f64,
+    /// What the state is compared with.
+    pub reference: &'a Reference,
+    /// Everything the reference was made from.
+    pub reference_bytes: &'a [u8],
+    /// Standard deviation of one observation, mm.
+    pub noise_mm: f64,
+}
+
+/// The estimate's numbers, and its state as one more sample.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct EstimateFacts {
+    /// Modes, intervals, limits.
+    pub estimate: EstimateOutcome,
+    /// Moduli and errors in the layout of a sample.
+    pub record: SampleOutcome,
+}
+
+/// Runs (or skips) the estimate.
+///
+/// # Errors
+/// A scenario that the solver refuses, or a prior that does not exist.
+pub fn estimate(
+    case: &Case,
+    input: &EstimateInput<'_>,
+    options: &EstimateOptions,
+    session: &Session,
+) -> Result<(Manifest, EstimateFacts), Failure> {
+    let prior: PriorSettings = session.settings("prior")?;
+    let posed = (input.scenario, input.tissues, input.poisson_ratio, input.noise_mm, options, &prior);
+    let stage = Stage::new(ESTIMATE, VERSION, &case.folder, &posed)
+        .input("mesh", input.mesh.1)
+        .input("reference", input.reference_bytes)
+        .frame(Mni::NAME);
+    case.run(&stage, ESTIMATE, || {
+        let bar = session.progress(1, "estimate");
+        let mesh = input.mesh.0;
+        let mut unknowns = Vec::new();
+        for tissue in input.tissues {
+            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, &prior).reject()?));
+        }
+        if options.density {
+            let mean = input.scenario.loads.density_kg_per_m3.ln();
+            let name = Unknown::Density.name();
+            unknowns.push((Unknown::Density, LogPrior { name, mean, sd: Some(options.density_log_sd) }));
+        }
+        let (observation, independent_share) = match input.reference {
+            Reference::Nodes(u) => {
+                (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0)
+            }
+            Reference::Surfaces(surfaces) => {
+                // A node of a surface mesh of edge h stands for sqrt(3)/2 h^2 of it.
+                let area_mm2 = 0.75f64.sqrt() * mesh.median_edge_mm().powi(2);
+                (Observation::Surfaces(surfaces.clone()), (area_mm2 / options.correlation_mm.powi(2)).min(1.0))
+            }
+        };
+        let problem = Problem {
+            mesh,
+            template: input.scenario,
+            unknowns,
+            poisson_ratio: input.poisson_ratio,
+            observation,
+            independent_share,
+            start: Vec::new(),
+        };
+        let settings = EstimateSettings { noise_mm: input.noise_mm, ..options.descent.clone() };
+        let found = solve_problem(problem, &settings).reject()?;
+        bar.finish_and_clear();
+        produced(input, found)
+    })
+}
+
+fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Failure> {
+    let mesh = input.mesh.0;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm } = found;
+    let errors = input.reference.errors(mesh, &state.displacement_mm);
+    let tissue = |(n, t): (usize, &Tissue)| {
+        let (mode, prior) = (outcome.posterior.mode[n], &outcome.prior[n]);
+        let level = prior.sd.map_or(0.0, |sd| (mode.ln() - prior.mean) / sd);
+        (t.name.clone(), neo_hookean(level, mode, input.poisson_ratio))
+    };
+    let sample = Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().enumerate().map(tissue).collect() };
+    let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
+    let file = format!("sim/{ESTIMATE}.vtu");
+    let record = SampleOutcome {
+        id: sample.id.clone(),
+        sd_levels: sample.tissues.iter().map(|(name, t)| (name.clone(), t.sd_level)).collect(),
+        shear_modulus_pa: sample.tissues.iter().map(|(name, t)| (name.clone(), t.shear_modulus_pa)).collect(),
+        laws: sample.tissues.iter().map(|(name, t)| (name.clone(), t.law())).collect(),
+        rmse_mm: errors.rmse_mm,
+        converged: true,
+        newton_iterations: state.convergence.iterations.len(),
+        relative_residuals: state.convergence.iterations.iter().map(|i| i.relative_residual).collect(),
+        displacement_max_mm: Some(largest),
+        file: Some(file.clone()),
+    };
+    let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
+    let points = [
+        Field::vector("displacement", &state.displacement_mm),
+        Field::vector("reaction_n", &state.reaction_n),
+        Field::scalar("rmse_mm", errors.node_error_mm),
+        Field::scalar("rmse_observed", observed),
+        Field::vector("displacement_mean", &state.displacement_mm),
+        Field::scalar("displacement_sd", displacement_sd_mm),
+        Field::scalar("displacement_95", displacement_95_mm),
+    ];
+    let cells = [
+        Field::scalar("jacobian", state.jacobian),
+        Field::scalar("strain_energy_density_pa", state.strain_energy_density_pa),
+    ];
+    let json = serde_json::to_string_pretty(&outcome)? + "\n";
+    Ok(Produced {
+        files: vec![(file, vtu::encode(mesh, &points, &cells)?), (ESTIMATE_JSON.to_owned(), json.into_bytes())],
+        warnings: outcome.limits.iter().map(|limit| format!("estimate: {limit}")).collect(),
+        facts: facts(&EstimateFacts { estimate: outcome, record })?,
+    })
+}

@@ -1,0 +1,234 @@
+//! The solver as a forward model: log-moduli in, distances to what was observed out.
+
+use super::levenberg_marquardt::{Forward, Linearisation};
+use crate::experiment::observed::ObservedSurfaces;
+use crate::experiment::sample::Tissue;
+use crate::fem::{By, FemError, Load, Materials, Model, Outcome, Scenario, State};
+use crate::material::law::{Material, Parameter};
+use crate::mesh::TetMesh;
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use rayon::prelude::*;
+use thiserror::Error;
+
+/// Something the estimate may change.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Unknown {
+    /// Shear modulus of a tissue, Pa.
+    ShearModulus(Tissue),
+    /// Effective density of all tissue, kg/m3.
+    Density,
+}
+
+impl Unknown {
+    /// How tables name it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
+            Self::Density => "effective density_kg_per_m3".to_owned(),
+        }
+    }
+}
+
+/// What was observed.
+#[derive(Clone, Debug)]
+pub enum Observation {
+    /// The displacement (mm) of some nodes, all three components.
+    Nodes(Vec<(u32, [f64; 3])>),
+    /// Surfaces that node sets should lie on; each node is one observation, its signed distance along the surface's
+    /// normal (point to plane: sliding along a surface is not seen).
+    Surfaces(ObservedSurfaces),
+}
+
+/// The body whose parameters are estimated.
+pub struct Body<'a> {
+    mesh: &'a TetMesh,
+    template: Scenario,
+    unknowns: Vec<Unknown>,
+    poisson_ratio: f64,
+    observation: Observation,
+    model: Model,
+    model_density: f64,
+    start: Option<State>,
+    /// Solves for an equilibrium so far.
+    pub solves: usize,
+    /// Linear solves for sensitivities so far.
+    pub tangent_solves: usize,
+}
+
+/// Why the body cannot be evaluated.
+#[derive(Debug, Error)]
+pub enum BodyError {
+    /// A label of a tissue has no name in the scenario.
+    #[error("label {label} of tissue `{tissue}` has no name in the scenario's [labels]")]
+    NoName {
+        /// The label.
+        label: u8,
+        /// The tissue.
+        tissue: String,
+    },
+    /// The solver's own.
+    #[error(transparent)]
+    Fem(#[from] FemError),
+}
+
+/// A solved point with everything the maps need.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// The equilibrium.
+    pub outcome: Outcome,
+    /// du / d ln(unknown), mm, per unknown and node.
+    pub sensitivities: Vec<Vec<[f64; 3]>>,
+}
+
+impl<'a> Body<'a> {
+    /// A body of neo-Hookean tissues of one Poisson's ratio.
+    ///
+    /// # Errors
+    /// [`BodyError`] when the scenario does not fit the mesh.
+    pub fn new(
+        mesh: &'a TetMesh,
+        template: &Scenario,
+        unknowns: Vec<Unknown>,
+        poisson_ratio: f64,
+        observation: Observation,
+    ) -> Result<Self, BodyError> {
+        let mut template = template.clone();
+        template.materials = materials(&template, &unknowns, &vec![7.0; unknowns.len()], poisson_ratio)?;
+        let model = Model::new(mesh, &template)?;
+        let model_density = template.loads.density_kg_per_m3;
+        Ok(Self {
+            mesh,
+            template,
+            unknowns,
+            poisson_ratio,
+            observation,
+            model,
+            model_density,
+            start: None,
+            solves: 0,
+            tangent_solves: 0,
+        })
+    }
+
+    /// Equilibrium and sensitivities at these log-parameters.
+    ///
+    /// # Errors
+    /// The solver's.
+    pub fn solve(&mut self, log_parameters: &[f64]) -> Result<Solved, BodyError> {
+        let density = self.unknowns.iter().position(|u| *u == Unknown::Density).map(|n| log_parameters[n].exp());
+        if let Some(density) = density.filter(|d| *d != self.model_density) {
+            self.template.loads.density_kg_per_m3 = density;
+            self.model = Model::new(self.mesh, &self.template)?;
+            self.model_density = density;
+        }
+        let materials = materials(&self.template, &self.unknowns, log_parameters, self.poisson_ratio)?;
+        let (outcome, state) = self.model.solve(&materials, self.start.as_ref(), &|_| {})?;
+        self.solves += 1;
+        let mut by = Vec::new();
+        let mut owner = Vec::new();
+        for (n, unknown) in self.unknowns.iter().enumerate() {
+            match unknown {
+                Unknown::Density => by.push(By::Load(Load::Weight)),
+                Unknown::ShearModulus(tissue) => {
+                    let names = tissue.labels.iter().filter_map(|&l| self.template.label_name(l));
+                    by.extend(
+                        names.map(|name| By::Material { name: name.to_owned(), parameter: Parameter::Stiffness }),
+                    );
+                }
+            }
+            owner.resize(by.len(), n);
+        }
+        let parts = self.model.sensitivities(&materials, &state, &by)?;
+        self.tangent_solves += by.len();
+        self.start = Some(state);
+        let mut sensitivities = vec![vec![[0.0; 3]; outcome.displacement_mm.len()]; self.unknowns.len()];
+        for (part, n) in parts.iter().zip(owner) {
+            for (sum, s) in sensitivities[n].iter_mut().zip(part) {
+                for a in 0..3 {
+                    sum[a] += s[a];
+                }
+            }
+        }
+        Ok(Solved { outcome, sensitivities })
+    }
+
+    fn residuals(&self, solved: &Solved) -> Linearisation {
+        let rows: Vec<(f64, Vec<f64>)> = match &self.observation {
+            Observation::Nodes(observed) => observed
+                .iter()
+                .flat_map(|(n, target)| {
+                    let n = *n as usize;
+                    (0..3).map(move |a| {
+                        let row = solved.sensitivities.iter().map(|s| s[n][a]).collect();
+                        (solved.outcome.displacement_mm[n][a] - target[a], row)
+                    })
+                })
+                .collect(),
+            Observation::Surfaces(surfaces) => surfaces
+                .surfaces()
+                .flat_map(|(set, surface, tree)| {
+                    let nodes = &self.mesh.node_sets[set];
+                    nodes
+                        .par_iter()
+                        .map(|&n| {
+                            let n = n as usize;
+                            let (x, u) = (Vector3::from(self.mesh.nodes_mm()[n]), solved.outcome.displacement_mm[n]);
+                            let at = x + Vector3::from(u);
+                            let hit = tree.find(at.into());
+                            let normal = normal_of(
+                                surface.triangles[hit.triangle as usize]
+                                    .map(|c| Point3::from(surface.nodes_mm[c as usize])),
+                            );
+                            let away = at - hit.point_mm.coords;
+                            // Past an edge the closest point lies askew: then the way to it is the direction.
+                            let direction = if away.norm() > 1e-6 && away.normalize().dot(&normal).abs() < 0.9 {
+                                away.normalize()
+                            } else {
+                                normal
+                            };
+                            let row =
+                                solved.sensitivities.iter().map(|s| direction.dot(&Vector3::from(s[n]))).collect();
+                            (direction.dot(&away), row)
+                        })
+                        .collect::<Vec<_>>()
+                })
+                .collect(),
+        };
+        Linearisation {
+            residuals_mm: DVector::from_iterator(rows.len(), rows.iter().map(|r| r.0)),
+            jacobian_mm: DMatrix::from_fn(rows.len(), self.unknowns.len(), |r, c| rows[r].1[c]),
+        }
+    }
+}
+
+impl Forward for Body<'_> {
+    type Error = BodyError;
+
+    fn linearise(&mut self, log_parameters: &[f64]) -> Result<Linearisation, BodyError> {
+        let solved = self.solve(log_parameters)?;
+        Ok(self.residuals(&solved))
+    }
+}
+
+fn materials(
+    template: &Scenario,
+    unknowns: &[Unknown],
+    log_parameters: &[f64],
+    poisson_ratio: f64,
+) -> Result<Materials, BodyError> {
+    let mut materials = Materials::new();
+    for (unknown, log) in unknowns.iter().zip(log_parameters) {
+        if let Unknown::ShearModulus(tissue) = unknown {
+            for &label in &tissue.labels {
+                let missing = || BodyError::NoName { label, tissue: tissue.name.clone() };
+                let name = template.label_name(label).ok_or_else(missing)?;
+                materials.insert(name.to_owned(), Material::neo_hookean(log.exp(), poisson_ratio));
+            }
+        }
+    }
+    Ok(materials)
+}
+
+fn normal_of([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {
+    (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector3::x)
+}

@@ -1,0 +1,237 @@
+//! From a posed problem to the estimate that is reported.
+
+use super::body::{Body, BodyError, Observation, Solved, Unknown};
+use super::{Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Verdict, estimate, laplace};
+use crate::experiment::rmse::root_mean_square;
+use crate::fem::{Outcome, Scenario};
+use crate::mesh::TetMesh;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Everything an estimate starts from.
+pub struct Problem<'a> {
+    /// The body at rest.
+    pub mesh: &'a TetMesh,
+    /// Loads, supports, solver; the materials are the unknowns'.
+    pub template: &'a Scenario,
+    /// What is estimated, with the prior of each logarithm in the same order.
+    pub unknowns: Vec<(Unknown, LogPrior)>,
+    /// Poisson's ratio of every tissue.
+    pub poisson_ratio: f64,
+    /// What was observed.
+    pub observation: Observation,
+    /// Share of the observations that are independent.
+    pub independent_share: f64,
+    /// Where to start; the prior's mean when empty.
+    pub start: Vec<f64>,
+}
+
+/// The estimate as tables, JSON and the page show it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimateOutcome {
+    /// Modes, intervals, identifiability.
+    pub posterior: Posterior,
+    /// What was known before.
+    pub prior: Vec<LogPrior>,
+    /// Observations (nodes of the observed sets, or components of displacements).
+    pub observations: usize,
+    /// How many of them count as independent.
+    pub independent_observations: f64,
+    /// Standard deviation of one observation, mm: the measurement's, or the misfit's where that is larger.
+    pub noise_mm: f64,
+    /// Root mean square of the residuals at the estimate, mm.
+    pub residual_rms_mm: f64,
+    /// How the descent ended.
+    pub convergence: Convergence,
+    /// Equilibria solved.
+    pub solves: usize,
+    /// Linear solves for sensitivities.
+    pub tangent_solves: usize,
+    /// What limits the estimate, in sentences.
+    pub limits: Vec<String>,
+}
+
+/// The estimate with the state behind it and how sure that state is.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// The numbers.
+    pub outcome: EstimateOutcome,
+    /// Displacement, Jacobian and energy at the mode.
+    pub state: Outcome,
+    /// Standard deviation of the displacement at every node, mm (root of the trace of its covariance).
+    pub displacement_sd_mm: Vec<f64>,
+    /// The 95 % bound of how far every node moves: |mean| + 1.96 sd along the mean, mm.
+    pub displacement_95_mm: Vec<f64>,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, Error)]
+pub enum ProblemError {
+    /// The scenario or mesh is refused, or the last state cannot be solved.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// The descent cannot start.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+}
+
+/// Finds the most probable parameters and how sure they are.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Result<Estimate, ProblemError> {
+    let (unknowns, prior): (Vec<Unknown>, Vec<LogPrior>) = problem.unknowns.into_iter().unzip();
+    let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
+    let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
+    let density_known = !unknowns.contains(&Unknown::Density);
+    let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
+    let share = problem.independent_share.clamp(1e-9, 1.0);
+    // Neighbours share their error: together they weigh as much as the independent ones alone.
+    let descent_settings = EstimateSettings { noise_mm: settings.noise_mm / share.sqrt(), ..settings.clone() };
+    let descent = estimate(&mut body, &prior, &start, &descent_settings)?;
+    let residual_rms_mm = root_mean_square(descent.linearisation.residuals_mm.as_slice()).unwrap_or(0.0);
+    // What the model cannot explain is noise to it: a misfit above the measurement's widens the intervals.
+    let noise_mm = settings.noise_mm.max(residual_rms_mm);
+    let posterior = laplace(&descent, &prior, noise_mm, share);
+    let Solved { outcome: state, sensitivities } = body.solve(&descent.log_parameters)?;
+    let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
+    let outcome = EstimateOutcome {
+        limits: limits(&posterior, &descent, settings.noise_mm, residual_rms_mm, only_weight && density_known),
+        observations: descent.linearisation.residuals_mm.len(),
+        independent_observations: share * descent.linearisation.residuals_mm.len() as f64,
+        noise_mm,
+        residual_rms_mm,
+        convergence: descent.convergence,
+        solves: body.solves,
+        tangent_solves: body.tangent_solves,
+        posterior,
+        prior,
+    };
+    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm })
+}
+
+/// Standard deviation and 95 % reach of every node by linear propagation of the posterior.
+fn spread(mean: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>], posterior: &Posterior) -> (Vec<f64>, Vec<f64>) {
+    let covariance = &posterior.log_covariance;
+    let at = |n: usize, a: usize, b: usize| -> f64 {
+        let mut sum = 0.0;
+        for (p, row) in covariance.iter().enumerate() {
+            for (q, c) in row.iter().enumerate() {
+                sum += sensitivities[p][n][a] * c * sensitivities[q][n][b];
+            }
+        }
+        sum
+    };
+    let sd = (0..mean.len()).map(|n| (0..3).map(|a| at(n, a, a)).sum::<f64>().max(0.0).sqrt()).collect();
+    let reach = (0..mean.len()).map(|n| {
+        let u = mean[n];
+        let length = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt();
+        if length < 1e-12 {
+            return 0.0;
+        }
+        let mut variance = 0.0;
+        for a in 0..3 {
+            for b in 0..3 {
+                variance += u[a] * at(n, a, b) * u[b] / (length * length);
+            }
+        }
+        length + 1.96 * variance.max(0.0).sqrt()
+    });
+    (sd, reach.collect())
+}
+
+fn limits(posterior: &Posterior, descent: &Descent, noise_mm: f64, rms_mm: f64, weight_alone: bool) -> Vec<String> {
+    let mut limits = Vec::new();
+    for (name, verdict) in posterior.names.iter().zip(&posterior.identifiability.verdicts) {
+        match verdict {
+            Verdict::Identified => {}
+            Verdict::PriorDominated => {
+                limits.push(format!("{name}: the interval comes from the prior, the data add little"))
+            }
+            Verdict::NotIdentifiable => limits.push(format!("{name}: not identifiable from these data")),
+        }
+    }
+    if weight_alone {
+        limits.push(
+            "gravity alone fixes only modulus / (density x g): the moduli are as good as the effective density assumed"
+                .to_owned(),
+        );
+    }
+    if rms_mm > 1.5 * noise_mm {
+        limits.push(format!(
+            "the residual of {rms_mm:.2} mm is above the measurement's {noise_mm:.2} mm: the model does not explain all of the shift"
+        ));
+    }
+    if descent.convergence == Convergence::IterationsExhausted {
+        limits.push("the iterations ran out before the minimum was reached".to_owned());
+    }
+    limits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::sample::Tissue;
+    use crate::experiment::sweep::scenario_of;
+    use crate::fem::simulate;
+
+    fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
+        let unknown = |tissue: Tissue| {
+            let unknown = Unknown::ShearModulus(tissue);
+            let prior = LogPrior { name: unknown.name(), mean: 7.0, sd: Some(2.0) };
+            (unknown, prior)
+        };
+        Problem {
+            mesh,
+            template: scenario,
+            unknowns: Tissue::grey_and_white().into_iter().map(unknown).collect(),
+            poisson_ratio: 0.45,
+            observation: Observation::Nodes(observed),
+            independent_share: 1.0,
+            start: vec![2299f64.ln(), 1195f64.ln()],
+        }
+    }
+
+    fn settings() -> PhantomSettings {
+        PhantomSettings {
+            tissues: 2,
+            two_tissue_force_n: [0.0, 0.0, -0.1],
+            fixed: vec!["base".to_owned()],
+            ..PhantomSettings::default()
+        }
+    }
+
+    #[test]
+    fn the_moduli_behind_a_simulation_come_back_from_far_away() {
+        let (mesh, settings) = (block(4), settings());
+        let scenario = settings.scenario();
+        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
+        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
+        let observed = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        let found = solve_problem(problem(&mesh, &scenario, observed), &precise).unwrap();
+        let [grey, white] = [found.outcome.posterior.mode[0], found.outcome.posterior.mode[1]];
+        assert!((grey / 1370.0 - 1.0).abs() < 1e-4 && (white / 990.0 - 1.0).abs() < 1e-4, "{grey} {white}");
+        assert!(found.outcome.tangent_solves <= 24, "{}", found.outcome.tangent_solves);
+        assert!(found.outcome.limits.is_empty(), "{:?}", found.outcome.limits);
+    }
+
+    #[test]
+    fn a_softer_body_moves_more_and_the_spread_follows_the_interval() {
+        let (mesh, settings) = (block(3), settings());
+        let scenario = settings.scenario();
+        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
+        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
+        let observed: Vec<_> = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let rough = EstimateSettings { noise_mm: 0.5, ..EstimateSettings::default() };
+        let fine = EstimateSettings { noise_mm: 0.05, ..EstimateSettings::default() };
+        let rough = solve_problem(problem(&mesh, &scenario, observed.clone()), &rough).unwrap();
+        let fine = solve_problem(problem(&mesh, &scenario, observed), &fine).unwrap();
+        let top = mesh.node_sets["superior"][5] as usize;
+        assert!(rough.displacement_sd_mm[top] > 5.0 * fine.displacement_sd_mm[top]);
+        let held = mesh.node_sets["base"][0] as usize;
+        assert_eq!((fine.displacement_sd_mm[held], fine.displacement_95_mm[held]), (0.0, 0.0));
+    }
+}
