@@ -4,7 +4,8 @@ use crate::material::law::MaterialError;
 use crate::mesh::TetMesh;
 use thiserror::Error;
 
-/// Why a simulation was refused or ended without an answer. All but [`FemError::NoEquilibrium`] are input errors.
+/// Why a simulation was refused or ended without an answer. All but [`FemError::NoEquilibrium`] and
+/// [`FemError::NoMotion`] are input errors.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum FemError {
@@ -47,6 +48,11 @@ pub enum FemError {
     )]
     UnstableState,
     #[error(
+        "the motion stops at {time_s:.4} s: {reason}; the worst element is cell {cell} (volume ratio {jacobian:.3}). \
+         Shorten `dynamics.time_step_s` or lower the load"
+    )]
+    NoMotion { time_s: f64, reason: String, cell: usize, jacobian: f64 },
+    #[error(
         "no equilibrium beyond {percent:.1} % of the load: {reason}; the worst element is cell {cell} \
          (volume ratio {jacobian:.3}). Lower the load, raise the shear modulus or repair the mesh there"
     )]
@@ -54,6 +60,11 @@ pub enum FemError {
 }
 
 impl FemError {
+    /// Whether the input is at fault, not the physics.
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::NoEquilibrium { .. } | Self::NoMotion { .. } | Self::UnstableState)
+    }
+
     pub(super) fn unknown_set(mesh: &TetMesh, set: &str) -> Self {
         let mut known: Vec<&str> = mesh.node_sets.keys().chain(mesh.facet_sets.keys()).map(String::as_str).collect();
         known.sort_unstable();

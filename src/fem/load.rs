@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Sharing<'a> {
     pub mesh: &'a TetMesh,
     pub quadratic: Option<Quadratic<'a>>,
+    /// Weight goes where a lumped mass is, so that a free body falls as one.
+    pub lumped: bool,
 }
 
 /// Quadratic connectivity and the sorted ends of the mid-edge nodes.
@@ -17,12 +19,13 @@ pub(super) type Quadratic<'a> = (&'a [[u32; 10]], &'a [[u32; 2]]);
 
 impl Sharing<'_> {
     /// Integrals of the shape functions over a tetrahedron of volume 1: a quarter each, or -1/20 at corners and 1/5 at
-    /// mid-edges.
+    /// mid-edges (1/36 and 4/27 for a lumped mass).
     fn of_tet(&self, tet: usize) -> Vec<(u32, f64)> {
         match self.quadratic {
             None => self.mesh.tets()[tet].iter().map(|&n| (n, 0.25)).collect(),
             Some((tets, _)) => {
-                tets[tet].iter().enumerate().map(|(k, &n)| (n, if k < 4 { -0.05 } else { 0.2 })).collect()
+                let [corner, middle] = if self.lumped { [1.0 / 36.0, 4.0 / 27.0] } else { [-0.05, 0.2] };
+                tets[tet].iter().enumerate().map(|(k, &n)| (n, if k < 4 { corner } else { middle })).collect()
             }
         }
     }

@@ -3,11 +3,13 @@
 //! [`simulate`] answers one [`Scenario`] on one mesh; [`Model`] keeps what does not depend on the materials for sweeps
 //! and estimation. Inside, everything is SI and in a numbering of its own; outside, mm and the mesh's numbering.
 
+mod dynamics;
 mod element;
 mod equilibrium;
 mod error;
 mod linear;
 mod load;
+mod mass;
 mod model;
 mod order;
 mod outcome;
@@ -22,7 +24,7 @@ pub use equilibrium::State;
 pub use error::FemError;
 pub use load::Load;
 pub use model::{Materials, Model};
-pub use outcome::{ConvergenceRecord, NewtonIteration, Outcome, Progress};
+pub use outcome::{ConvergenceRecord, Frame, Motion, NewtonIteration, Outcome, Progress};
 pub use scenario::{
     CsfLevel, DynamicsSettings, LinearMethod, Loads, MassKind, Method, PatchLoad, Prescribed, PressureLoad, Scenario,
     ScenarioError, SolverSettings,
@@ -31,13 +33,16 @@ pub use sensitivity::By;
 
 use crate::mesh::TetMesh;
 
-/// One deformation: the mesh under the scenario's loads.
+/// One deformation, or one motion: the mesh under the scenario's loads.
 ///
 /// # Errors
 /// [`FemError`] names what is wrong with the input, or why there is no equilibrium.
 pub fn simulate(mesh: &TetMesh, scenario: &Scenario, progress: &dyn Fn(&Progress)) -> Result<Outcome, FemError> {
     let model = Model::new(mesh, scenario)?;
-    model.solve(&scenario.materials, None, progress).map(|(outcome, _)| outcome)
+    match scenario.solver.method {
+        Method::Static => model.solve(&scenario.materials, None, progress).map(|(outcome, _)| outcome),
+        Method::BackwardEuler => model.run(&scenario.materials, progress),
+    }
 }
 
 /// [`simulate`] from a displacement of the nodes (mm) near the answer, such as that of neighbouring materials: fewer

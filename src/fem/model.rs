@@ -8,7 +8,7 @@ use super::element::{
 use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
 use super::order::{Graph, reverse_cuthill_mckee};
-use super::scenario::Scenario;
+use super::scenario::{MassKind, Method, Scenario};
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, Outcome, State};
@@ -249,18 +249,24 @@ impl Model {
         for set in &scenario.fixed {
             hold(set, [true; 3], [0.0; 3])?;
         }
-        if held.iter().all(|h| *h == [false; 3]) {
+        // A body in motion has its mass to hold on to.
+        let moving = scenario.solver.method == Method::BackwardEuler;
+        if !moving && held.iter().all(|h| *h == [false; 3]) {
             return Err(FemError::NothingHeld);
         }
 
-        let sharing = Sharing { mesh, quadratic: quadratic.as_ref().map(|(tets, edges)| (&tets[..], &edges[..])) };
+        let lumped = moving && scenario.dynamics.mass == MassKind::Lumped;
+        let ends = quadratic.as_ref().map(|(tets, edges)| (&tets[..], &edges[..]));
+        let sharing = Sharing { mesh, quadratic: ends, lumped };
         let loads = nodal_forces_n(&sharing, &scenario.loads)?;
 
         let graph = match &quadratic {
             Some((tets, _)) => Graph::of_elements(nodes, tets),
             None => Graph::of_elements(nodes, mesh.tets()),
         };
-        check_held_together(&graph, &held)?;
+        if !moving {
+            check_held_together(&graph, &held)?;
+        }
         let order = reverse_cuthill_mckee(&graph);
         let mut number = vec![0u32; nodes];
         order.iter().enumerate().for_each(|(new, &old)| number[old as usize] = new as u32);
@@ -440,12 +446,17 @@ impl Model {
     /// Entries of the free rows; held components are zero.
     pub(super) fn free_part(&self, of_nodes: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut rows: Vec<[f64; 3]> = self.node_of_row.iter().map(|&n| of_nodes[n as usize]).collect();
+        self.clear_held(&mut rows);
+        rows
+    }
+
+    /// Held components of free rows become zero.
+    pub(super) fn clear_held(&self, rows: &mut [[f64; 3]]) {
         if let Some(held) = &self.held_components {
             for (row, held) in rows.iter_mut().zip(&**held) {
                 (0..3).filter(|&i| held[i]).for_each(|i| row[i] = 0.0);
             }
         }
-        rows
     }
 
     /// Nodes of the mesh in mm from solver nodes in m.
@@ -496,6 +507,7 @@ impl Model {
             jacobian: state.iter().map(|s| s[0]).collect(),
             strain_energy_density_pa: density,
             convergence,
+            motion: None,
             warnings,
         }
     }

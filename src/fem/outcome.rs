@@ -15,8 +15,35 @@ pub struct Outcome {
     pub strain_energy_density_pa: Vec<f64>,
     /// How it was found.
     pub convergence: ConvergenceRecord,
+    /// How it moved there; absent in statics.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
     /// What the reader should know.
     pub warnings: Vec<String>,
+}
+
+/// A motion from rest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// Time steps taken.
+    pub steps: usize,
+    /// Time at the end, s.
+    pub time_s: f64,
+    /// The body came to rest.
+    pub rested: bool,
+    /// Speed of the fastest node at the end, mm/s.
+    pub fastest_mm_per_s: f64,
+    /// States along the way, as asked for by `dynamics.keep_every`.
+    pub frames: Vec<Frame>,
+}
+
+/// A state of a motion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Time, s.
+    pub time_s: f64,
+    /// Displacement of every node, mm.
+    pub displacement_mm: Vec<[f64; 3]>,
 }
 
 /// Newton's way to the solution.

@@ -14,7 +14,7 @@ pub(super) use assembly::{At, Elements, Partition};
 pub(super) use kernel::Kernel;
 pub(super) use nodal::{NODAL_SHARE, NodalGradient, NodalTangent, Rings};
 pub(super) use tet4::tet4;
-pub(super) use tet10::{tet10, with_mid_edge_nodes};
+pub(super) use tet10::{EDGES, tet10, with_mid_edge_nodes};
 
 use serde::{Deserialize, Serialize};
 

@@ -60,6 +60,7 @@ pub(in super::super) struct Rings {
 }
 
 /// The nodal part of a tangent: sum_a B_a^T moduli_a B_a.
+#[derive(Clone)]
 pub(in super::super) struct NodalTangent {
     pub rings: Arc<Rings>,
     /// V_a C_a, column-major 9 x 9, entry (r + 3 c, r' + 3 c').

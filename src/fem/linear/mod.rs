@@ -52,6 +52,18 @@ impl Tangent {
         }
     }
 
+    /// K + factor other.
+    pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
+        let mut sum = Self { matrix: self.matrix.clone(), nodal: self.nodal.clone() };
+        let (own, more) = (sum.matrix.blocks.as_flattened_mut(), other.matrix.blocks.as_flattened());
+        own.iter_mut().zip(more).for_each(|(a, b)| *a += factor * b);
+        if let (Some(own), Some(more)) = (&mut sum.nodal, &other.nodal) {
+            let pairs = own.moduli.as_flattened_mut().iter_mut().zip(more.moduli.as_flattened());
+            pairs.for_each(|(a, b)| *a += factor * b);
+        }
+        sum
+    }
+
     /// The 3 x 3 diagonal block of a row, column-major.
     pub(super) fn diagonal_block(&self, row: usize) -> [f64; 9] {
         let mut block = self.matrix.blocks[self.matrix.pattern.diagonal[row] as usize];

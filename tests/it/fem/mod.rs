@@ -2,6 +2,7 @@
 
 mod cook;
 mod meshes;
+mod motion;
 mod refusals;
 mod sensitivities;
 mod statics;

@@ -1,0 +1,188 @@
+//! Motion: implicit backward Euler with Rayleigh damping C = a M + b K.
+//!
+//! One step of length h from (u, v) solves
+//!   M (v+ - v)/h + C v+ + f_int(u+) = f_ext,  v+ = (u+ - u)/h
+//! by Newton's method from u+ = u (Baraff and Witkin, "Large steps in cloth simulation", SIGGRAPH 1998), with the
+//! stiffness in C that of the start of the step: one iteration is their linearised step, more converge to the nonlinear
+//! one. Free fall and linear modes come out exactly as the formula says. Prescribed displacements are in place from the
+//! start.
+
+use super::equilibrium::largest_ratio;
+use super::linear::{self, Tangent};
+use super::mass::Mass;
+use super::model::{Laws, Materials, Model};
+use super::units::METRES_PER_MM;
+use super::{ConvergenceRecord, FemError, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
+
+/// Most Newton iterations of a step that is to be solved to the residual asked for.
+const MOST_NEWTON: usize = 30;
+
+/// A body under way.
+struct Moving<'a> {
+    model: &'a Model,
+    laws: Laws,
+    mass: Mass,
+    u: Vec<[f64; 3]>,
+    /// Velocity of the free rows, m/s.
+    v: Vec<[f64; 3]>,
+}
+
+impl Model {
+    /// The motion from rest under the full loads, until the body rests or the steps run out.
+    ///
+    /// # Errors
+    /// [`FemError::NoMotion`] when a step has no solution, however short its Newton step.
+    pub fn run(&self, materials: &Materials, progress: &dyn Fn(&Progress)) -> Result<Outcome, FemError> {
+        let settings = &self.scenario.dynamics;
+        let laws = self.laws(materials)?;
+        let mass = Mass::new(self);
+        let mut u = vec![[0.0; 3]; self.nodes_m.len()];
+        self.move_prescribed(&mut u, 1.0);
+        let v = vec![[0.0; 3]; self.free_nodes()];
+        let mut body = Moving { model: self, laws, mass, u, v };
+        let mut solver = linear::for_model(self, largest_ratio(materials));
+        let mut record = ConvergenceRecord::default();
+        let mut motion = Motion::default();
+        let h = settings.time_step_s;
+        for step in 1..=settings.steps {
+            body.step(solver.as_mut(), &mut record).map_err(|stuck| {
+                let state = self.body.state(&body.u, &body.laws);
+                let worst = (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0);
+                let time_s = (step - 1) as f64 * h;
+                FemError::NoMotion { time_s, reason: stuck.to_owned(), cell: worst, jacobian: state[worst][1] }
+            })?;
+            let fastest = body.v.iter().map(|v| v.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max).sqrt();
+            motion.steps = step;
+            motion.time_s = step as f64 * h;
+            motion.fastest_mm_per_s = fastest / METRES_PER_MM;
+            motion.rested = motion.fastest_mm_per_s <= settings.rest_speed_mm_per_s;
+            if settings.keep_every > 0 && step % settings.keep_every == 0 {
+                motion.frames.push(Frame { time_s: motion.time_s, displacement_mm: self.to_mesh_mm(&body.u) });
+            }
+            progress(&Progress {
+                fraction: step as f64 / settings.steps as f64,
+                iteration: step,
+                relative_residual: motion.fastest_mm_per_s,
+                goal: settings.rest_speed_mm_per_s,
+            });
+            if motion.rested {
+                break;
+            }
+        }
+        let mut forces = vec![[0.0; 3]; body.u.len()];
+        self.body.assemble(&body.u, &body.laws, &self.partition, &mut forces, None, false);
+        let size = reduce::norm(&self.out_of_balance(&forces, 1.0));
+        let scale = reduce::norm(&self.free_part(&self.load_n));
+        record.relative_residual = if scale > 0.0 { size / scale } else { size };
+        let mut outcome = self.outcome(&body.u, &forces, &body.laws, record);
+        if !motion.rested {
+            outcome.warnings.push(format!(
+                "the body still moves after {} steps ({:.3} s), up to {:.3e} mm/s: raise `dynamics.steps` or the damping",
+                motion.steps, motion.time_s, motion.fastest_mm_per_s
+            ));
+        }
+        outcome.motion = Some(motion);
+        Ok(outcome)
+    }
+}
+
+impl Moving<'_> {
+    /// One time step.
+    fn step(
+        &mut self,
+        solver: &mut dyn linear::LinearSolver,
+        record: &mut ConvergenceRecord,
+    ) -> Result<(), &'static str> {
+        let settings = &self.model.scenario.dynamics;
+        let (h, goal) = (settings.time_step_s, self.model.scenario.solver.relative_residual);
+        let [mass_damping, stiffness_damping] = [settings.mass_damping_per_s, settings.stiffness_damping_s];
+        let (fixed_count, most) = match settings.newton_iterations {
+            0 => (false, MOST_NEWTON),
+            n => (true, n),
+        };
+        let mass_factor = 1.0 / (h * h) + mass_damping / h;
+        let momentum = self.mass.product(&self.v.iter().map(|v| v.map(|x| x / h)).collect::<Vec<_>>());
+        let reference = reduce::norm(&self.model.free_part(&self.model.load_n)) + reduce::norm(&momentum);
+        // Displacement of the step on the free rows.
+        let mut moved = vec![[0.0; 3]; self.v.len()];
+        let mut forces = vec![[0.0; 3]; self.u.len()];
+        let mut at_start: Option<Tangent> = None;
+        for iteration in 0..=most {
+            let mut now = self.u.clone();
+            self.model.add_free(&mut now, 1.0, &moved);
+            let mut tangent = self.model.tangent(&now, &self.laws, &mut forces, false);
+            let mut rhs = self.model.out_of_balance(&forces, 1.0);
+            add(&mut rhs, 1.0, &momentum);
+            if let Some(start) = &at_start {
+                add(&mut rhs, -mass_factor, &self.mass.product(&moved));
+                let mut damped = vec![[0.0; 3]; moved.len()];
+                start.product(&moved, &mut damped);
+                add(&mut rhs, -stiffness_damping / h, &damped);
+            }
+            self.model.clear_held(&mut rhs);
+            let size = reduce::norm(&rhs);
+            if !size.is_finite() {
+                return Err("the deformation turns an element inside out");
+            }
+            let relative = if reference > 0.0 { size / reference } else { 0.0 };
+            if iteration == most || (!fixed_count && relative <= goal) || size == 0.0 {
+                if !fixed_count && relative > goal && iteration == most {
+                    return Err("Newton's method ran out of iterations");
+                }
+                break;
+            }
+            let finest = if fixed_count { goal.sqrt() } else { (0.1 * goal / relative).clamp(1e-10, 1e-3) };
+            let mut report = linear::LinearReport::default();
+            let mut change = vec![[0.0; 3]; rhs.len()];
+            for project in [false, true] {
+                if project {
+                    tangent = self.model.tangent(&now, &self.laws, &mut forces, true);
+                }
+                let start = at_start.as_ref().unwrap_or(&tangent);
+                let mut system = tangent.plus(stiffness_damping / h, start);
+                self.mass.add_to(&mut system, mass_factor);
+                solver.prepare(&system);
+                report = solver.solve(&system, &rhs, &mut change, finest);
+                if !report.negative_curvature {
+                    break;
+                }
+            }
+            // Only as far as every element keeps a finite energy.
+            let mut length = 1.0;
+            loop {
+                let mut trial = now.clone();
+                self.model.add_free(&mut trial, length, &change);
+                if self.model.body.energy(&trial, &self.laws).is_finite() {
+                    break;
+                }
+                length *= 0.5;
+                if length < 1e-6 {
+                    return Err("the deformation turns an element inside out");
+                }
+            }
+            add(&mut moved, length, &change);
+            record.iterations.push(NewtonIteration {
+                load_factor: 1.0,
+                relative_residual: relative,
+                linear_iterations: report.iterations,
+                step_length: length,
+                projected: report.negative_curvature,
+            });
+            if fixed_count && iteration + 1 == most {
+                break;
+            }
+            if at_start.is_none() {
+                at_start = Some(tangent);
+            }
+        }
+        self.model.add_free(&mut self.u, 1.0, &moved);
+        for (v, m) in self.v.iter_mut().zip(&moved) {
+            *v = m.map(|x| x / h);
+        }
+        Ok(())
+    }
+}
+
+fn add(a: &mut [[f64; 3]], factor: f64, b: &[[f64; 3]]) {
+    a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += factor * b);
+}
