@@ -17,6 +17,7 @@ mod register;
 mod report;
 mod run;
 mod session;
+mod simulate;
 mod synth;
 
 pub use failure::{Failure, Reject};
@@ -42,6 +43,7 @@ enum Command {
     Run(run::Args),
     Phantom(phantom::Args),
     Estimate(estimate::Args),
+    Simulate(simulate::Args),
     Synth(synth::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
@@ -60,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),
+        Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),

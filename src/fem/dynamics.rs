@@ -10,7 +10,7 @@
 use super::equilibrium::largest_ratio;
 use super::linear::{self, Tangent};
 use super::mass::Mass;
-use super::model::{Laws, Materials, Model};
+use super::model::{Laws, Materials, Model, worst};
 use super::units::METRES_PER_MM;
 use super::{ConvergenceRecord, FemError, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
 
@@ -47,7 +47,7 @@ impl Model {
         for step in 1..=settings.steps {
             body.step(solver.as_mut(), &mut record).map_err(|stuck| {
                 let state = self.body.state(&body.u, &body.laws);
-                let worst = (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0);
+                let worst = worst(&state);
                 let time_s = (step - 1) as f64 * h;
                 FemError::NoMotion { time_s, reason: stuck.to_owned(), cell: worst, jacobian: state[worst][1] }
             })?;

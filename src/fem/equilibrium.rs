@@ -7,7 +7,7 @@
 //! the next be longer.
 
 use super::linear::{LinearReport, LinearSolver};
-use super::model::{Laws, Materials, Model};
+use super::model::{Laws, Materials, Model, worst};
 use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, linear, reduce};
 use crate::material::law::Material;
 
@@ -37,6 +37,12 @@ impl Stuck {
 
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;
+
+/// A load step is given up for a shorter one when the residual has found no new minimum for so many iterations.
+const PATIENCE: usize = 12;
+
+/// Newton iterations of all load steps together, in units of the most for one: the whole call ends with a verdict.
+const BUDGET: usize = 8;
 
 impl Model {
     /// Equilibrium of the model with these materials, from rest or from a state of an earlier solve.
@@ -85,9 +91,10 @@ impl Model {
                 }
                 Err(stuck) => {
                     step *= 0.5;
-                    if step < self.scenario.solver.smallest_load_step {
+                    let spent = record.iterations.len() >= BUDGET * self.scenario.solver.newton_iterations;
+                    if spent || step < self.scenario.solver.smallest_load_step {
                         let state = self.body.state(&trial, &laws);
-                        let worst = (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0);
+                        let worst = worst(&state);
                         return Err(FemError::NoEquilibrium {
                             percent: 100.0 * reached,
                             reason: stuck.words().to_owned(),
@@ -194,6 +201,7 @@ impl Model {
         let (mut last_size, mut last_forcing) = (f64::INFINITY, 0.0);
         let mut reference = stage.load_scale;
         let mut project = false;
+        let (mut best, mut since_best) = (f64::INFINITY, 0);
         for iteration in 0..=settings.newton_iterations {
             let mut tangent = self.tangent(u, laws, forces, project);
             let rhs = self.out_of_balance(forces, factor);
@@ -216,7 +224,9 @@ impl Model {
             if relative <= settings.relative_residual {
                 return Ok(());
             }
-            if iteration == settings.newton_iterations {
+            (best, since_best) = if size < best { (size, 0) } else { (best, since_best + 1) };
+            let spent = record.iterations.len() >= BUDGET * settings.newton_iterations;
+            if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
             let forcing = forcing_term(size, last_size, last_forcing, settings.relative_residual / relative);

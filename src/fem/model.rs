@@ -251,22 +251,25 @@ impl Model {
         }
         // A body in motion has its mass to hold on to.
         let moving = scenario.solver.method == Method::BackwardEuler;
-        if !moving && held.iter().all(|h| *h == [false; 3]) {
-            return Err(FemError::NothingHeld);
-        }
 
         let lumped = moving && scenario.dynamics.mass == MassKind::Lumped;
         let ends = quadratic.as_ref().map(|(tets, edges)| (&tets[..], &edges[..]));
         let sharing = Sharing { mesh, quadratic: ends, lumped };
         let loads = nodal_forces_n(&sharing, &scenario.loads)?;
 
+        let any_held = held.iter().any(|h| *h != [false; 3]);
         let graph = match &quadratic {
             Some((tets, _)) => Graph::of_elements(nodes, tets),
             None => Graph::of_elements(nodes, mesh.tets()),
         };
+        if !moving && !any_held {
+            return Err(FemError::NothingHeld);
+        }
         if !moving {
             check_held_together(&graph, &held)?;
         }
+        // A node of no element has nothing to answer to.
+        (0..nodes).filter(|&n| graph.of(n).is_empty()).for_each(|n| held[n] = [true; 3]);
         let order = reverse_cuthill_mckee(&graph);
         let mut number = vec![0u32; nodes];
         order.iter().enumerate().for_each(|(new, &old)| number[old as usize] = new as u32);
@@ -495,8 +498,18 @@ impl Model {
             let averaged = nodal.energy_density(u, &laws.nodal);
             elements.cell.iter().zip(averaged).for_each(|(&cell, extra)| density[cell as usize] += extra);
         }
+
+        let worst_cell = worst(&state);
+        let convergence =
+            super::ConvergenceRecord { worst_cell, worst_volume_ratio: state[worst_cell][1], ..convergence };
         let mut warnings = self.warnings.clone();
-        let crushed = state.iter().filter(|s| s[1] < 0.1).count();
+        let inverted = state.iter().filter(|s| s[1] <= 0.0).count();
+        if inverted > 0 {
+            warnings.push(format!(
+                "{inverted} cells are inside out, among them cell {worst_cell}: lower the load or raise the modulus"
+            ));
+        }
+        let crushed = state.iter().filter(|s| (0.0..0.1).contains(&s[1])).count();
         if crushed > 0 {
             warnings
                 .push(format!("{crushed} cells are squeezed below a tenth of their volume: treat stresses with care"));
@@ -511,6 +524,11 @@ impl Model {
             warnings,
         }
     }
+}
+
+/// The cell with the smallest volume ratio.
+pub(super) fn worst(state: &[[f64; 3]]) -> usize {
+    (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0)
 }
 
 /// Every material obeys its rules.

@@ -55,6 +55,12 @@ pub struct ConvergenceRecord {
     pub load_steps: Vec<f64>,
     /// Out-of-balance force over applied force at the end.
     pub relative_residual: f64,
+    /// The cell with the smallest volume ratio at the end.
+    #[serde(default)]
+    pub worst_cell: usize,
+    /// Its volume ratio.
+    #[serde(default)]
+    pub worst_volume_ratio: f64,
 }
 
 impl ConvergenceRecord {

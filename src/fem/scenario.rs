@@ -165,8 +165,8 @@ impl Default for SolverSettings {
             relative_residual: 1e-8,
             element: ElementKind::Tet4,
             linear: LinearMethod::Auto,
-            newton_iterations: 60,
-            smallest_load_step: 1.0 / 512.0,
+            newton_iterations: 50,
+            smallest_load_step: 1.0 / 256.0,
         }
     }
 }

@@ -8,5 +8,6 @@ mod nifti_guard;
 mod pipelines;
 mod python;
 mod rooms;
+mod simulate;
 mod slicer_files;
 mod transform_files;

@@ -1,0 +1,166 @@
+//! `hgm simulate` from the command line: files in, files out, refusals by name.
+
+use hgm::mesh::TetMesh;
+use hgm::mesh::format::{msh, vtu};
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SCENARIO: &str = "
+fixed = ['base']
+[materials.grey_matter]
+law = 'neo-hookean'
+shear_modulus_pa = 1370.0
+poisson_ratio = 0.45
+[loads]
+gravity_m_per_s2 = [0.0, 0.0, -9.81]
+";
+
+fn simulate(folder: &Path, arguments: &[&str]) -> Output {
+    let program = std::env::var_os("HGM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_hgm").into());
+    Command::new(program).current_dir(folder).arg("simulate").args(arguments).output().unwrap()
+}
+
+/// A bar of 3 x 3 x 6 cells of 10 mm with the set `base`.
+fn bar() -> TetMesh {
+    let node = |i: usize, j: usize, k: usize| (i + 4 * (j + 4 * k)) as u32;
+    let nodes = (0..112).map(|n| [n % 4, n / 4 % 4, n / 16].map(|x| 10.0 * x as f64)).collect();
+    let mut tets = Vec::new();
+    for cell in 0..54 {
+        let (i, j, k) = (cell % 3, cell / 3 % 3, cell / 9);
+        let corner = |b: usize| node(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
+        for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+            tets.push([corner(0), corner(a), corner(b), corner(7)]);
+        }
+    }
+    let labels = vec![2; tets.len()];
+    let mut mesh = TetMesh::new(nodes, tets, labels).unwrap();
+    mesh.set_nodes("base", (0..16).collect()).unwrap();
+    mesh
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bar.vtu"), vtu::encode(&bar(), &[], &[]).unwrap()).unwrap();
+    std::fs::write(folder.path().join("s.toml"), SCENARIO).unwrap();
+    folder
+}
+
+#[test]
+fn a_deformation_is_written_with_fields_record_and_manifest_and_skipped_the_second_time() {
+    let folder = folder();
+    let done = simulate(folder.path(), &["bar.vtu", "s.toml", "-o", "out.vtu", "--json"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(json["convergence"]["relative_residual"].as_f64().unwrap() <= 1e-8);
+    assert!(json["convergence"]["worst_volume_ratio"].as_f64().unwrap() < 1.0);
+    assert!(!json["convergence"]["iterations"].as_array().unwrap().is_empty());
+    let weight = 1e3 * 9.81 * 0.03 * 0.03 * 0.06;
+    assert!((json["reaction_n"][2].as_f64().unwrap() - weight).abs() < 1e-6 * weight);
+    let bytes = std::fs::read(folder.path().join("out.vtu")).unwrap();
+    let out = vtu::decode(&bytes, "out.vtu").unwrap();
+    assert!(out.point_field("displacement").unwrap().vectors().unwrap().iter().any(|u| u[2] < -0.1));
+    for (name, found) in [("reaction_n", out.point_field("reaction_n")), ("jacobian", out.cell_field("jacobian"))] {
+        assert!(found.is_some(), "{name}");
+    }
+    assert!(out.cell_field("strain_energy_density_pa").unwrap().values.iter().all(|&w| w >= 0.0));
+    assert!(folder.path().join("out.vtu.manifest.json").exists());
+
+    let modified = || std::fs::metadata(folder.path().join("out.vtu")).unwrap().modified().unwrap();
+    let before = modified();
+    let again = simulate(folder.path(), &["bar.vtu", "s.toml", "-o", "out.vtu", "--json"]);
+    assert_eq!(again.stdout, done.stdout);
+    assert_eq!(modified(), before);
+    let forced = simulate(folder.path(), &["bar.vtu", "s.toml", "-o", "out.vtu", "--force", "--threads", "2"]);
+    assert!(forced.status.success());
+    assert_eq!(std::fs::read(folder.path().join("out.vtu")).unwrap(), bytes);
+}
+
+#[test]
+fn a_result_is_a_start_and_a_reference_and_gmsh_meshes_give_the_same() {
+    let folder = folder();
+    assert!(simulate(folder.path(), &["bar.vtu", "s.toml", "-o", "a.vtu"]).status.success());
+    let warm = ["bar.vtu", "s.toml", "-o", "b.vtu", "--start", "a.vtu", "--reference", "a.vtu", "--json"];
+    let json: serde_json::Value = serde_json::from_slice(&simulate(folder.path(), &warm).stdout).unwrap();
+    assert_eq!(json["convergence"]["iterations"].as_array().unwrap().len(), 0);
+    assert_eq!(json["rmse_mm"], 0.0);
+    std::fs::write(folder.path().join("bar.msh"), msh::encode(&bar()).unwrap()).unwrap();
+    let gmsh = ["bar.msh", "s.toml", "-o", "c.vtu", "--reference", "a.vtu", "--json"];
+    let done = simulate(folder.path(), &gmsh);
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(json["rmse_mm"].as_f64().unwrap() < 1e-5, "{json}");
+}
+
+#[test]
+fn a_motion_gets_a_series() {
+    let folder = folder();
+    let motion = "[solver]\nmethod = 'backward-euler'\n[dynamics]\nsteps = 6\nkeep_every = 2\n";
+    std::fs::write(folder.path().join("m.toml"), format!("{SCENARIO}{motion}")).unwrap();
+    let done = simulate(folder.path(), &["bar.vtu", "m.toml", "-o", "m.vtu", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(json["motion"]["steps"], 6);
+    assert_eq!(json["series"], "m.pvd");
+    let series = std::fs::read_to_string(folder.path().join("m.pvd")).unwrap();
+    for n in 1..=3 {
+        let name = format!("m-{n:04}.vtu");
+        assert!(series.contains(&name));
+        assert!(vtu::decode(&std::fs::read(folder.path().join(&name)).unwrap(), &name).is_ok());
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_by_file_and_key() {
+    let folder = folder();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let vtu_text = |points: &str, corners: &str, label: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+             <Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" Name=\"Points\" \
+             NumberOfComponents=\"3\" format=\"ascii\">{points}</DataArray></Points><Cells>\
+             <DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{corners}</DataArray>\
+             <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\
+             <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray></Cells>\
+             <PointData><DataArray type=\"UInt8\" Name=\"base\" format=\"ascii\">1 1 1 0</DataArray></PointData>\
+             <CellData>{label}</CellData></Piece></UnstructuredGrid></VTKFile>"
+        )
+    };
+    let label = "<DataArray type=\"Int32\" Name=\"label\" format=\"ascii\">2</DataArray>";
+    let (points, corners) = ("0 0 0 1 0 0 0 1 0 0 0 1", "0 1 2 3");
+    write("good.vtu", &vtu_text(points, corners, label));
+    write("inverted.vtu", &vtu_text(points, "0 2 1 3", label));
+    write("flat.vtu", &vtu_text("0 0 0 1 0 0 0 1 0 1 1 0", corners, label));
+    write("nan.vtu", &vtu_text("0 0 0 1 0 0 0 1 0 0 0 nan", corners, label));
+    write("unlabelled.vtu", &vtu_text(points, corners, ""));
+    assert!(simulate(folder.path(), &["good.vtu", "s.toml", "-o", "x.vtu"]).status.success());
+
+    let scenarios = [
+        ("loose.toml", SCENARIO.replace("fixed = ['base']", "")),
+        ("set.toml", SCENARIO.replace("'base'", "'skull'")),
+        ("nu.toml", SCENARIO.replace("0.45", "0.5")),
+        ("modulus.toml", SCENARIO.replace("1370.0", "-1370.0")),
+        ("label.toml", SCENARIO.replace("grey_matter", "white_matter")),
+        ("key.toml", SCENARIO.replace("poisson_ratio", "poisson")),
+    ];
+    for (name, text) in &scenarios {
+        write(name, text);
+    }
+    for (mesh, scenario, words) in [
+        ("inverted.vtu", "s.toml", ["inverted.vtu", "tetrahedron 0"]),
+        ("flat.vtu", "s.toml", ["flat.vtu", "tetrahedron 0"]),
+        ("nan.vtu", "s.toml", ["nan.vtu", "node 3"]),
+        ("unlabelled.vtu", "s.toml", ["unlabelled.vtu", "label"]),
+        ("good.vtu", "loose.toml", ["loose.toml", "fixed"]),
+        ("good.vtu", "set.toml", ["set.toml", "`skull`"]),
+        ("good.vtu", "nu.toml", ["nu.toml", "poisson_ratio"]),
+        ("good.vtu", "modulus.toml", ["modulus.toml", "shear_modulus_pa"]),
+        ("good.vtu", "label.toml", ["label.toml", "cell 0"]),
+        ("good.vtu", "key.toml", ["key.toml", "poisson"]),
+        ("good.vtu", "none.toml", ["none.toml", "read"]),
+        ("good.stl", "s.toml", ["good.stl", "read"]),
+    ] {
+        let refused = simulate(folder.path(), &[mesh, scenario, "-o", "y.vtu"]);
+        let message = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(3), "{mesh} {scenario}: {message}");
+        assert!(words.iter().all(|w| message.contains(w)), "{mesh} {scenario}: {message}");
+        assert!(!folder.path().join("y.vtu").exists());
+    }
+}
