@@ -10,6 +10,8 @@ mod demo;
 mod doctor;
 mod estimate;
 mod failure;
+mod gp;
+mod law;
 mod man;
 mod phantom;
 mod prep;
@@ -45,6 +47,8 @@ enum Command {
     Estimate(estimate::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
+    Gp(gp::Args),
+    Law(law::Args),
     Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -64,6 +68,8 @@ pub fn main() -> ExitCode {
         Command::Estimate(args) => estimate::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
+        Command::Gp(args) => gp::run(&args, &session),
+        Command::Law(args) => law::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),

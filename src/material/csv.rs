@@ -34,9 +34,8 @@ pub enum CsvError {
 /// [`CsvError`] with the line.
 pub fn rows(bytes: &[u8]) -> Result<Vec<Row>, CsvError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let text = std::str::from_utf8(bytes).map_err(|error| CsvError::NotText {
-        line: 1 + bytes[..error.valid_up_to()].iter().filter(|b| **b == b'\n').count(),
-    })?;
+    let text = std::str::from_utf8(bytes)
+        .map_err(|error| CsvError::NotText { line: bytes[..error.valid_up_to()].split(|b| *b == b'\n').count() })?;
     let mut rows = Vec::new();
     let mut characters = text.chars().peekable();
     let mut line = 1;

@@ -8,6 +8,7 @@ pub mod law;
 pub mod literature;
 pub mod meta_model;
 pub mod random;
+pub mod rheometry;
 pub mod statistics;
 pub mod task;
 pub mod training;

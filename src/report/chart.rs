@@ -72,7 +72,7 @@ pub struct LineChart {
 }
 
 /// One axis: values to pixels.
-struct Axis {
+pub(super) struct Axis {
     low: f64,
     high: f64,
     log: bool,
@@ -80,7 +80,7 @@ struct Axis {
 }
 
 impl Axis {
-    fn over(values: impl Iterator<Item = f64>, log: bool, from_zero: bool, pixels: [f64; 2]) -> Self {
+    pub(super) fn over(values: impl Iterator<Item = f64>, log: bool, from_zero: bool, pixels: [f64; 2]) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for v in values.filter(|v| v.is_finite() && (!log || *v > 0.0)) {
             low = low.min(v);
@@ -100,7 +100,7 @@ impl Axis {
         Self { low: if from_zero && low == 0.0 { 0.0 } else { low - pad }, high: high + pad, log, pixels }
     }
 
-    fn at(&self, value: f64) -> f64 {
+    pub(super) fn at(&self, value: f64) -> f64 {
         let t = if self.log {
             (value / self.low).ln() / (self.high / self.low).ln()
         } else {
@@ -272,7 +272,7 @@ impl LineChart {
 }
 
 /// Axes, ticks, grid lines, labels.
-fn frame(svg: &mut String, x_axis: &Axis, y_axis: &Axis, x_label: &str, y_label: &str) {
+pub(super) fn frame(svg: &mut String, x_axis: &Axis, y_axis: &Axis, x_label: &str, y_label: &str) {
     let ([x0, x1], [bottom, top]) = (x_axis.pixels, y_axis.pixels);
     for (value, text) in y_axis.ticks(5) {
         let y = y_axis.at(value);

@@ -7,6 +7,7 @@ pub mod figure;
 pub mod hand_off;
 pub mod html;
 pub mod lettering;
+pub mod material_figure;
 pub mod mesh_figure;
 pub mod page;
 pub mod picture;

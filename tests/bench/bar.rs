@@ -1,6 +1,7 @@
 //! One bar of an issue: what was asked, what was measured.
 
 /// A named bar with its measured figure.
+#[allow(clippy::struct_field_names, reason = "the word of the issues")]
 pub struct Bar {
     /// Short name, starting with the room.
     pub name: String,

@@ -3,6 +3,7 @@
 mod damaged_files;
 mod fem;
 mod job;
+mod material;
 mod mesh_files;
 mod nifti_guard;
 mod pipelines;

@@ -17,12 +17,16 @@ pub trait Number:
     /// A constant.
     fn constant(value: f64) -> Self;
     /// e^x - 1 without cancellation at 0.
+    #[must_use]
     fn exp_m1(self) -> Self;
     /// ln(1 + x) without cancellation at 0; not a number below -1.
+    #[must_use]
     fn ln_1p(self) -> Self;
     /// x^p, x > 0.
+    #[must_use]
     fn powf(self, exponent: f64) -> Self;
     /// ln x.
+    #[must_use]
     fn ln(self) -> Self;
 }
 
@@ -100,6 +104,7 @@ impl Sub for Jet {
 
 impl Mul for Jet {
     type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl, reason = "the product rule adds")]
     fn mul(self, other: Self) -> Self {
         let (a, b) = (self, other);
         Self {

@@ -7,6 +7,7 @@ use super::hyperparameters::{Hyperparameters, TaskMatrix};
 use super::matern::Transition;
 use crate::material::task::TASKS;
 use crate::material::training::TrainingData;
+use std::ops::Range;
 
 /// Half of the state.
 pub(super) type Half = [f64; TASKS];
@@ -148,12 +149,23 @@ pub(super) fn transposed(m: &TaskMatrix) -> TaskMatrix {
 /// Runs the filter over the stops; returns the negative log likelihood of the collapsed means.
 pub(super) fn run(parameters: &Hyperparameters, data: &TrainingData, stops: &[Stop], record: &mut impl Record) -> f64 {
     let b = parameters.coregionalisation();
-    let mut state = State::stationary(&b);
+    run_part(parameters, data, stops, 0..stops.len(), (&b, State::stationary(&b)), record)
+}
+
+/// Runs it over some of the stops, from the state after the stop before them (the stationary one before the first).
+pub(super) fn run_part(
+    parameters: &Hyperparameters,
+    data: &TrainingData,
+    stops: &[Stop],
+    part: Range<usize>,
+    (b, mut state): (&TaskMatrix, State),
+    record: &mut impl Record,
+) -> f64 {
     let mut nlml = 0.0;
-    let mut at = None;
-    for (index, stop) in stops.iter().enumerate() {
-        if let Some(before) = at.replace(stop.stretch) {
-            state.predict(&Transition::over(stop.stretch - before, parameters.lengthscale), &b);
+    for index in part {
+        let stop = &stops[index];
+        if index > 0 {
+            state.predict(&Transition::over(stop.stretch - stops[index - 1].stretch, parameters.lengthscale), b);
         }
         for input in &data.inputs()[stop.first_input..stop.end_input] {
             let noise = parameters.observation_variance(input.task) / input.replicates as f64;

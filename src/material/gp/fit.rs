@@ -98,6 +98,13 @@ const MEMORY: usize = 40;
 /// Logarithms beyond these would overflow or stop mattering; there the slope is zero.
 const LOG_LIMITS: [f64; 2] = [-60.0, 20.0];
 
+/// A point with its value and gradient, scaled.
+struct Evaluation {
+    at: Vec<f64>,
+    value: f64,
+    gradient: Vec<f64>,
+}
+
 /// Hyperparameters as a point of the search: ln lengthscale, weights, ln kappa, ln noise variance.
 struct Search<'a> {
     data: &'a TrainingData,
@@ -106,7 +113,7 @@ struct Search<'a> {
     /// The value is divided by it, so that the first step (the gradient itself) is of order one.
     scale: f64,
     /// Value and gradient at the last point: the line search asks for them one after the other.
-    last: RefCell<Option<(Vec<f64>, f64, Vec<f64>)>>,
+    last: RefCell<Option<Evaluation>>,
 }
 
 impl Search<'_> {
@@ -126,10 +133,10 @@ impl Search<'_> {
     }
 
     fn evaluate(&self, at: &[f64]) -> (f64, Vec<f64>) {
-        if let Some((point, value, gradient)) = &*self.last.borrow()
-            && point == at
+        if let Some(last) = &*self.last.borrow()
+            && last.at == at
         {
-            return (*value, gradient.clone());
+            return (last.value, last.gradient.clone());
         }
         let hyperparameters = self.hyperparameters(at);
         let (value, slopes) = negative_log_likelihood_and_gradient(&hyperparameters, self.data);
@@ -145,7 +152,7 @@ impl Search<'_> {
         }
         // A point that cannot be evaluated is worse than any other: the line search turns back.
         let value = if value.is_finite() { value / self.scale } else { f64::MAX.sqrt() };
-        *self.last.borrow_mut() = Some((at.to_vec(), value, gradient.clone()));
+        *self.last.borrow_mut() = Some(Evaluation { at: at.to_vec(), value, gradient: gradient.clone() });
         (value, gradient)
     }
 

@@ -77,6 +77,21 @@ impl MetaModel {
         }
     }
 
+    /// d stress / d parameters; the second entry is unused by a law of one parameter.
+    pub(super) fn stress_slope_pa(self, parameters: &[f64], stretch: f64) -> [f64; 2] {
+        let l = stretch;
+        let neo_hookean = l - l.powi(-2);
+        match self {
+            Self::NeoHookean => [neo_hookean, 0.0],
+            Self::MooneyRivlin => [2.0 * neo_hookean, 2.0 * neo_hookean / l],
+            Self::Ogden | Self::OgdenHigh => {
+                let (mu, alpha) = (parameters[0], parameters[1]);
+                let (up, down) = (l.powf(alpha - 1.0), l.powf(-0.5 * alpha - 1.0));
+                [up - down, mu * l.ln() * (up + 0.5 * down)]
+            }
+        }
+    }
+
     /// Shear modulus at rest, Pa.
     pub fn small_strain_shear_modulus_pa(self, parameters: &[f64]) -> f64 {
         match self {

@@ -2,6 +2,7 @@
 
 use super::least_squares::{Bounds, Residuals, Solution, Tolerances, minimise};
 use super::{MetaModel, Stability};
+use crate::material::law::{Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -45,9 +46,9 @@ pub struct Fit {
     pub parameters: Vec<f64>,
     /// Shear modulus at rest, Pa.
     pub shear_modulus_pa: f64,
-    /// Half the sum of squared residuals of ln(W + offset).
+    /// Half the sum of squared residuals: of ln(W + offset), or of stress over its root mean square.
     pub cost: f64,
-    /// Share of the variance of y that the law explains.
+    /// Share of the variance of the targets that the law explains.
     pub r_squared: f64,
     /// Covariance of the parameters, residual variance times the inverse normal matrix; zero for a parameter that
     /// stands at a bound, since it did not move.
@@ -58,6 +59,25 @@ pub struct Fit {
     pub stability: Stability,
     /// Whether the search met a tolerance.
     pub converged: bool,
+}
+
+impl Fit {
+    /// The law as a compressible material of a scenario.
+    pub fn material(&self, poisson_ratio: f64) -> Material {
+        let (compression_resistance_pa, inversion_threshold) = (0.0, 0.0);
+        match (self.model, self.parameters.as_slice()) {
+            (MetaModel::MooneyRivlin, &[c1_pa, c2_pa]) => {
+                Material::MooneyRivlin { c1_pa, c2_pa, poisson_ratio, compression_resistance_pa, inversion_threshold }
+            }
+            (MetaModel::Ogden | MetaModel::OgdenHigh, &[mu_pa, alpha]) => Material::Ogden {
+                terms: vec![OgdenTerm { alpha, mu_pa }],
+                poisson_ratio,
+                compression_resistance_pa,
+                inversion_threshold,
+            },
+            _ => Material::neo_hookean(self.shear_modulus_pa, poisson_ratio),
+        }
+    }
 }
 
 /// Points that no law can be fitted to.
@@ -74,7 +94,7 @@ pub enum FitError {
         needed: usize,
     },
     /// Stretches and targets of different lengths, or one that is no number.
-    #[error("point {index} (stretch {stretch}, ln energy {target}) is not a positive stretch with a finite target")]
+    #[error("point {index} (stretch {stretch}, target {target}) is not a positive stretch with a finite target")]
     Point {
         /// Index of the point.
         index: usize,
@@ -86,6 +106,9 @@ pub enum FitError {
     /// All at rest.
     #[error("all stretches are 1: nothing is deformed, so no modulus can be found")]
     AllAtRest,
+    /// All stresses zero.
+    #[error("all stresses are 0: no modulus can be found")]
+    NoStress,
 }
 
 /// Fits W to targets y = ln(W + offset) at stretches.
@@ -98,6 +121,33 @@ pub fn fit(
     targets: &[f64],
     settings: &MetaModelSettings,
 ) -> Result<Fit, FitError> {
+    let quantity = Quantity::LogEnergy { offset_pa: settings.log_offset_pa };
+    fit_quantity(&Problem { model, stretches, targets, quantity, search: settings.search })
+}
+
+/// Fits the nominal stress dW/dl to measured ones, Pa. Residuals are relative to the root mean square of the stresses,
+/// so that costs of two tests compare.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_stress(
+    model: MetaModel,
+    stretches: &[f64],
+    stresses_pa: &[f64],
+    settings: &MetaModelSettings,
+) -> Result<Fit, FitError> {
+    let mean_square = stresses_pa.iter().map(|s| s * s).sum::<f64>() / stresses_pa.len().max(1) as f64;
+    if mean_square == 0.0 {
+        return Err(FitError::NoStress);
+    }
+    let rms_pa = mean_square.sqrt();
+    let targets: Vec<f64> = stresses_pa.iter().map(|s| s / rms_pa).collect();
+    let quantity = Quantity::Stress { rms_pa };
+    fit_quantity(&Problem { model, stretches, targets: &targets, quantity, search: settings.search })
+}
+
+fn fit_quantity(problem: &Problem) -> Result<Fit, FitError> {
+    let Problem { model, stretches, targets, .. } = *problem;
     let needed = model.parameter_names().len() + 1;
     if stretches.len() < needed || targets.len() != stretches.len() {
         return Err(FitError::TooFew { found: stretches.len().min(targets.len()), model, needed });
@@ -110,38 +160,77 @@ pub fn fit(
     if stretches.iter().all(|l| (l - 1.0).abs() < 1e-9) {
         return Err(FitError::AllAtRest);
     }
-    let problem = Problem { model, stretches, targets, offset: settings.log_offset_pa, search: settings.search };
     Ok(match model {
-        MetaModel::NeoHookean => report(&problem, best_of(&problem, &neo_hookean_searches(&problem))),
-        MetaModel::MooneyRivlin => report(&problem, best_of(&problem, &mooney_rivlin_searches(&problem))),
-        MetaModel::Ogden | MetaModel::OgdenHigh => report(&problem, best_of(&problem, &ogden_searches(&problem))),
+        MetaModel::NeoHookean => report(problem, best_of(problem, &neo_hookean_searches(problem))),
+        MetaModel::MooneyRivlin => report(problem, best_of(problem, &mooney_rivlin_searches(problem))),
+        MetaModel::Ogden | MetaModel::OgdenHigh => report(problem, best_of(problem, &ogden_searches(problem))),
     })
 }
 
+/// What is compared with the targets.
+#[derive(Clone, Copy)]
+enum Quantity {
+    /// ln(W + offset).
+    LogEnergy { offset_pa: f64 },
+    /// dW/dl over the root mean square of the measured ones.
+    Stress { rms_pa: f64 },
+}
+
+#[derive(Clone, Copy)]
 struct Problem<'a> {
     model: MetaModel,
     stretches: &'a [f64],
     targets: &'a [f64],
-    offset: f64,
+    quantity: Quantity,
     search: Search,
+}
+
+impl Problem<'_> {
+    fn predicted(&self, parameters: &[f64], stretch: f64) -> f64 {
+        match self.quantity {
+            Quantity::LogEnergy { offset_pa } => (self.model.energy_pa(parameters, stretch) + offset_pa).ln(),
+            Quantity::Stress { rms_pa } => self.model.stress_pa(parameters, stretch) / rms_pa,
+        }
+    }
+
+    /// d predicted / d parameters.
+    fn slope(&self, parameters: &[f64], stretch: f64) -> [f64; 2] {
+        match self.quantity {
+            Quantity::LogEnergy { offset_pa } => {
+                let denominator = self.model.energy_pa(parameters, stretch) + offset_pa;
+                self.model.energy_slope_pa(parameters, stretch).map(|s| s / denominator)
+            }
+            Quantity::Stress { rms_pa } => self.model.stress_slope_pa(parameters, stretch).map(|s| s / rms_pa),
+        }
+    }
+
+    /// The neo-Hookean modulus that meets one target.
+    fn modulus_of(&self, stretch: f64, target: f64) -> f64 {
+        match self.quantity {
+            Quantity::LogEnergy { offset_pa } => {
+                (target.exp() - offset_pa) / MetaModel::NeoHookean.energy_pa(&[1.0], stretch)
+            }
+            Quantity::Stress { rms_pa } => target * rms_pa / MetaModel::NeoHookean.stress_pa(&[1.0], stretch),
+        }
+    }
 }
 
 impl<const N: usize> Residuals<N> for Problem<'_> {
     fn residuals(&self, parameters: &[f64; N], out: &mut Vec<f64>) {
-        let residual = |(l, y): (&f64, &f64)| (self.model.energy_pa(parameters, *l) + self.offset).ln() - y;
-        out.extend(self.stretches.iter().zip(self.targets).map(residual));
+        out.extend(self.stretches.iter().zip(self.targets).map(|(l, y)| self.predicted(parameters, *l) - y));
     }
 
     fn jacobian(&self, parameters: &[f64; N], out: &mut Vec<[f64; N]>) {
         out.extend(self.stretches.iter().map(|l| {
-            let energy = self.model.energy_pa(parameters, *l);
-            let slope = if self.search == Search::Published && self.model == MetaModel::NeoHookean {
+            if let (Search::Published, MetaModel::NeoHookean, Quantity::LogEnergy { offset_pa }) =
+                (self.search, self.model, self.quantity)
+            {
                 // The published program's W' is W itself and its denominator mu W + offset.
-                return [energy / (parameters[0] * energy + self.offset); N];
-            } else {
-                self.model.energy_slope_pa(parameters, *l)
-            };
-            std::array::from_fn(|i| slope[i] / (energy + self.offset))
+                let energy = self.model.energy_pa(parameters, *l);
+                return [energy / (parameters[0] * energy + offset_pa); N];
+            }
+            let slope = self.slope(parameters, *l);
+            std::array::from_fn(|i| slope[i])
         }));
     }
 }
@@ -150,12 +239,8 @@ type Start<const N: usize> = ([f64; N], Bounds<N>);
 
 /// A first modulus: the neo-Hookean one that fits the median point exactly, so that starts carry the data's scale.
 fn typical_modulus_pa(problem: &Problem) -> f64 {
-    let scale = |(l, y): (&f64, &f64)| {
-        let unit = MetaModel::NeoHookean.energy_pa(&[1.0], *l);
-        ((y.exp() - problem.offset) / unit).max(1e-3)
-    };
     let strained = problem.stretches.iter().zip(problem.targets).filter(|(l, _)| (*l - 1.0).abs() > 1e-9);
-    let mut moduli: Vec<f64> = strained.map(scale).collect();
+    let mut moduli: Vec<f64> = strained.map(|(l, y)| problem.modulus_of(*l, *y).max(1e-3)).collect();
     moduli.sort_by(f64::total_cmp);
     moduli.get(moduli.len() / 2).copied().unwrap_or(1000.0)
 }
@@ -235,8 +320,7 @@ fn report<const N: usize>(problem: &Problem, (solution, bounds): (Solution<N>, B
     let mut normal = [[0.0; N]; N];
     for stretch in problem.stretches {
         // The covariance is that of the law itself, whatever Jacobian the search used.
-        let energy = problem.model.energy_pa(&parameters, *stretch);
-        let slope = problem.model.energy_slope_pa(&parameters, *stretch).map(|s| s / (energy + problem.offset));
+        let slope = problem.slope(&parameters, *stretch);
         for i in 0..N {
             for j in 0..N {
                 normal[i][j] += slope[i] * slope[j];

@@ -34,6 +34,26 @@ fn a_law_is_recovered_from_its_own_curve() {
 }
 
 #[test]
+fn a_law_is_recovered_from_its_own_stresses() {
+    let l = stretches(0.8, 1.2, 31);
+    let cases: [(MetaModel, &[f64]); 4] = [
+        (MetaModel::NeoHookean, &[333.28]),
+        (MetaModel::MooneyRivlin, &[140.0, 166.5]),
+        (MetaModel::Ogden, &[-200.0, -3.4]),
+        (MetaModel::OgdenHigh, &[61.0, 17.0]),
+    ];
+    for (model, parameters) in cases {
+        let stresses: Vec<f64> = l.iter().map(|l| model.stress_pa(parameters, *l)).collect();
+        let fit = fit_stress(model, &l, &stresses, &exact()).unwrap();
+        for (found, true_value) in fit.parameters.iter().zip(parameters) {
+            assert!((found / true_value - 1.0).abs() < 1e-6, "{model}: {:?}", fit.parameters);
+        }
+        assert!(fit.converged && fit.r_squared > 1.0 - 1e-9 && fit.stability.everywhere());
+    }
+    assert_eq!(fit_stress(MetaModel::NeoHookean, &l, &[0.0; 31], &exact()), Err(FitError::NoStress));
+}
+
+#[test]
 fn energy_slopes_and_stress_are_the_derivatives() {
     for (model, p) in [
         (MetaModel::NeoHookean, [500.0, 0.0]),
@@ -52,6 +72,13 @@ fn energy_slopes_and_stress_are_the_derivatives() {
                 };
                 let difference = (shifted(h) - shifted(-h)) / (2.0 * h);
                 assert!((difference - slope[i]).abs() <= 1e-7 * slope[i].abs() + 1e-9, "{model} {i} at {l}");
+                let stress = |d: f64| {
+                    let mut q = p;
+                    q[i] += d;
+                    model.stress_pa(&q, l)
+                };
+                let (difference, slope) = ((stress(h) - stress(-h)) / (2.0 * h), model.stress_slope_pa(&p, l)[i]);
+                assert!((difference - slope).abs() <= 1e-7 * slope.abs() + 1e-9, "{model} stress {i} at {l}");
             }
             let h = 1e-6;
             let difference = (model.energy_pa(&p, l + h) - model.energy_pa(&p, l - h)) / (2.0 * h);
@@ -135,4 +162,15 @@ fn points_that_determine_nothing_are_refused() {
     assert_eq!(fit(model, &[1.0; 5], &[1.0; 5], &exact()), Err(FitError::AllAtRest));
     let bad = fit(model, &[0.9, 1.0, -1.1], &[1.0, 2.0, 3.0], &exact());
     assert!(matches!(bad, Err(FitError::Point { index: 2, .. })));
+}
+
+#[test]
+fn a_fit_as_a_material_keeps_its_shear_modulus() {
+    let l = stretches(0.7, 1.3, 41);
+    for model in MetaModel::ALL {
+        let fit = fit(model, &l, &targets(MetaModel::MooneyRivlin, &[140.0, 166.5], &l), &exact()).unwrap();
+        let material = fit.material(0.45);
+        assert!((material.shear_modulus_pa() / fit.shear_modulus_pa - 1.0).abs() < 1e-12, "{model}");
+        assert_eq!(material.poisson_ratio(), 0.45);
+    }
 }

@@ -1,0 +1,206 @@
+//! `hgm gp sample`: materials from the generative model.
+
+use super::{HyperparameterOptions, StudyOptions, VERSION, facts};
+use crate::artefact::{Produced, Stage};
+use crate::cli::{Failure, Session};
+use crate::material::Task;
+use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior, nine_levels, sample_prior};
+use crate::material::gp::{JointPosterior, Spread};
+use crate::material::meta_model::{Fit, FitError, MetaModel};
+use anyhow::anyhow;
+use serde::Serialize;
+use serde_json::json;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Materials of one tissue: at standard deviations from the mean, or fitted to random curves
+///
+/// Writes the materials and the posterior over the stretch as CSV. Levels are the paper's quantile envelopes (mean
+/// and k standard deviations of a new observation); draws are whole random curves.
+///
+/// Example: hgm gp sample --task hyperelastic-white --draws 1000 --law ogden
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Kind of study and region, as hyperelastic-grey, mre-white, linear-healthy
+    #[arg(long, default_value = "hyperelastic-healthy")]
+    task: Task,
+    /// Standard deviations from the mean [default: -2 to 2 in halves]
+    #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "K,K,...")]
+    levels: Vec<f64>,
+    /// Random curves instead of levels
+    #[arg(long, value_name = "N", conflicts_with = "levels")]
+    draws: Option<u64>,
+    /// What a draw is of: the tissue's own curve, or what one more study would report of it
+    #[arg(long, value_parser = spread, default_value = "tissue", value_name = "tissue|study")]
+    spread: Spread,
+    /// Also write the drawn curves, one column a draw
+    #[arg(long, requires = "draws")]
+    curves: bool,
+    /// Law fitted to each: neo-hookean, mooney-rivlin, ogden or ogden-high
+    #[arg(long, default_value = "neo-hookean")]
+    law: MetaModel,
+    /// Points over the task's window
+    #[arg(long, default_value_t = 501, value_name = "N", value_parser = clap::value_parser!(u16).range(5..=5001))]
+    stretches: u16,
+    #[command(flatten)]
+    studies: StudyOptions,
+    #[command(flatten)]
+    hyperparameters: HyperparameterOptions,
+    /// Where to write
+    #[arg(short, long, value_name = "DIR", default_value = "gp")]
+    output: PathBuf,
+}
+
+fn spread(text: &str) -> Result<Spread, String> {
+    match text {
+        "tissue" => Ok(Spread::Tissue),
+        "study" => Ok(Spread::Study),
+        _ => Err("say tissue or study".to_owned()),
+    }
+}
+
+/// One material, from a level or a draw.
+#[derive(Serialize)]
+struct Sampled {
+    sd_level: Option<f64>,
+    draw: Option<u64>,
+    fit: Fit,
+}
+
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let studies = args.studies.read()?;
+    let hyperparameters = args.hyperparameters.read()?;
+    let levels = if args.levels.is_empty() { nine_levels().to_vec() } else { args.levels.clone() };
+    if let Some(bad) = levels.iter().find(|level| level.is_nan() || level.abs() > 6.0) {
+        return Err(Failure::Rejected(anyhow!("--levels: {bad} is not a number of standard deviations from -6 to 6")));
+    }
+    if args.draws.is_some_and(|draws| draws == 0 || draws > 1_000_000) {
+        return Err(Failure::Rejected(anyhow!("--draws: give 1 to 1000000")));
+    }
+    let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
+    let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };
+    let seed = session.options.seed.unwrap_or(0);
+
+    let used = json!({
+        "task": args.task.to_string(), "law": args.law, "search": settings.meta_model, "curves": studies.curves,
+        "stretches": args.stretches, "levels": if args.draws.is_none() { levels.clone() } else { vec![] },
+        "draws": args.draws, "spread": args.spread, "write_curves": args.curves,
+        "hyperparameters": settings.hyperparameters.to_toml(),
+    });
+    let how = if args.draws.is_some() { "draws" } else { "samples" };
+    let name = format!("{how}-{}", args.task);
+    let stage = Stage::new(&format!("gp-{name}"), VERSION, &args.output, &used).seed(seed);
+    let outcome = studies.input(stage).run(session.options.force, || {
+        let joint = joint_tissue_prior(args.task, &studies.models, &settings);
+        let sampled: Vec<Sampled> = match args.draws {
+            None => sample_prior(&joint.prior, &levels, &settings)?
+                .into_iter()
+                .map(|m| Sampled { sd_level: Some(m.sd_level), draw: None, fit: m.fit })
+                .collect(),
+            Some(draws) => draw_materials(&joint, draws, seed, args.spread, &settings)?
+                .into_iter()
+                .map(|m| Sampled { sd_level: None, draw: Some(m.draw), fit: m.fit })
+                .collect(),
+        };
+        let mut files = vec![
+            (format!("{name}.csv"), materials_csv(&sampled, args.law).into_bytes()),
+            (format!("posterior-{}.csv", args.task), posterior_csv(&joint).into_bytes()),
+        ];
+        if let Some(draws) = args.draws.filter(|_| args.curves) {
+            files
+                .push((format!("curves-{}.csv", args.task), curves_csv(&joint, draws, seed, args.spread).into_bytes()));
+        }
+        let facts = json!({ "shear_modulus_pa": quantiles(&sampled), "materials": shown(&sampled) });
+        Ok::<_, FitError>(Produced { files, facts, ..Produced::default() })
+    });
+    let facts = facts(outcome)?;
+    let file = args.output.join(format!("{name}.csv")).display().to_string();
+    session.emit(&json!({ "file": file, "settings": used, "seed": seed, "result": facts }), &summary(&facts, &file))
+}
+
+/// All materials, or the first twenty of a long list: the rest is in the file.
+fn shown(sampled: &[Sampled]) -> Vec<&Sampled> {
+    sampled.iter().take(20).collect()
+}
+
+fn quantiles(sampled: &[Sampled]) -> serde_json::Value {
+    let mut moduli: Vec<f64> = sampled.iter().map(|s| s.fit.shear_modulus_pa).collect();
+    moduli.sort_by(f64::total_cmp);
+    let at = |p: f64| moduli[((moduli.len() - 1) as f64 * p).round() as usize];
+    json!({
+        "count": moduli.len(), "stable": sampled.iter().filter(|s| s.fit.stability.everywhere()).count(),
+        "lowest": at(0.0), "p2.5": at(0.025), "p16": at(0.16), "median": at(0.5), "p84": at(0.84), "p97.5": at(0.975),
+        "highest": at(1.0),
+    })
+}
+
+fn summary(facts: &serde_json::Value, file: &str) -> String {
+    let mut text = String::new();
+    let rows = facts["materials"].as_array().map_or(&[][..], Vec::as_slice);
+    if rows.iter().all(|row| row["sd_level"].is_number()) {
+        text += "   sd   shear modulus (Pa)      R2\n";
+        for row in rows {
+            let number = |v: &serde_json::Value| v.as_f64().unwrap_or(f64::NAN);
+            let fit = &row["fit"];
+            let (modulus, r2) = (number(&fit["shear_modulus_pa"]), number(&fit["r_squared"]));
+            let _ = writeln!(text, "{:>5.2}   {modulus:>18.1}   {r2:.3}", number(&row["sd_level"]));
+        }
+    } else {
+        let q = &facts["shear_modulus_pa"];
+        let pa = |name: &str| q[name].as_f64().unwrap_or(f64::NAN);
+        let _ = writeln!(
+            text,
+            "{} draws, {} fitted by a law stable at every stretch\nshear modulus: median {:.1} Pa, 68 % in {:.1} to \
+             {:.1}, 95 % in {:.1} to {:.1}",
+            q["count"],
+            q["stable"],
+            pa("median"),
+            pa("p16"),
+            pa("p84"),
+            pa("p2.5"),
+            pa("p97.5")
+        );
+    }
+    text + file
+}
+
+fn materials_csv(sampled: &[Sampled], law: MetaModel) -> String {
+    let names = law.parameter_names().join(",");
+    let mut text = format!("sd_level,draw,law,{names},shear_modulus_pa,cost,r_squared,stable\n");
+    for s in sampled {
+        let level = s.sd_level.map_or_else(String::new, |v| v.to_string());
+        let draw = s.draw.map_or_else(String::new, |v| v.to_string());
+        let parameters: Vec<String> = s.fit.parameters.iter().map(ToString::to_string).collect();
+        let Fit { shear_modulus_pa, cost, r_squared, stability, .. } = &s.fit;
+        let stable = stability.everywhere();
+        let parameters = parameters.join(",");
+        let _ = writeln!(text, "{level},{draw},{law},{parameters},{shear_modulus_pa},{cost},{r_squared},{stable}");
+    }
+    text
+}
+
+fn posterior_csv(joint: &JointPosterior) -> String {
+    let prior = &joint.prior;
+    let mut text = String::from("stretch,mean_ln_pa,latent_sd,observation_sd\n");
+    for i in 0..prior.stretches.len() {
+        let (mean, latent, observation) = (prior.mean[i], prior.latent_sd[i], prior.observation_sd[i]);
+        let _ = writeln!(text, "{},{mean},{latent},{observation}", prior.stretches[i]);
+    }
+    text
+}
+
+/// One row a stretch, one column a draw, ln(W / Pa + offset).
+fn curves_csv(joint: &JointPosterior, draws: u64, seed: u64, spread: Spread) -> String {
+    let curves: Vec<Vec<f64>> = (0..draws).map(|draw| joint.draw(seed, draw, spread)).collect();
+    let mut text = String::from("stretch");
+    for draw in 0..draws {
+        let _ = write!(text, ",draw_{draw}");
+    }
+    for (i, stretch) in joint.prior.stretches.iter().enumerate() {
+        let _ = write!(text, "\n{stretch}");
+        for curve in &curves {
+            let _ = write!(text, ",{}", curve[i]);
+        }
+    }
+    text + "\n"
+}

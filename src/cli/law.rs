@@ -1,0 +1,151 @@
+//! `hgm law fit`: simple stable laws for a laboratory's test or a literature model.
+
+use super::gp::StudyOptions;
+use super::session::read_input;
+use super::{Failure, Reject, Session};
+use crate::material::law::Material;
+use crate::material::literature::citation;
+use crate::material::meta_model::{Fit, MetaModel, MetaModelSettings, Search, StabilityRange};
+use crate::material::rheometry::{Measured, Rheometry, fit_rheometry, read_rheometry};
+use anyhow::{Context, anyhow};
+use clap::Subcommand;
+use serde::Serialize;
+use serde_json::json;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Constitutive laws
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Fit(FitArgs),
+}
+
+/// Fit a law to a uniaxial test (CSV) or to a literature model
+///
+/// The CSV's header names quantity and unit: `stretch,nominal stress (kPa)`, `stretch,true stress (Pa)`,
+/// `strain (%),stress (kPa)` or `stretch,energy (Pa)`; other columns are left alone. Stresses are fitted as stresses,
+/// energies as ln W.
+///
+/// Example: hgm law fit rheometry.csv --law ogden,mooney-rivlin
+#[derive(Debug, clap::Args)]
+struct FitArgs {
+    /// The test
+    #[arg(required_unless_present = "literature", conflicts_with = "literature", value_name = "CSV")]
+    test: Option<PathBuf>,
+    /// A literature model by id instead
+    #[arg(long, value_name = "ID")]
+    literature: Option<u32>,
+    /// Laws, with commas between: neo-hookean, mooney-rivlin, ogden, ogden-high [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAME")]
+    law: Vec<MetaModel>,
+    /// Poisson's ratio of the material tables in the result
+    #[arg(long, default_value_t = 0.45, value_name = "NU")]
+    poisson_ratio: f64,
+    #[command(flatten)]
+    studies: StudyOptions,
+}
+
+/// One fitted law.
+#[derive(Serialize)]
+struct Fitted {
+    fit: Fit,
+    parameter_names: &'static [&'static str],
+    parameter_sd: Vec<f64>,
+    stable_everywhere: bool,
+    /// A `[materials.NAME]` table of a scenario.
+    material: Material,
+}
+
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let Command::Fit(args) = &args.command;
+    let mut settings: MetaModelSettings = session.settings("law")?;
+    if args.studies.published {
+        settings.search = Search::Published;
+    }
+    if !(0.0..0.5).contains(&args.poisson_ratio) {
+        let nu = args.poisson_ratio;
+        return Err(Failure::Rejected(anyhow!("--poisson-ratio is {nu}: it must be at least 0 and below 0.5")));
+    }
+    let (name, test) = points(args)?;
+    let laws = if args.law.is_empty() { MetaModel::ALL.to_vec() } else { args.law.clone() };
+    let mut fitted = Vec::new();
+    for law in laws {
+        let fit = fit_rheometry(law, &test, &settings).with_context(|| name.clone()).reject()?;
+        let parameter_sd = (0..fit.parameters.len()).map(|i| fit.covariance[i][i].sqrt()).collect();
+        let material = fit.material(args.poisson_ratio);
+        let (parameter_names, stable_everywhere) = (law.parameter_names(), fit.stability.everywhere());
+        fitted.push(Fitted { fit, parameter_names, parameter_sd, stable_everywhere, material });
+    }
+    let measured = match test.measured {
+        Measured::NominalStress => "nominal stress",
+        Measured::Energy => "strain energy density",
+    };
+    let mut text = format!("{name}: {} points of {measured}\n", test.stretches.len());
+    for one in &fitted {
+        describe(&mut text, one);
+    }
+    session
+        .emit(&json!({ "source": name, "settings": settings, "points": test.stretches.len(), "fits": fitted }), &text)
+}
+
+fn points(args: &FitArgs) -> Result<(String, Rheometry), Failure> {
+    if let Some(path) = &args.test {
+        let name = path.display().to_string();
+        let test = read_rheometry(&read_input(path)?).with_context(|| name.clone()).reject()?;
+        return Ok((name, test));
+    }
+    let id = args.literature.unwrap_or_default();
+    let studies = args.studies.read()?;
+    let model = studies.models.iter().find(|model| model.id == id).ok_or_else(|| {
+        let last = studies.models.iter().map(|model| model.id).max().unwrap_or(0);
+        Failure::Rejected(anyhow!("--literature {id}: there is no such model; ids go from 0 to {last}"))
+    })?;
+    let curve = model.curve(studies.curves);
+    let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();
+    let words = [model.study.clone(), citation(model)].into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>();
+    let name = format!("literature model {id} {}", words.join(", "));
+    Ok((name, Rheometry { measured: Measured::Energy, stretches: curve.stretches, values_pa }))
+}
+
+fn describe(text: &mut String, one: &Fitted) {
+    let fit = &one.fit;
+    let _ = write!(text, "\n{:<14}", fit.model.name());
+    for ((name, value), sd) in one.parameter_names.iter().zip(&fit.parameters).zip(&one.parameter_sd) {
+        let bound = if fit.at_bound.iter().any(|b| b == name) { " (at its bound)" } else { "" };
+        let _ = write!(text, "{name} = {value:.4} (sd {sd:.3}){bound}  ");
+    }
+    let _ = write!(
+        text,
+        "\n{:<14}shear modulus {:.1} Pa, R2 {:.4}, cost {:.4}{}\n{:<14}{}\n",
+        "",
+        fit.shear_modulus_pa,
+        fit.r_squared,
+        fit.cost,
+        if fit.converged { "" } else { ", the search did not converge" },
+        "",
+        verdict(fit)
+    );
+}
+
+fn verdict(fit: &Fit) -> String {
+    if fit.stability.everywhere() {
+        return "stable at every stretch: energy grows, energy is convex, true stress rises".to_owned();
+    }
+    let where_ = |range: StabilityRange| match range {
+        StabilityRange::Everywhere => "at every stretch",
+        StabilityRange::Window => "in the window only",
+        StabilityRange::Nowhere => "not even in the window",
+    };
+    format!(
+        "energy grows {}, is convex {}, true stress rises {}",
+        where_(fit.stability.energy_grows),
+        where_(fit.stability.convex),
+        where_(fit.stability.true_stress_rises)
+    )
+}
