@@ -9,6 +9,8 @@ mod equilibrium;
 mod error;
 mod linear;
 mod load;
+#[cfg(test)]
+mod manufactured;
 mod mass;
 mod model;
 mod order;

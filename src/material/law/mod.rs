@@ -7,6 +7,8 @@ mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
 mod stable_neo_hookean;
+#[cfg(test)]
+mod verification;
 mod volume;
 
 pub use battery::check_hyperelastic;

@@ -1,6 +1,7 @@
 //! The solver against closed forms, identities and other people's figures.
 
 mod cook;
+mod inversion;
 mod meshes;
 mod motion;
 mod refusals;

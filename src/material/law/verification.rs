@@ -1,0 +1,77 @@
+//! Stresses tabulated by hand and by other codes: mu = 1000 Pa, nu = .45; Mooney-Rivlin C1 = 300, C2 = 200 Pa; Ogden
+//! alpha = -4, mu1 = -500 Pa.
+
+use super::{Hyperelastic, MooneyRivlin, NeoHookean, Ogden, OgdenTerm};
+use nalgebra::{Matrix3, Vector3};
+
+fn laws() -> [(&'static str, Box<dyn Hyperelastic>); 3] {
+    let ogden = Ogden::new(vec![OgdenTerm { alpha: -4.0, mu_pa: -500.0 }], 0.45);
+    [
+        ("neo-Hookean", Box::new(NeoHookean::new(1000.0, 0.45))),
+        ("Mooney-Rivlin", Box::new(MooneyRivlin::new(300.0, 200.0, 0.45))),
+        ("Ogden", Box::new(ogden)),
+    ]
+}
+
+fn diagonal(a: f64, b: f64, c: f64) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(a - 1.0, b - 1.0, c - 1.0))
+}
+
+fn is(found: f64, listed: f64) {
+    assert!((found - listed).abs() <= 1e-9 * listed.abs().max(100.0), "{found} against {listed}");
+}
+
+#[test]
+fn stresses_are_those_tabulated() {
+    let stretched = [
+        (1734.078342621326, 1640.894011145592),
+        (1880.745009287993, 1816.894011145592),
+        (1583.139556613096, 1640.894011145592),
+    ];
+    let squeezed = [-3371.9265808459, -3593.171025290344, -3452.014304600747];
+    for (n, (_, law)) in laws().iter().enumerate() {
+        let p = law.first_piola_kirchhoff_pa(&diagonal(1.2, 1.0, 1.0));
+        is(p[(0, 0)], stretched[n].0);
+        is(p[(1, 1)], stretched[n].1);
+        is(law.first_piola_kirchhoff_pa(&diagonal(0.9, 0.9, 0.9))[(2, 2)], squeezed[n]);
+    }
+    let mut shear = Matrix3::zeros();
+    shear[(0, 1)] = 0.5;
+    let listed = [
+        [[0.0, 500.0, 0.0], [500.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        [[0.0, 500.0, 0.0], [500.0, 0.0, 0.0], [0.0, 0.0, 100.0]],
+        [[-406.25, 562.5, 0.0], [765.625, -406.25, 0.0], [0.0, 0.0, 0.0]],
+    ];
+    for ((name, law), listed) in laws().iter().zip(listed) {
+        let p = law.first_piola_kirchhoff_pa(&shear);
+        for r in 0..3 {
+            for c in 0..3 {
+                assert!((p[(r, c)] - listed[r][c]).abs() < 1e-9 * 500.0, "{name} ({r}, {c}): {p}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bars_with_free_sides_stretch_as_tabulated() {
+    let listed = [
+        (0.7, [(1.1708525469, -1258.42240949), (1.1672148782, -1426.92717052), (1.1793001881, -2605.65500738)]),
+        (0.9, [(1.0483132490, -321.06740889), (1.0483340209, -333.83252695), (1.0490050572, -387.96098451)]),
+        (1.1, [(0.9578444644, 265.93998365), (0.9572266285, 258.07410162), (0.9583839169, 228.32899688)]),
+        (1.3, [(0.8874685818, 694.15347415), (0.8847033775, 637.25957505), (0.8913980891, 474.50735598)]),
+    ];
+    for (stretch, of_laws) in listed {
+        for ((name, law), (lateral, stress)) in laws().iter().zip(of_laws) {
+            // The side's stress grows with the lateral stretch: bisection.
+            let (mut low, mut high) = (0.5_f64, 1.5_f64);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                let side = law.first_piola_kirchhoff_pa(&diagonal(stretch, middle, middle))[(1, 1)];
+                if side < 0.0 { low = middle } else { high = middle }
+            }
+            assert!((low - lateral).abs() < 1e-9, "{name} at {stretch}: {low} against {lateral}");
+            let found = law.first_piola_kirchhoff_pa(&diagonal(stretch, low, low))[(0, 0)];
+            assert!((found - stress).abs() < 1e-8 * stress.abs().max(1000.0), "{name}: {found} against {stress}");
+        }
+    }
+}
