@@ -1,6 +1,7 @@
 //! `./run bench [ROOM ...]`: measures the bars of the issues and prints them side by side. Never part of a timed test.
 
 mod bar;
+mod fem;
 mod material;
 
 use bar::Bar;
@@ -8,7 +9,7 @@ use bar::Bar;
 type Room = (&'static str, fn() -> Vec<Bar>);
 
 fn main() {
-    let rooms: Vec<Room> = vec![("material", material::bars)];
+    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars)];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if bar::data().is_none() {
         println!("HGM_BENCH_DATA is not set: bars that need the measuring data are skipped, each room says which.");
