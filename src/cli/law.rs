@@ -14,7 +14,9 @@ use serde_json::json;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// Constitutive laws
+/// Fit constitutive laws to your own tests and to the literature
+///
+/// Example: hgm law fit rheometry.csv --law ogden
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

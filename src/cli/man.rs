@@ -16,15 +16,36 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, _session: &Session) -> Result<(), Failure> {
-    let whole = Hgm::command();
-    let page = |command: clap::Command, name: &str| -> Result<(), Failure> {
-        let mut bytes = Vec::new();
-        clap_mangen::Man::new(command).render(&mut bytes)?;
-        Ok(write_whole(&args.output.join(format!("{name}.1")), &bytes)?)
-    };
-    for sub in whole.get_subcommands() {
-        let name = format!("hgm-{}", sub.get_name());
-        page(sub.clone().name(name.clone().leak() as &'static str), &name)?;
+    for (name, page) in pages(Hgm::command(), "hgm")? {
+        write_whole(&args.output.join(format!("{name}.1")), &page)?;
     }
-    page(whole, "hgm")
+    Ok(())
+}
+
+/// The page of a command, then those of its subcommands: hgm, hgm-gp, hgm-gp-fit.
+fn pages(command: clap::Command, name: &str) -> std::io::Result<Vec<(String, Vec<u8>)>> {
+    let subcommands: Vec<clap::Command> = command.get_subcommands().cloned().collect();
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command.name(name.to_owned().leak() as &'static str)).render(&mut page)?;
+    let mut all = vec![(name.to_owned(), page)];
+    for subcommand in subcommands {
+        let name = format!("{name}-{}", subcommand.get_name());
+        all.extend(pages(subcommand, &name)?);
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_and_subcommand_has_a_page_with_an_example() {
+        let pages = pages(Hgm::command(), "hgm").unwrap();
+        assert!(pages.iter().any(|(name, _)| name == "hgm-gp-fit"));
+        for (name, page) in &pages[1..] {
+            let page = String::from_utf8(page.clone()).unwrap();
+            assert!(page.contains("Example: "), "{name} has no example");
+        }
+    }
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Options of every command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct GlobalOptions {
-    /// Settings file (TOML, one table per room: [register], [segment], [mesh], [material], [solver] ...)
+    /// Settings file (TOML, one table for each part: register, segment, mesh, gp, law ...)
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Machine-readable result on stdout, logs on stderr

@@ -17,6 +17,8 @@ use std::path::PathBuf;
 const VERSION: u32 = 1;
 
 /// The Gaussian process over the literature: fit it, sample it, show it
+///
+/// Example: hgm gp sample --task hyperelastic-white --draws 1000
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

@@ -218,6 +218,7 @@ pub fn fit_hyperparameters(data: &TrainingData, settings: &FitSettings) -> Resul
     whole("rank", settings.rank, TASKS, "from 1 to 12")?;
     whole("starts", settings.starts, 10_000, "from 1 to 10000")?;
     whole("finalists", settings.finalists, settings.starts, "from 1 to the number of starts")?;
+    whole("first_iterations", settings.first_iterations, 1_000_000, "1 or more")?;
     whole("iterations", settings.iterations, 1_000_000, "1 or more")?;
     if !(settings.noise_floor > 0.0 && settings.noise_floor.is_finite()) {
         let (field, value) = ("noise_floor", settings.noise_floor);
