@@ -101,6 +101,20 @@ fn a_study_of_ones_own_moves_the_posterior_and_a_bad_row_is_refused_with_its_lin
 }
 
 #[test]
+fn the_printed_literature_table_is_a_table_of_studies() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("all.csv");
+    std::fs::write(&table, hgm(&["gp", "studies"]).stdout).unwrap();
+    let out = folder.path().join("gp");
+    let sample = ["gp", "sample", "--levels", "-1,1", "-o", out.to_str().unwrap()];
+    let same = json(&[&sample[..], &["--studies", table.to_str().unwrap()]].concat());
+    assert_eq!(same["result"], json(&sample)["result"], "each row replaced by itself");
+    let studies = json(&["gp", "studies"]);
+    assert_eq!(studies.as_array().unwrap().len(), 73);
+    assert!(studies[40]["citation"].as_str().unwrap().contains("Mihai"));
+}
+
+#[test]
 fn a_test_in_kilopascals_and_in_pascals_gives_the_same_law() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, unit: &str, factor: f64| {

@@ -1,8 +1,9 @@
-//! `hgm gp fit|sample|show`: the generative model of brain tissue.
+//! `hgm gp fit|sample|show|studies`: the generative model of brain tissue.
 
 mod fit;
 mod sample;
 mod show;
+mod studies;
 
 use super::session::read_input;
 use super::{Failure, Reject, Session};
@@ -30,6 +31,7 @@ enum Command {
     Fit(fit::Args),
     Sample(sample::Args),
     Show(show::Args),
+    Studies(studies::Args),
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -37,13 +39,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Fit(args) => fit::run(args, session),
         Command::Sample(args) => sample::run(args, session),
         Command::Show(args) => show::run(args, session),
+        Command::Studies(args) => studies::run(args, session),
     }
 }
 
 /// Which studies.
 #[derive(Clone, Debug, clap::Args)]
 pub struct StudyOptions {
-    /// A table of your own studies (CSV, the columns of the literature table): added, or in place of those of their id
+    /// A table of your own studies (CSV, columns as `hgm gp studies` prints them): added, or in place of those of their id
     #[arg(long, value_name = "FILE")]
     pub studies: Option<PathBuf>,
     /// The published program's choices: its curves of the two studies it mis-coded, its searches

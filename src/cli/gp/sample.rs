@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, default_value = "hyperelastic-healthy")]
     task: Task,
     /// Standard deviations from the mean [default: -2 to 2 in halves]
-    #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "K,K,...")]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "K,K,...")]
     levels: Vec<f64>,
     /// Random curves instead of levels
     #[arg(long, value_name = "N", conflicts_with = "levels")]

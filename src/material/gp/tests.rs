@@ -109,3 +109,64 @@ fn settings_that_cannot_be_are_refused_by_name() {
     assert!(refused(FitSettings { finalists: 9, ..FitSettings::default() }).contains("`finalists`"));
     assert!(refused(FitSettings { noise_floor: 0.0, ..FitSettings::default() }).contains("`noise_floor`"));
 }
+
+/// Hyperparameters and data of no particular shape: few or many replicates, ranks 1 to 3, tasks without their own
+/// part.
+fn random_case(seed: u64) -> (Hyperparameters, TrainingData) {
+    let rng = crate::material::random::CounterRng::new(seed, 77);
+    let rank = 1 + (seed % 3) as usize;
+    let weight = |r: usize, t: usize| 3.0 * rng.normal((100 * r + t) as u64);
+    let part = |base: u64, t: usize| rng.between(base + t as u64, -0.3, 2.0).max(0.0);
+    let parameters = Hyperparameters {
+        lengthscale: rng.between(1, 0.03, 0.8),
+        weights: (0..rank).map(|r| std::array::from_fn(|t| weight(r + 1, t))).collect(),
+        kappa: std::array::from_fn(|t| part(1000, t)),
+        noise_variance: std::array::from_fn(|t| part(2000, t)),
+        noise_floor: 1e-2,
+    };
+    let observation = |n: u64| {
+        // A coarse grid, so that stretches repeat within and across tasks.
+        let stretch = 0.6 + 0.01 * (rng.uniform(5000 + n) * 80.0).floor();
+        (stretch, (rng.uniform(6000 + n) * 12.0) as usize, 4.0 * rng.normal(7000 + n))
+    };
+    (parameters, TrainingData::from_observations((0..20 + 30 * (seed % 5)).map(observation).collect()))
+}
+
+#[test]
+fn filter_and_smoother_agree_with_the_oracle_on_random_data() {
+    for seed in 0..40 {
+        let (parameters, data) = random_case(seed);
+        let dense = dense_negative_log_likelihood(&parameters, &data).unwrap();
+        let filter = negative_log_likelihood(&parameters, &data);
+        assert!((filter - dense).abs() < 1e-9 * dense.abs().max(1.0), "seed {seed}: {filter} against {dense}");
+        let queries = [0.55, 0.7, 1.0, 1.003, 1.5];
+        for task in Task::all().step_by(3) {
+            let (dense, covariance) = dense_posterior(&parameters, &data, task, &queries).unwrap();
+            let joint = joint_posterior(&parameters, &data, task, &queries);
+            for i in 0..queries.len() {
+                assert!((joint.prior.mean[i] - dense.mean[i]).abs() < 1e-7, "seed {seed}, {task}, {i}");
+                for j in 0..queries.len() {
+                    assert!((joint.covariance[i][j] - covariance[(i, j)]).abs() < 1e-7, "seed {seed}, {task}, {i} {j}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn one_observation_is_enough_and_none_gives_the_prior() {
+    let parameters = Hyperparameters::published();
+    let b = parameters.coregionalisation();
+    let task = Task::HYPERELASTIC_HEALTHY;
+    let none = TrainingData::from_observations(vec![]);
+    assert_eq!(negative_log_likelihood_and_gradient(&parameters, &none).0, 0.0);
+    let prior = posterior(&parameters, &none, task, &[1.0, 1.2]);
+    assert!(prior.mean == [0.0, 0.0] && (prior.latent_sd[0].powi(2) / b[10][10] - 1.0).abs() < 1e-12);
+    let one = TrainingData::from_observations(vec![(1.0, 10, 2.0)]);
+    let at = posterior(&parameters, &one, task, &[1.0]).mean[0];
+    let variance = b[10][10] + parameters.observation_variance(10);
+    assert!((at - 2.0 * b[10][10] / variance).abs() < 1e-12);
+    let (value, _) = negative_log_likelihood_and_gradient(&parameters, &one);
+    let expected = 0.5 * ((2.0 * std::f64::consts::PI * variance).ln() + 4.0 / variance);
+    assert!((value - expected).abs() < 1e-12);
+}

@@ -129,12 +129,15 @@ impl LiteratureModel {
     }
 }
 
+/// The embedded table itself, a pattern for a user's own.
+pub const STUDIES_CSV: &str = include_str!("studies.csv");
+
 /// The 73 models, in order of their number.
 ///
 /// # Panics
 /// Never: the embedded table is read by a test.
 pub fn table() -> Vec<LiteratureModel> {
-    read_studies(include_bytes!("studies.csv")).expect("the embedded table is well formed")
+    read_studies(STUDIES_CSV.as_bytes()).expect("the embedded table is well formed")
 }
 
 /// The full citation of a model: from the embedded list, else the model's own words.
