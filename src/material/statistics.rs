@@ -88,7 +88,7 @@ pub struct Comparison {
     pub sd_levels: Vec<f64>,
     /// Cost of each law on each curve, laws in the order of [`COMPARED`].
     pub costs: Vec<[f64; 3]>,
-    /// Friedman's test, paired.
+    /// Friedman's test, paired, over the eleven levels: the mean is one of them.
     pub friedman: RankTest,
     /// Kruskal and Wallis' test, the paper's.
     pub kruskal_wallis: RankTest,
@@ -128,7 +128,7 @@ pub fn compare(prior: &TissuePrior, settings: &MetaModelSettings, digits: CostDi
     }
     let column = |i: usize| costs.iter().map(|row| row[i]).collect();
     let samples: [Vec<f64>; 3] = std::array::from_fn(column);
-    Ok(Comparison { sd_levels, friedman: friedman(&costs), kruskal_wallis: kruskal_wallis(&samples), costs })
+    Ok(Comparison { sd_levels, friedman: friedman(&costs[1..]), kruskal_wallis: kruskal_wallis(&samples), costs })
 }
 
 #[cfg(test)]

@@ -148,9 +148,9 @@ fn text(rows: &[Row], tests: &[(String, Comparison)]) -> String {
     let laws = COMPARED.map(MetaModel::name).join(", ");
     let _ = write!(
         text,
-        "\n\nDo {laws} fit equally well? Costs over the mean and 11 levels from -2 to 2 sd.\n\
-         Friedman: each curve fitted by all three laws (paired). Kruskal-Wallis: the costs as three independent samples \
-         (the paper's).\n"
+        "\n\nDo {laws} fit equally well? Costs at 11 levels from -2 to 2 sd.\n\
+         Friedman: each curve fitted by all three laws (paired). Kruskal-Wallis: the costs as three independent samples, \
+         with those of the mean curve once more (the paper's).\n"
     );
     for (task, Comparison { friedman, kruskal_wallis, .. }) in tests {
         let _ = writeln!(

@@ -28,8 +28,13 @@ pub struct Hyperparameters {
 #[derive(Debug, Error)]
 pub enum HyperparametersError {
     /// Not TOML, or not these fields.
-    #[error("hyperparameters are not readable: {0}")]
-    Toml(#[from] toml::de::Error),
+    #[error("line {line}: {message}; `hgm gp fit` writes such a file")]
+    Toml {
+        /// Line in the text.
+        line: usize,
+        /// What is wrong there.
+        message: String,
+    },
     /// Tasks missing, repeated or unknown.
     #[error("task `{0}` is missing, unknown or stands twice: give each of the twelve tasks one table")]
     Tasks(String),
@@ -106,7 +111,11 @@ impl Hyperparameters {
     /// # Errors
     /// [`HyperparametersError`] names the field.
     pub fn from_toml(text: &str) -> Result<Self, HyperparametersError> {
-        let file: File = toml::from_str(text)?;
+        let file: File = toml::from_str(text).map_err(|error| {
+            let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
+            let line = 1 + before.matches('\n').count();
+            HyperparametersError::Toml { line, message: error.message().to_owned() }
+        })?;
         let rank = file.tasks.first().map_or(0, |task| task.weights.len());
         let mut this = Self {
             lengthscale: file.lengthscale,
@@ -183,6 +192,7 @@ mod tests {
         assert!(refused("mre-grey", "mre-blue").contains("mre-blue"));
         assert!(refused("mre-white", "mre-grey").contains("mre-grey"));
         assert!(refused("weights = [135.62322426953898]", "weights = []").contains("rank"));
-        assert!(refused("noise_floor", "noise_flor").contains("noise_flor"));
+        let message = refused("noise_floor", "noise_flor");
+        assert!(message.starts_with("line 2: ") && message.contains("noise_flor"), "{message}");
     }
 }
