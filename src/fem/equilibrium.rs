@@ -38,6 +38,9 @@ impl Stuck {
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;
 
+/// Accuracy of the first linear solution from rest: large rotations spoil a better one.
+const FIRST_FORCING: f64 = 0.1;
+
 /// A load step is given up for a shorter one when the residual has found no new minimum for so many iterations.
 const PATIENCE: usize = 12;
 
@@ -320,7 +323,7 @@ struct Stage<'a> {
 /// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.
 fn forcing_term(size: f64, last_size: f64, last: f64, needed: f64) -> f64 {
     if last_size == f64::INFINITY {
-        return 1e-2_f64.max(0.3 * needed).min(0.5);
+        return FIRST_FORCING.max(0.3 * needed).min(0.5);
     }
     let ratio = size / last_size;
     let mut forcing = 0.9 * ratio * ratio;

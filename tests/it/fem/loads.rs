@@ -1,0 +1,50 @@
+//! What the supports carry tells what was loaded.
+
+use super::meshes::cube;
+use hgm::fem::{Scenario, simulate};
+use hgm::mesh::TetMesh;
+
+const GREY: &str = "[materials.grey_matter]\nlaw = 'neo-hookean'\nshear_modulus_pa = 3000.0\npoisson_ratio = 0.4\n";
+
+/// Sum of the supports' forces, N.
+fn carried(mesh: &TetMesh, held: &str, loads: &str) -> [f64; 3] {
+    let text = format!("fixed = ['{held}']\n{GREY}[solver]\nrelative_residual = 1e-11\n[loads]\n{loads}");
+    let outcome = simulate(mesh, &Scenario::from_toml(&text).unwrap(), &|_| ()).unwrap();
+    [0, 1, 2].map(|i| outcome.reaction_n.iter().map(|r| r[i]).sum())
+}
+
+fn close(a: [f64; 3], b: [f64; 3]) {
+    for i in 0..3 {
+        assert!((a[i] - b[i]).abs() < 1e-8, "{a:?} against {b:?}");
+    }
+}
+
+#[test]
+fn tissue_below_the_fluid_level_weighs_what_the_fluid_leaves() {
+    // 4 cells of 10 mm along each axis: planes of nodes carry 1/8, 1/4, 1/4, 1/4, 1/8 of the volume.
+    let mesh = cube(4, 40.0);
+    let volume = 64e-6;
+    let csf = |level: f64| format!("csf = {{ density_kg_per_m3 = 1007.0, level_mm = {level} }}\n");
+    for (level, submerged) in [(-1.0, 0.0), (15.0, 0.375), (35.0, 0.875), (41.0, 1.0)] {
+        let loads = format!("gravity_m_per_s2 = [0, 0, -9.81]\ndensity_kg_per_m3 = 1040.0\n{}", csf(level));
+        let weight = 9.81 * volume * (1040.0 - 1007.0 * submerged);
+        close(carried(&mesh, "z0", &loads), [0.0, 0.0, weight]);
+    }
+    // The head turned: gravity along +x, the surface at x = 25 mm is 25 mm below the origin.
+    let loads = format!("gravity_m_per_s2 = [9.81, 0, 0]\ndensity_kg_per_m3 = 1040.0\n{}", csf(-25.0));
+    close(carried(&mesh, "x0", &loads), [-9.81 * volume * (1040.0 - 1007.0 * 0.375), 0.0, 0.0]);
+}
+
+#[test]
+fn pressure_pushes_along_the_inward_normal_with_the_area() {
+    let mesh = cube(3, 40.0);
+    let area = 16e-4;
+    close(carried(&mesh, "z0", "pressure = [{ set = 'x1', pressure_pa = 200.0 }]"), [200.0 * area, 0.0, 0.0]);
+    close(carried(&mesh, "z0", "pressure = [{ set = 'y0', pressure_pa = -100.0 }]"), [0.0, 100.0 * area, 0.0]);
+}
+
+#[test]
+fn a_patch_force_is_carried_whole() {
+    let mesh = cube(3, 40.0);
+    close(carried(&mesh, "z0", "patch = [{ set = 'z1', force_n = [0.2, -0.3, 0.4] }]"), [-0.2, 0.3, -0.4]);
+}
