@@ -38,8 +38,9 @@ impl Stuck {
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;
 
-/// Accuracy of the first linear solution from rest: large rotations spoil a better one.
-const FIRST_FORCING: f64 = 0.1;
+/// Accuracy of the first linear solution of a load step, where large rotations spoil a better one, and from a given
+/// state, which is thought to be near.
+const FIRST_FORCING: [f64; 2] = [0.1, 0.01];
 
 /// A load step is given up for a shorter one when the residual has found no new minimum for so many iterations.
 const PATIENCE: usize = 12;
@@ -69,7 +70,7 @@ impl Model {
             let mut u = state.u.clone();
             self.move_prescribed(&mut u, 1.0);
             if self.body.energy(&u, &laws).is_finite() {
-                let stage = Stage { laws: &laws, factor: 1.0, load_scale, progress };
+                let stage = Stage { laws: &laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], progress };
                 let found = self.newton(&stage, &mut u, &mut forces, solver.as_mut(), &mut record).is_ok();
                 // A start far off may lead to an equilibrium with cells inside out: then the way is from rest.
                 if found && self.body.state(&u, &laws).iter().all(|s| s[1] > 0.0) {
@@ -84,7 +85,7 @@ impl Model {
         let (mut reached, mut step) = (0.0_f64, 1.0_f64);
         while reached < 1.0 {
             let factor = (reached + step).min(1.0);
-            let stage = Stage { laws: &laws, factor, load_scale, progress };
+            let stage = Stage { laws: &laws, factor, load_scale, first_forcing: FIRST_FORCING[0], progress };
             let start = self.predicted(&u, reached, before.as_ref(), factor, &laws, solver.as_mut());
             let mut trial = start;
             match self.newton(&stage, &mut trial, &mut forces, solver.as_mut(), &mut record) {
@@ -234,7 +235,12 @@ impl Model {
             if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
-            let forcing = forcing_term(size, last_size, last_forcing, settings.relative_residual / relative);
+            let needed = 0.3 * settings.relative_residual / relative;
+            let forcing = if iteration == 0 {
+                stage.first_forcing.max(needed).min(0.5)
+            } else {
+                forcing_term(size / last_size, last_forcing, needed)
+            };
             (last_size, last_forcing) = (size, forcing);
             let mut step = vec![[0.0; 3]; rhs.len()];
             solver.prepare(&tangent);
@@ -317,19 +323,16 @@ struct Stage<'a> {
     laws: &'a Laws,
     factor: f64,
     load_scale: f64,
+    first_forcing: f64,
     progress: &'a dyn Fn(&Progress),
 }
 
 /// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.
-fn forcing_term(size: f64, last_size: f64, last: f64, needed: f64) -> f64 {
-    if last_size == f64::INFINITY {
-        return FIRST_FORCING.max(0.3 * needed).min(0.5);
-    }
-    let ratio = size / last_size;
+fn forcing_term(ratio: f64, last: f64, needed: f64) -> f64 {
     let mut forcing = 0.9 * ratio * ratio;
     let guard = 0.9 * last * last;
     if guard > 0.1 {
         forcing = forcing.max(guard);
     }
-    forcing.clamp(1e-4, 0.1).max(0.3 * needed).min(0.5)
+    forcing.clamp(1e-4, 0.1).max(needed).min(0.5)
 }

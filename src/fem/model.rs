@@ -371,6 +371,11 @@ impl Model {
         self.node_of_row.len()
     }
 
+    /// Where the nodes of the rows lie, m.
+    pub(super) fn positions_of_rows(&self) -> Vec<[f64; 3]> {
+        self.node_of_row.iter().map(|&n| self.nodes_m[n as usize]).collect()
+    }
+
     /// Elimination order of the direct solver; `None` when there is not enough memory.
     pub(super) fn symbolic(&self) -> Option<Arc<Symbolic>> {
         let new = || {
@@ -378,8 +383,7 @@ impl Model {
                 Body::Tet4Nodal(_, nodal) => Some(nodal.rings()),
                 _ => None,
             };
-            let positions: Vec<[f64; 3]> = self.node_of_row.iter().map(|&n| self.nodes_m[n as usize]).collect();
-            Symbolic::new(&self.pattern, rings, &positions).map(Arc::new)
+            Symbolic::new(&self.pattern, rings, &self.positions_of_rows()).map(Arc::new)
         };
         self.symbolic.get_or_init(new).clone()
     }

@@ -1,12 +1,14 @@
 //! Solvers for the symmetric linear systems of Newton's method, behind one interface; one file per method.
 
 mod block_jacobi;
+mod coarse;
 mod direct;
 mod dissection;
 mod factor;
 mod operator;
 mod pcg;
 
+use coarse::Rows;
 pub(super) use direct::Direct;
 pub(super) use factor::Symbolic;
 pub(super) use pcg::Pcg;
@@ -86,17 +88,21 @@ const MOST_FACTORED: usize = 12_000;
 /// The solver a model's settings ask for, with materials up to this Poisson's ratio.
 pub(super) fn for_model(model: &Model, largest_ratio: f64) -> Box<dyn LinearSolver> {
     let method = model.scenario.solver.linear;
-    let iterative = |blocks| Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes()));
+    let iterative = |blocks| Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes(), None));
+    let two_level = || {
+        let rows = Rows { positions: model.positions_of_rows(), held: model.held_components.clone() };
+        Box::new(Pcg::new(true, 20_000 + 10 * model.free_nodes(), Some(rows)))
+    };
     match method {
         LinearMethod::PcgJacobi => return iterative(false),
         LinearMethod::PcgBlockJacobi => return iterative(true),
         LinearMethod::Auto if largest_ratio < STIFF_RATIO || model.free_nodes() > MOST_FACTORED => {
-            return iterative(true);
+            return two_level();
         }
         LinearMethod::Auto | LinearMethod::Direct => (),
     }
     match model.symbolic() {
         Some(symbolic) => Box::new(Direct::new(symbolic)),
-        None => iterative(true),
+        None => two_level(),
     }
 }

@@ -1,8 +1,10 @@
 //! Preconditioned conjugate gradients (Hestenes and Stiefel, 1952), in single precision inside a double-precision
-//! refinement: the matrix is read in half the bytes, and the residual that decides is the double-precision one.
+//! refinement: the matrix is read in half the bytes, and the residual that decides is the double-precision one. Larger
+//! systems have a coarse correction besides the blocks of the diagonal.
 
 use super::super::reduce;
 use super::block_jacobi::BlockJacobi;
+use super::coarse::{Coarse, Rows};
 use super::operator::{Lanes, Operator, Real};
 use super::{LinearReport, LinearSolver, Tangent};
 
@@ -12,6 +14,10 @@ pub(in super::super) struct Pcg {
     blocks: bool,
     /// Give up after this many iterations.
     most_iterations: usize,
+    /// The rows, where a coarse correction is wanted.
+    rows: Option<Rows>,
+    /// The coarse correction, made of the first tangent.
+    coarse: Option<Coarse>,
     /// The tangent in single precision.
     single: Option<Packed<f32>>,
     /// The tangent in double precision, once a solve has needed it.
@@ -22,6 +28,23 @@ pub(in super::super) struct Pcg {
 struct Packed<T> {
     operator: Operator<T>,
     preconditioner: BlockJacobi<T>,
+    /// Relative residual that rounding lets one run reach.
+    finest: f64,
+}
+
+/// Jacobi, and the coarse correction on top.
+struct Preconditioner<'a, T> {
+    jacobi: &'a BlockJacobi<T>,
+    coarse: Option<&'a Coarse>,
+}
+
+impl<T: Real> Preconditioner<'_, T> {
+    fn apply(&self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
+        self.jacobi.apply(r, z);
+        if let Some(coarse) = self.coarse {
+            coarse.add(r, z);
+        }
+    }
 }
 
 /// One inner run that solves A x = b to `tolerance` |b|.
@@ -56,7 +79,7 @@ fn add<T: Real>(a: &mut [Lanes<T>], factor: T, b: &[Lanes<T>]) {
 
 fn conjugate_gradients<T: Real>(
     operator: &mut Operator<T>,
-    preconditioner: &BlockJacobi<T>,
+    preconditioner: &Preconditioner<T>,
     b: &[Lanes<T>],
     x: &mut [Lanes<T>],
     tolerance: f64,
@@ -114,20 +137,22 @@ fn conjugate_gradients<T: Real>(
 }
 
 impl<T: Real> Packed<T> {
-    fn new(tangent: &Tangent, blocks: bool) -> Self {
-        Self { operator: Operator::new(tangent), preconditioner: BlockJacobi::new(tangent, blocks) }
+    fn new(tangent: &Tangent, blocks: bool, finest: f64) -> Self {
+        Self { operator: Operator::new(tangent), preconditioner: BlockJacobi::new(tangent, blocks), finest }
     }
 
     fn refine(
         &mut self,
+        coarse: Option<&Coarse>,
         most_iterations: usize,
         tangent: &Tangent,
         rhs: &[[f64; 3]],
         x: &mut [[f64; 3]],
         tolerance: f64,
-        finest: f64,
     ) -> LinearReport {
-        let Self { operator, preconditioner } = self;
+        let finest = self.finest;
+        let Self { operator, preconditioner, .. } = self;
+        let preconditioner = &Preconditioner { jacobi: preconditioner, coarse };
         let mut report = LinearReport::default();
         let whole = reduce::norm(rhs);
         let mut residual = rhs.to_vec();
@@ -177,27 +202,30 @@ impl<T: Real> Packed<T> {
 }
 
 impl Pcg {
-    pub(in super::super) fn new(blocks: bool, most_iterations: usize) -> Self {
-        Self { blocks, most_iterations, single: None, double: None }
+    pub(in super::super) fn new(blocks: bool, most_iterations: usize, rows: Option<Rows>) -> Self {
+        Self { blocks, most_iterations, rows, coarse: None, single: None, double: None }
     }
 }
 
 impl LinearSolver for Pcg {
     fn prepare(&mut self, tangent: &Tangent) {
-        self.single = Some(Packed::new(tangent, self.blocks));
+        if let (None, Some(rows)) = (&self.coarse, &self.rows) {
+            self.coarse = Coarse::new(tangent, rows);
+        }
+        self.single = Some(Packed::new(tangent, self.blocks, 1e-5));
         self.double = None;
     }
 
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
         let (blocks, most) = (self.blocks, self.most_iterations);
-        let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks));
-        let single = single.refine(most, tangent, rhs, x, tolerance, 1e-5);
+        let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));
+        let single = single.refine(self.coarse.as_ref(), most, tangent, rhs, x, tolerance);
         if single.reached {
             return single;
         }
         // Too ill-conditioned for single precision, or truly indefinite: double precision decides.
-        let double = self.double.get_or_insert_with(|| Packed::new(tangent, blocks));
-        let mut double = double.refine(most, tangent, rhs, x, tolerance, 1e-13);
+        let double = self.double.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-13));
+        let mut double = double.refine(self.coarse.as_ref(), most, tangent, rhs, x, tolerance);
         double.iterations += single.iterations;
         double
     }
