@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Raised when the reference's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 use super::case::REFERENCE_STATE as REFERENCE;
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples

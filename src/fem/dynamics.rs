@@ -110,7 +110,7 @@ impl Moving<'_> {
         for iteration in 0..=most {
             let mut now = self.u.clone();
             self.model.add_free(&mut now, 1.0, &moved);
-            let mut tangent = self.model.tangent(&now, &self.laws, &mut forces, false);
+            let mut first = Some(self.model.tangent(&now, &self.laws, &mut forces, false));
             let mut rhs = self.model.out_of_balance(&forces, 1.0);
             add(&mut rhs, 1.0, &momentum);
             if let Some(start) = &at_start {
@@ -134,12 +134,17 @@ impl Moving<'_> {
             let finest = if fixed_count { goal.sqrt() } else { (0.1 * goal / relative).clamp(1e-10, 1e-3) };
             let mut report = linear::LinearReport::default();
             let mut change = vec![[0.0; 3]; rhs.len()];
+            let mut kept = None;
             for project in [false, true] {
-                if project {
-                    tangent = self.model.tangent(&now, &self.laws, &mut forces, true);
-                }
-                let start = at_start.as_ref().unwrap_or(&tangent);
-                let mut system = tangent.plus(stiffness_damping / h, start);
+                let tangent = first.take();
+                let tangent = tangent.unwrap_or_else(|| self.model.tangent(&now, &self.laws, &mut forces, project));
+                let mut system = if fixed_count && most == 1 {
+                    tangent.scaled(1.0 + stiffness_damping / h)
+                } else {
+                    let sum = tangent.plus(stiffness_damping / h, at_start.as_ref().unwrap_or(&tangent));
+                    kept = Some(tangent);
+                    sum
+                };
                 self.mass.add_to(&mut system, mass_factor);
                 solver.prepare(&system);
                 report = solver.solve(&system, &rhs, &mut change, finest);
@@ -172,7 +177,7 @@ impl Moving<'_> {
                 break;
             }
             if at_start.is_none() {
-                at_start = Some(tangent);
+                at_start = kept;
             }
         }
         self.model.add_free(&mut self.u, 1.0, &moved);

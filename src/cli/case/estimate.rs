@@ -18,7 +18,7 @@ use crate::mesh::format::{Field, vtu};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Name of the estimate among the samples.
 pub const ESTIMATE: &str = "estimate";
 /// Its numbers.

@@ -12,7 +12,7 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// What every sample of a sweep shares.
 #[derive(Debug)]

@@ -3,6 +3,7 @@
 use super::Tangent;
 use super::operator::{Lanes, Real, by_rows};
 use nalgebra::Matrix3;
+use rayon::prelude::*;
 
 /// Inverse diagonal blocks, column-major in four lanes.
 pub(super) struct BlockJacobi<T> {
@@ -13,6 +14,8 @@ impl<T: Real> BlockJacobi<T> {
     /// With `blocks` false only the diagonal entries are used.
     pub(super) fn new(tangent: &Tangent, blocks: bool) -> Self {
         let inverse = (0..tangent.matrix.pattern.rows())
+            .into_par_iter()
+            .with_min_len(512)
             .map(|row| {
                 let block = Matrix3::from_column_slice(&tangent.diagonal_block(row));
                 let diagonal =

@@ -17,6 +17,7 @@ use super::element::NodalTangent;
 use super::model::Model;
 use super::scenario::LinearMethod;
 use super::sparse::BlockMatrix;
+use rayon::prelude::*;
 
 /// A tangent: sparse blocks and, for elements with averaged deformation, the nodes' part on top.
 pub(super) struct Tangent {
@@ -52,6 +53,16 @@ impl Tangent {
         if let Some(nodal) = &self.nodal {
             nodal.add_product(x, y);
         }
+    }
+
+    /// factor K.
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
+        let times = |block: &mut [f64]| block.iter_mut().for_each(|v| *v *= factor);
+        self.matrix.blocks.par_iter_mut().with_min_len(4096).for_each(|block| times(block));
+        if let Some(nodal) = &mut self.nodal {
+            nodal.moduli.par_iter_mut().with_min_len(512).for_each(|moduli| times(moduli));
+        }
+        self
     }
 
     /// K + factor other.

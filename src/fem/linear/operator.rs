@@ -141,9 +141,12 @@ fn add_scaled<T: Real>(sum: &mut Lanes<T>, column: &[T], factor: T) {
 
 impl<T: Real> Operator<T> {
     pub(super) fn new(tangent: &Tangent) -> Self {
-        let mut packed: Vec<T> = Vec::with_capacity(9 * tangent.matrix.blocks.len() + 1);
-        packed.extend(tangent.matrix.blocks.iter().flatten().map(|&v| T::of(v)));
-        packed.push(T::default());
+        let mut packed = vec![T::default(); 9 * tangent.matrix.blocks.len() + 1];
+        by_rows(packed.as_chunks_mut::<9>().0, |first, blocks| {
+            for (out, block) in blocks.iter_mut().zip(&tangent.matrix.blocks[first..]) {
+                *out = block.map(T::of);
+            }
+        });
         let nodal = tangent.nodal.as_ref().map(PackedNodal::new);
         Self { pattern: Arc::clone(&tangent.matrix.pattern), packed, nodal }
     }
