@@ -8,7 +8,8 @@
 //   u32 sx sy sz, f64 sizing_spacing[3], f32 edge_mm[sx*sy*sz]     target edge length, trilinear, x fastest
 //   u32 seeds, f64 xyz[3*seeds]                                    points on interfaces (every component has some)
 //   f32 value[nx*ny*nz*K]   fields, the K values of a voxel together, x fastest
-// Output: "HGMTET01", u32 nodes, u32 tets, f64 xyz[3*nodes], u32 corner[4*tets], u8 field[tets]
+// Output: "HGMTET02", u32 nodes, u32 tets, f64 xyz[3*nodes], u32 corner[4*tets], u8 field[tets]
+//   Tets of field 0 are the layer outside that touches the mesh.
 // The label of a point is the field with the largest trilinear value. Fixed seed, no time limit: same bytes each run.
 
 #define CGAL_MESH_3_NO_DEPRECATED_SURFACE_INDEX
@@ -172,6 +173,14 @@ void mesh() {
 
   C3t3 c3t3;
   const Domain::Index on_surface = domain.index_from_surface_patch_index(Domain::Surface_patch_index(0, 1));
+  // Eight points far outside, so that the mesh lies within tets on all sides.
+  for (int n = 0; n < 8; ++n) {
+    double x[3];
+    for (int a = 0; a < 3; ++a) x[a] = (n >> a & 1 ? 2.0 : -1.0) * far_corner[a];
+    const auto v = c3t3.triangulation().insert(Tr::Weighted_point(Point(x[0], x[1], x[2])));
+    c3t3.set_dimension(v, 3);
+    c3t3.set_index(v, domain.index_from_subdomain_index(0));
+  }
   for (const Point& p : seeds) {
     const auto v = c3t3.triangulation().insert(Tr::Weighted_point(p));
     if (v == Tr::Vertex_handle()) continue;
@@ -190,7 +199,7 @@ void mesh() {
   std::vector<double> xyz;
   std::vector<std::uint32_t> corner;
   std::vector<std::uint8_t> field;
-  for (auto cell = c3t3.cells_in_complex_begin(); cell != c3t3.cells_in_complex_end(); ++cell) {
+  const auto emit = [&](Tr::Cell_handle cell, std::uint8_t label) {
     for (int c = 0; c < 4; ++c) {
       const auto v = cell->vertex(c);
       const auto [at, fresh] = number.try_emplace(v, static_cast<std::uint32_t>(number.size()));
@@ -198,9 +207,22 @@ void mesh() {
         for (int a = 0; a < 3; ++a) xyz.push_back(CGAL::to_double(v->point().point()[a]));
       corner.push_back(at->second);
     }
-    field.push_back(static_cast<std::uint8_t>(c3t3.subdomain_index(cell)));
+    field.push_back(label);
+  };
+  for (auto cell = c3t3.cells_in_complex_begin(); cell != c3t3.cells_in_complex_end(); ++cell)
+    emit(cell, static_cast<std::uint8_t>(c3t3.subdomain_index(cell)));
+  const std::uint32_t inner = static_cast<std::uint32_t>(number.size());
+  const Tr& tr = c3t3.triangulation();
+  for (auto cell = tr.finite_cells_begin(); cell != tr.finite_cells_end(); ++cell) {
+    if (c3t3.is_in_complex(cell)) continue;
+    bool touches = false;
+    for (int c = 0; c < 4; ++c) {
+      const auto at = number.find(cell->vertex(c));
+      touches = touches || (at != number.end() && at->second < inner);
+    }
+    if (touches) emit(cell, 0);
   }
-  put("HGMTET01", 8);
+  put("HGMTET02", 8);
   put(static_cast<std::uint32_t>(number.size()));
   put(static_cast<std::uint32_t>(field.size()));
   put(xyz.data(), xyz.size() * sizeof(double));

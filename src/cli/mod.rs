@@ -13,6 +13,7 @@ mod failure;
 mod gp;
 mod law;
 mod man;
+mod mesh;
 mod phantom;
 mod prep;
 mod register;
@@ -53,6 +54,7 @@ enum Command {
     Completions(completions::Args),
     Man(man::Args),
     Register(register::Args),
+    Mesh(mesh::Args),
     Report(report::Args),
 }
 
@@ -73,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(args) => doctor::run(&args, &session),
         Command::Completions(args) => completions::run(&args, &session),
         Command::Man(args) => man::run(&args, &session),
+        Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
         Command::Report(args) => report::run(&args, &session),
     });

@@ -7,6 +7,7 @@
 
 use crate::geometry::Frame;
 use crate::image::LabelMap;
+use crate::mesh::sheet::Sheet;
 use nalgebra::{Matrix4, Vector3};
 use rayon::prelude::*;
 
@@ -17,11 +18,17 @@ pub struct LabelField {
     spacing_mm: [f64; 3],
     /// Label of every field; field 0 is the outside.
     labels: Vec<u8>,
+    /// Where labels are split, see [`LabelField::split_at_midplane`].
+    sheet: Option<Sheet>,
     /// The fields of a voxel side by side, i fastest.
     values: Vec<f32>,
     largest: Vec<u8>,
     frame_from_box: Matrix4<f64>,
 }
+
+/// How fast the halves of a split label part from the midplane. Small, because the kink of the larger half is blurred over a
+/// voxel and moves other interfaces there by a quarter of this; large enough to outdo rounding.
+const SPLIT_SLOPE_PER_VOXEL: f64 = 0.4;
 
 /// Voxels between the labelled part and the border of the box: the Gaussian's reach and one more.
 const PAD: usize = 4;
@@ -72,7 +79,53 @@ impl LabelField {
         }
         let scale = Matrix4::from_diagonal(&Vector3::from(spacing_mm.map(|s| 1.0 / s)).push(1.0));
         let frame_from_box = map.grid.mm_from_voxel * shift * scale;
-        Some(Self { dims, spacing_mm, labels, values, largest, frame_from_box })
+        Some(Self { dims, spacing_mm, labels, sheet: None, values, largest, frame_from_box })
+    }
+
+    /// The same fields, those of `labels` cut in two by the plane x = 0 of the frame: the field that was there is the left
+    /// half, a new one at the end of the list, with the same label, the right half. Their difference is linear in x, which
+    /// trilinear interpolation keeps, so that they meet in the plane itself whatever the grid. See [`Sheet`] for `above_yz_mm`.
+    #[must_use]
+    pub(crate) fn split_at_midplane(self, labels: &[u8], above_yz_mm: &[[f64; 2]]) -> Self {
+        let halves: Vec<usize> = (1..self.labels.len()).filter(|&k| labels.contains(&self.labels[k])).collect();
+        let (old_count, count) = (self.labels.len(), self.labels.len() + halves.len());
+        let slope = SPLIT_SLOPE_PER_VOXEL / self.spacing_mm.iter().product::<f64>().cbrt();
+        let mut values = vec![0f32; self.largest.len() * count];
+        let mut largest = vec![0u8; self.largest.len()];
+        let chunks = values.par_chunks_mut(count * 4096).zip(largest.par_chunks_mut(4096));
+        chunks.enumerate().for_each(|(chunk, (values, largest))| {
+            for (n, (value, best)) in values.chunks_mut(count).zip(largest).enumerate() {
+                let voxel = chunk * 4096 + n;
+                value[..old_count].copy_from_slice(&self.values[voxel * old_count..(voxel + 1) * old_count]);
+                let x = slope * self.frame_from_box.transform_point(&self.voxel_mm(voxel).into()).x;
+                for (n, &k) in halves.iter().enumerate() {
+                    value[old_count + n] = value[k] + x.min(0.0) as f32;
+                    value[k] -= x.max(0.0) as f32;
+                }
+                *best = argmax(value);
+            }
+        });
+        let mask = |fields: &mut dyn Iterator<Item = usize>| fields.fold(0u64, |mask, k| mask | 1 << k);
+        let sheet = Sheet {
+            frame_from_box: self.frame_from_box,
+            left: mask(&mut halves.iter().copied()),
+            right: mask(&mut (old_count..count)),
+            above_yz_mm: above_yz_mm.to_vec(),
+        };
+        let labels = self.labels.iter().copied().chain(halves.iter().map(|&k| self.labels[k])).collect();
+        Self { labels, sheet: Some(sheet), values, largest, ..self }
+    }
+
+    /// Where labels are split, if they are.
+    pub(crate) fn sheet(&self) -> Option<&Sheet> {
+        self.sheet.as_ref()
+    }
+
+    /// Millimetres of the box of a voxel's centre.
+    fn voxel_mm(&self, voxel: usize) -> Vector3<f64> {
+        let [nx, ny, _] = self.dims;
+        let at = [voxel % nx, voxel / nx % ny, voxel / (nx * ny)];
+        Vector3::from(std::array::from_fn::<f64, 3, _>(|a| at[a] as f64 * self.spacing_mm[a]))
     }
 
     /// Voxels of the box along i, j, k.
@@ -98,6 +151,12 @@ impl LabelField {
     /// The fields, those of a voxel side by side, i fastest.
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+
+    /// For every field, the first with the same label: the halves of a split label belong together.
+    pub(crate) fn groups(&self) -> Vec<usize> {
+        let first = |label: &u8| self.labels.iter().position(|l| l == label).unwrap_or(0);
+        self.labels.iter().map(first).collect()
     }
 
     /// Number of the largest field at every voxel, i fastest.
@@ -319,6 +378,30 @@ mod tests {
         let p = Vector3::new(8.3, 9.1, 12.6);
         assert!((field.difference(1, 2, &p) + field.difference(2, 1, &p)).abs() < 1e-12);
         assert!(field.difference(0, 1, &Vector3::new(-9.0, 0.0, 0.0)) > 0.99);
+    }
+
+    #[test]
+    fn halves_of_a_label_meet_in_the_midplane_itself() {
+        let map = ball();
+        // The frame's x = 0 lies between voxels at a third of their distance when the origin is moved.
+        let grid = Grid::axis_aligned([24, 24, 24], [1.0; 3], [-11.7, 5.0, 7.0]);
+        let map = LabelMap::<Mni>::from_data(grid, map.data);
+        let whole = LabelField::new(&map, 0.7).unwrap();
+        let field = whole.clone().split_at_midplane(&[2, 3], &[]);
+        assert_eq!((field.labels(), field.groups()), ([0, 2, 3, 2, 3].as_slice(), vec![0, 1, 2, 1, 2]));
+        let crosses = |a, b| field.sheet().unwrap().crosses(a, b);
+        assert!(crosses(1, 4) && crosses(3, 2) && !crosses(1, 2) && !crosses(0, 3));
+        for n in 0..500 {
+            let p = Vector3::new(f64::from(n % 23) * 0.9 + 2.0, f64::from(n % 19) + 2.3, f64::from(n % 17) + 3.1);
+            let (k, before) = (field.field_at(&p), whole.field_at(&p));
+            let x = field.sheet().unwrap().distance_mm(&p);
+            if x.abs() > 1.0 {
+                assert_eq!(field.labels()[k as usize], whole.labels()[before as usize], "{p}");
+            }
+            if k != 0 && x.abs() > 1e-6 {
+                assert_eq!(k >= 3, x > 0.0, "{p}");
+            }
+        }
     }
 
     #[test]

@@ -105,7 +105,7 @@ pub(crate) fn separate(complex: &mut Complex) {
             let volume = |fan: &Vec<u32>| fan.iter().map(|&t| six_volumes(complex, t)).sum::<f64>();
             fans.sort_by(|p, q| volume(p).total_cmp(&volume(q)).then(p.cmp(q)));
             fans.pop();
-            fans.into_iter().flatten().for_each(|t| complex.take_out(t));
+            fans.into_iter().flatten().for_each(|t| complex.vent(t));
         }
     }
 }
@@ -117,7 +117,7 @@ fn six_volumes(complex: &Complex, t: u32) -> f64 {
 
 /// The tets around an edge, grouped by whether they share faces.
 fn fans(complex: &Complex, a: u32, b: u32) -> Vec<Vec<u32>> {
-    let mut rest: Vec<u32> = complex.sharing(&[a, b]).collect();
+    let mut rest: Vec<u32> = complex.sharing(&[a, b]).filter(|&t| complex.is_solid(t)).collect();
     rest.sort_unstable();
     let mut fans = Vec::new();
     while let Some(first) = rest.pop() {

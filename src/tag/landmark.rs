@@ -1,9 +1,11 @@
 //! Where the falx, the tentorium and the skull base lie in MNI152 2009a (mm, RAS+), placed by hand on the template's
 //! T1 and checked by eye.
 
+use crate::mesh::line_height;
+
 /// Free edge of the falx in the midsagittal plane, (y, z) from front to back; the falx is above it. It runs from the
 /// crista galli over the corpus callosum to the internal occipital protuberance.
-const FALX_EDGE: [[f64; 2]; 16] = [
+pub(super) const FALX_EDGE: [[f64; 2]; 16] = [
     [68.0, -16.0],
     [60.0, -4.0],
     [52.0, 12.0],
@@ -31,28 +33,14 @@ const BASE_LINE: [[f64; 2]; 6] =
 const TENTORIUM_RIDGE: [[f64; 2]; 6] =
     [[-40.0, 10.0], [-52.0, 10.0], [-62.0, 4.0], [-76.0, -4.0], [-92.0, -12.0], [-106.0, -16.0]];
 
-/// Height of a polyline at `y`: linear between its points, constant beyond its ends. `line` runs from front to back.
-fn height(line: &[[f64; 2]], y: f64) -> f64 {
-    if y >= line[0][0] {
-        return line[0][1];
-    }
-    for pair in line.windows(2) {
-        let ([y0, z0], [y1, z1]) = (pair[0], pair[1]);
-        if y >= y1 {
-            return z0 + (z1 - z0) * (y0 - y) / (y0 - y1);
-        }
-    }
-    line[line.len() - 1][1]
-}
-
 /// Whether a point of the midsagittal plane is above the free edge of the falx.
 pub(super) fn above_falx_edge([_, y, z]: [f64; 3]) -> bool {
-    z > height(&FALX_EDGE, y)
+    z > line_height(&FALX_EDGE, y)
 }
 
 /// Whether a point is below the line under which the brain rests on the skull.
 pub(super) fn below_base_line([_, y, z]: [f64; 3]) -> bool {
-    z < height(&BASE_LINE, y)
+    z < line_height(&BASE_LINE, y)
 }
 
 /// Distance along z from the tentorium, mm; `None` where there is no tentorium: in front of its edge, beyond its
@@ -62,7 +50,7 @@ pub(super) fn above_tentorium_mm([x, y, z]: [f64; 3]) -> Option<f64> {
     if y >= -20.0 || x.abs() >= 65.0 || z <= -45.0 || incisura {
         return None;
     }
-    let sheet = height(&TENTORIUM_RIDGE, y) - 0.42 * x.abs() - 0.05 * (x.abs() - 25.0).max(0.0);
+    let sheet = line_height(&TENTORIUM_RIDGE, y) - 0.42 * x.abs() - 0.05 * (x.abs() - 25.0).max(0.0);
     Some(z - sheet)
 }
 
@@ -74,12 +62,12 @@ mod tests {
     fn polylines_run_through_their_points_and_stay_level_beyond() {
         for line in [FALX_EDGE.as_slice(), &BASE_LINE, &TENTORIUM_RIDGE] {
             for [y, z] in line {
-                assert!((height(line, *y) - z).abs() < 1e-12);
+                assert!((line_height(line, *y) - z).abs() < 1e-12);
             }
-            assert_eq!(height(line, 500.0), line[0][1]);
-            assert_eq!(height(line, -500.0), line[line.len() - 1][1]);
+            assert_eq!(line_height(line, 500.0), line[0][1]);
+            assert_eq!(line_height(line, -500.0), line[line.len() - 1][1]);
         }
-        assert!((height(&FALX_EDGE, 64.0) + 10.0).abs() < 1e-12);
+        assert!((line_height(&FALX_EDGE, 64.0) + 10.0).abs() < 1e-12);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod landmark;
 mod section;
 
 use crate::mesh::TetMesh;
+use crate::mesh::engine::MidplaneSplit;
 use crate::segment::label;
 use landmark::{above_falx_edge, above_tentorium_mm, below_base_line};
 use nalgebra::Vector3;
@@ -29,9 +30,8 @@ pub const SUPERIOR: &str = "superior";
 pub const MARGIN: &str = "margin";
 /// Held, as an option: the tentorium cerebelli.
 pub const TENTORIUM: &str = "tentorium";
-/// A facet set that meshing engines may leave: the facets between the left and the right half of a mesh whose labels
-/// were split at x = 0. It is used up by tagging.
-pub const MIDSAGITTAL: &str = "midsagittal";
+/// A facet set that meshing leaves where labels were split: used up by tagging.
+pub use crate::mesh::engine::MIDSAGITTAL;
 
 /// Facets this close to x = 0 with all nodes lie in the midsagittal plane, mm.
 const IN_PLANE_MM: f64 = 1e-3;
@@ -80,6 +80,12 @@ impl Default for TagSettings {
             plausible_area_mm2: ranges.map(|(name, range)| (name.to_owned(), range)).into(),
         }
     }
+}
+
+/// The sheet that a mesh in the MNI frame must conform to for the falx to be one: grey and white matter cut at x = 0 above
+/// the free edge.
+pub fn falx_sheet() -> MidplaneSplit {
+    MidplaneSplit { labels: vec![label::GREY_MATTER, label::WHITE_MATTER], above_yz_mm: landmark::FALX_EDGE.to_vec() }
 }
 
 /// How a set is made.

@@ -3,13 +3,14 @@
 mod bar;
 mod fem;
 mod material;
+mod mesh;
 
 use bar::Bar;
 
 type Room = (&'static str, fn() -> Vec<Bar>);
 
 fn main() {
-    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars)];
+    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars), ("mesh", mesh::bars)];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if bar::data().is_none() {
         println!("HGM_BENCH_DATA is not set: bars that need the measuring data are skipped, each room says which.");

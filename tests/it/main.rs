@@ -4,6 +4,7 @@ mod damaged_files;
 mod fem;
 mod job;
 mod material;
+mod mesh_engines;
 mod mesh_files;
 mod nifti_guard;
 mod pipelines;

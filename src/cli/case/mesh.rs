@@ -12,13 +12,13 @@ use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::{label, with_closed_sulci};
-use crate::tag::{TagSettings, tag_boundary_sets};
+use crate::tag::{TagError, TagSettings, falx_sheet, tag_boundary_sets};
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Sulci and fissures up to twice this width are closed in the mesh.
@@ -70,13 +70,20 @@ pub fn mesh(
     session: &Session,
 ) -> Result<(Manifest, MeshFacts), Failure> {
     let programs = programs();
-    let settings = mesh_settings(options, &programs, session)?;
+    let mut settings = mesh_settings(options, &programs, session)?;
+    settings.without = vec![label::CSF];
     let tag_settings: TagSettings = session.settings("tag")?;
+    if tag_settings.falx && settings.split.is_none() {
+        settings.split = Some(falx_sheet());
+    }
     let stage = Stage::new("mesh", VERSION, &case.folder, &(&settings, &tag_settings)).after(after).frame(Mni::NAME);
     case.run(&stage, "mesh", || {
         let body = with_closed_sulci(labels, SULCUS_MM);
         let (mut whole, record) = mesh_labels(&body, &settings, &programs).reject()?;
-        let tags = tag_boundary_sets(&mut whole, &tag_settings).reject()?;
+        let tags = tag_boundary_sets(&mut whole, &tag_settings).map_err(|error| match error {
+            TagError::Empty { .. } => Failure::QualityGate(error.into()),
+            TagError::NoTissue => Failure::Rejected(error.into()),
+        })?;
         let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
         let (rest, _) = whole.restricted(tissue).context("the mesh holds no grey or white matter").reject()?;
         let (rest, _) = rest.largest_face_connected_part().context("the mesh holds no tetrahedra").reject()?;
@@ -101,7 +108,7 @@ pub fn mesh(
             centroid_mm: Some(set.centroid_mm),
         });
         let facts_of_mesh = MeshFacts {
-            mesh: outcome(&rest, &whole, &body, &settings),
+            mesh: mesh_outcome(&rest, &whole, &body, &settings),
             sets: sets.collect(),
             implausible: tags.warnings.clone(),
         };
@@ -132,12 +139,16 @@ pub fn mesh_settings(
     if let Some(edge_mm) = options.edge_mm {
         settings.size = MeshSize::EdgeMm(edge_mm);
     }
-    settings.without = vec![label::CSF];
     Ok(settings)
 }
 
 /// Size and shape of what is simulated, and how well the `whole` mesh it was cut from fills its label map.
-pub fn outcome<F: Frame>(mesh: &TetMesh, whole: &TetMesh, map: &LabelMap<F>, settings: &MeshSettings) -> MeshOutcome {
+pub fn mesh_outcome<F: Frame>(
+    mesh: &TetMesh,
+    whole: &TetMesh,
+    map: &LabelMap<F>,
+    settings: &MeshSettings,
+) -> MeshOutcome {
     let named = |l: u8| label::name(l).map_or_else(|| l.to_string(), str::to_owned);
     let mut volume_cc = BTreeMap::new();
     for (t, &l) in mesh.labels().iter().enumerate() {

@@ -13,7 +13,7 @@ mod scans;
 
 pub use anat::{AnatFacts, Anatomy, anat};
 pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, estimate};
-pub use mesh::{MeshFacts, MeshOptions, mesh};
+pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, programs};
 pub use observed::{observed_surfaces, reference};
 pub use registration::{RegistrationFacts, registration};
 pub use samples::{Sweep, rest_mesh, samples};

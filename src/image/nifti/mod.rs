@@ -97,6 +97,14 @@ pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(M
     Ok((mask, warnings))
 }
 
+/// Whether the header says that the coordinates are those of the MNI template (code 4 for the affine that is believed).
+/// False for what is no NIfTI.
+pub fn says_mni(bytes: &[u8]) -> bool {
+    let head = if gzip::is_gzip(bytes) { gzip::head(bytes, header::HEADER_BYTES) } else { Ok(bytes.to_vec()) };
+    let Some(header) = head.ok().and_then(|head| Header::parse(&head).ok()) else { return false };
+    (if header.sform_code > 0 { header.sform_code } else { header.qform_code }) == 4
+}
+
 fn refused(name: &str, problem: NiftiProblem) -> NiftiError {
     NiftiError { file: name.to_owned(), problem }
 }

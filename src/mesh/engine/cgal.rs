@@ -30,7 +30,7 @@ fn request(field: &LabelField, edge: &EdgeField, seeds: &[Point]) -> Vec<u8> {
 
 /// Reads the program's answer; `None` when it is not one.
 fn parse(bytes: &[u8], fields: usize) -> Option<Complex> {
-    let rest = bytes.strip_prefix(b"HGMTET01")?;
+    let rest = bytes.strip_prefix(b"HGMTET02")?;
     let (head, rest) = rest.split_at_checked(8)?;
     let count = |b: &[u8]| Some(u32::from_le_bytes(b.try_into().ok()?) as usize);
     let (nodes, tets) = (count(&head[..4])?, count(&head[4..])?);
@@ -45,7 +45,8 @@ fn parse(bytes: &[u8], fields: usize) -> Option<Complex> {
         .map(|t| Some([number(&t[..4])?, number(&t[4..8])?, number(&t[8..12])?, number(&t[12..])?]))
         .collect();
     let (x, tets) = (x?, tets?);
-    let fine = labels.len() == tets.len() && labels.iter().all(|&l| l > 0 && (l as usize) < fields);
+    // Field 0: the layer outside.
+    let fine = labels.len() == tets.len() && labels.iter().all(|&l| (l as usize) < fields);
     fine.then(|| Complex::new(x, tets, labels.to_vec()))
 }
 
@@ -67,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_broken_answer_is_refused() {
-        let mut answer = b"HGMTET01".to_vec();
+        let mut answer = b"HGMTET02".to_vec();
         answer.extend([4u32, 1].iter().flat_map(|n| n.to_le_bytes()));
         let x = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f64];
         answer.extend(x.iter().flat_map(|x| x.to_le_bytes()));

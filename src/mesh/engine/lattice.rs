@@ -15,11 +15,11 @@ struct Lattice {
     tets: Vec<[u32; 4]>,
 }
 
-/// All tets of the body-centred lattice of cube edge `cube_mm` that touch a labelled part of the box.
+/// All tets of the body-centred lattice of cube edge `cube_mm` that touch a labelled part of the box, and those around them.
 fn lattice(field: &LabelField, cube_mm: f64) -> Lattice {
     let extent = field.extent_mm();
-    let cells: [usize; 3] = std::array::from_fn(|a| (extent[a] / cube_mm).ceil() as usize + 2);
-    // The lattice is centred on the box and overhangs it by about a cube.
+    let cells: [usize; 3] = std::array::from_fn(|a| (extent[a] / cube_mm).ceil() as usize + 4);
+    // The lattice is centred on the box and overhangs it by about two cubes.
     let origin: [f64; 3] = std::array::from_fn(|a| 0.5 * (extent[a] - cells[a] as f64 * cube_mm));
     let corners = cells.map(|c| c + 1);
     let corner = |c: [usize; 3]| (c[0] + corners[0] * (c[1] + corners[1] * c[2])) as u32;
@@ -39,7 +39,6 @@ fn lattice(field: &LabelField, cube_mm: f64) -> Lattice {
             }
         }
     }
-    let inside: Vec<bool> = x.par_iter().map(|p| field.field_at(p) != 0).collect();
     let mut tets = Vec::new();
     for k in 0..cells[2] {
         for j in 0..cells[1] {
@@ -62,14 +61,23 @@ fn lattice(field: &LabelField, cube_mm: f64) -> Lattice {
                     let (a, b) = (centre(c), centre(next));
                     for n in 0..4 {
                         let tet = [a, b, square[n], square[(n + 1) % 4]];
-                        if tet.iter().any(|&v| inside[v as usize]) {
-                            tets.push(tet);
-                        }
+                        tets.push(tet);
                     }
                 }
             }
         }
     }
+    // What touches a labelled vertex, and one layer more: every vertex that may snap then has all its tets.
+    let mut near: Vec<bool> = x.par_iter().map(|p| field.field_at(p) != 0).collect();
+    for _ in 0..2 {
+        let before = near.clone();
+        for tet in &tets {
+            if tet.iter().any(|&v| before[v as usize]) {
+                tet.iter().for_each(|&v| near[v as usize] = true);
+            }
+        }
+    }
+    tets.retain(|tet| tet.iter().all(|&v| near[v as usize]));
     Lattice { x, tets }
 }
 
@@ -170,8 +178,13 @@ pub(crate) fn mesh(field: &LabelField, cube_mm: f64) -> Complex {
         }
     }
     let fields: Vec<u8> = tets.par_iter().map(|t| majority(field, &t.map(|v| x[v as usize]))).collect();
-    let kept = |n: &usize| fields[*n] != 0;
-    let tets = (0..tets.len()).filter(kept).map(|n| tets[n]).collect();
-    let (x, tets, fields) = Complex::new(x, tets, fields.iter().copied().filter(|&f| f != 0).collect()).compacted();
-    Complex::new(x, tets, fields)
+    // Of the outside, the layer that touches the mesh stays.
+    let mut used = vec![false; x.len()];
+    for (tet, _) in tets.iter().zip(&fields).filter(|(_, f)| **f != 0) {
+        tet.iter().for_each(|&v| used[v as usize] = true);
+    }
+    let kept: Vec<usize> =
+        (0..tets.len()).filter(|&n| fields[n] != 0 || tets[n].iter().any(|&v| used[v as usize])).collect();
+    let fields = kept.iter().map(|&n| fields[n]).collect();
+    Complex::new(x, kept.iter().map(|&n| tets[n]).collect(), fields)
 }

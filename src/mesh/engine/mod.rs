@@ -5,9 +5,12 @@
 //! programs, used when they are installed.
 
 mod cgal;
+mod gmsh;
 mod lattice;
 mod process;
 mod sizing;
+mod surface;
+mod tetgen;
 
 pub use process::{Limits, ProcessError};
 
@@ -20,6 +23,7 @@ use crate::image::LabelMap;
 use serde::{Deserialize, Serialize};
 use sizing::EdgeField;
 use std::path::PathBuf;
+use surface::InterfaceSurface;
 use thiserror::Error;
 
 /// The engines.
@@ -30,6 +34,10 @@ pub enum Engine {
     Lattice,
     /// CGAL's Mesh_3 through our small program.
     Cgal,
+    /// gmsh, inside our own interface surface.
+    Gmsh,
+    /// TetGen, inside our own interface surface.
+    Tetgen,
 }
 
 impl Engine {
@@ -38,6 +46,8 @@ impl Engine {
         match self {
             Self::Lattice => "lattice",
             Self::Cgal => "cgal",
+            Self::Gmsh => "gmsh",
+            Self::Tetgen => "tetgen",
         }
     }
 }
@@ -58,6 +68,10 @@ pub enum MeshSize {
 pub struct EnginePrograms {
     /// `hgm-cgal-mesher`.
     pub cgal: Option<PathBuf>,
+    /// `gmsh`.
+    pub gmsh: Option<PathBuf>,
+    /// `tetgen`.
+    pub tetgen: Option<PathBuf>,
 }
 
 impl EnginePrograms {
@@ -71,13 +85,27 @@ impl EnginePrograms {
             places.into_iter().find(|p| p.is_file())
         });
         let named = variable("HGM_CGAL_MESHER").map(PathBuf::from).filter(|p| p.is_file());
-        Self { cgal: named.or(beside).or_else(|| on_path("hgm-cgal-mesher")) }
+        let cgal = named.or(beside).or_else(|| on_path("hgm-cgal-mesher"));
+        Self { cgal, gmsh: on_path("gmsh"), tetgen: on_path("tetgen") }
     }
 
     /// The engine that is used when none is named: `cgal` where it is built, else `lattice`.
     pub fn preferred(&self) -> Engine {
         if self.cgal.is_some() { Engine::Cgal } else { Engine::Lattice }
     }
+}
+
+/// The facet set of a mesh with a [`MidplaneSplit`]: the facets of the sheet (and a few mm below it), seen from the right.
+pub const MIDSAGITTAL: &str = "midsagittal";
+
+/// Labels that are cut in two by the plane x = 0 of the map's frame, so that tets conform to it: the falx.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MidplaneSplit {
+    /// The labels.
+    pub labels: Vec<u8>,
+    /// The lower edge of the sheet as (y, z) from front to back, mm; empty for the whole plane.
+    pub above_yz_mm: Vec<[f64; 2]>,
 }
 
 /// Everything that decides a mesh.
@@ -90,6 +118,8 @@ pub struct MeshSettings {
     pub size: MeshSize,
     /// Labels that are not meshed (they count as outside).
     pub without: Vec<u8>,
+    /// A sheet in the plane x = 0 to which the tets conform.
+    pub split: Option<MidplaneSplit>,
     /// Smoothing of the label indicators, in voxels.
     pub smoothing_voxels: f64,
     /// Parts of the labelled region smaller than this share of the largest are removed; parts of a label smaller than
@@ -107,6 +137,7 @@ impl Default for MeshSettings {
             engine: Engine::Lattice,
             size: MeshSize::Cells(60_000),
             without: Vec::new(),
+            split: None,
             smoothing_voxels: 0.7,
             smallest_part: 0.05,
             optimise: OptimiseSettings::default(),
@@ -188,14 +219,41 @@ pub fn mesh_labels<F: Frame>(
     }
     let islands = repair::remove_islands(&mut map, settings.smallest_part, TET_SHARE * edge_mm.powi(3));
     let field = LabelField::new(&map, settings.smoothing_voxels).ok_or_else(no_labels)?;
+    let field = match &settings.split {
+        Some(split) => field.split_at_midplane(&split.labels, &split.above_yz_mm),
+        None => field,
+    };
     let seeds = sizing::interface_seeds(&field);
+    let voxel_mm3 = map.grid.voxel_volume_mm3();
+    let wanted_mm3 = |label: &u8| map.data.iter().filter(|l| *l == label).count() as f64 * voxel_mm3;
+    let wanted_mm3: Vec<f64> = field.labels().iter().map(wanted_mm3).collect();
+    let polish = |mut complex: Complex| {
+        repair::separate(&mut complex);
+        complex.sheet = field.sheet().cloned();
+        optimise::optimise(&mut complex, &field, &wanted_mm3, &settings.optimise);
+        repair::separate(&mut complex);
+        complex
+    };
+    let lattice = |edge_mm: f64| lattice::mesh(&field, edge_mm * CUBE_PER_EDGE);
+    let missing = |program| EngineError::Missing { engine: name, program };
+    let failed = |source| EngineError::Program { engine: name, source };
     let make = |edge_mm: f64| match settings.engine {
-        Engine::Lattice => Ok(lattice::mesh(&field, edge_mm * CUBE_PER_EDGE)),
+        Engine::Lattice => Ok(lattice(edge_mm)),
         Engine::Cgal => {
-            let program = programs.cgal.as_ref();
-            let program = program.ok_or(EngineError::Missing { engine: name, program: "hgm-cgal-mesher" })?;
-            cgal::mesh(program, &field, &EdgeField::uniform(edge_mm), &seeds, &settings.limits)
-                .map_err(|source| EngineError::Program { engine: name, source })
+            let program = programs.cgal.as_ref().ok_or(missing("hgm-cgal-mesher"))?;
+            cgal::mesh(program, &field, &EdgeField::uniform(edge_mm), &seeds, &settings.limits).map_err(failed)
+        }
+        Engine::Gmsh | Engine::Tetgen => {
+            let is_gmsh = settings.engine == Engine::Gmsh;
+            let program = if is_gmsh { programs.gmsh.as_ref() } else { programs.tetgen.as_ref() };
+            let program = program.ok_or(missing(name))?;
+            let surface = InterfaceSurface::of(&polish(lattice(edge_mm)));
+            let inside = if is_gmsh {
+                gmsh::mesh(program, &surface, edge_mm, &settings.limits)
+            } else {
+                tetgen::mesh(program, &surface, &field, edge_mm, &settings.limits)
+            };
+            inside.map_err(failed)
         }
     };
     let mut complex = make(edge_mm)?;
@@ -209,19 +267,11 @@ pub fn mesh_labels<F: Frame>(
             complex = make(edge_mm)?;
         }
     }
-    repair::separate(&mut complex);
     if complex.count() == 0 {
         let centre_mm = centre_of_mass(&field);
         return Err(EngineError::TooSmall { engine: name, centre_mm, volume_mm3, edge_mm });
     }
-    let mut wanted_mm3 = vec![0.0; field.labels().len()];
-    for label in &map.data {
-        if let Ok(k) = field.labels().binary_search(label) {
-            wanted_mm3[k] += map.grid.voxel_volume_mm3();
-        }
-    }
-    optimise::optimise(&mut complex, &field, &wanted_mm3, &settings.optimise);
-    repair::separate(&mut complex);
+    let complex = polish(complex);
     let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
     Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
 }
@@ -258,7 +308,18 @@ fn to_frame(complex: &Complex, field: &LabelField) -> Result<TetMesh, MeshError>
             tet.swap(2, 3);
         }
     }
-    TetMesh::new(nodes, tets, fields.iter().map(|&f| field.labels()[f as usize]).collect())
+    let mut mesh = TetMesh::new(nodes, tets, fields.iter().map(|&f| field.labels()[f as usize]).collect())?;
+    let Some(sheet) = field.sheet() else { return Ok(mesh) };
+    let in_sheet = |(facet, first, second): ([u32; 3], usize, Option<usize>)| {
+        let (own, other) = (fields[first], fields[second?]);
+        let centre: Point = facet.iter().map(|&n| x[n as usize]).sum::<Point>() / 3.0;
+        let [a, b, c] = facet;
+        let seen_from_right = if sheet.left >> own & 1 == 1 { facet } else { [a, c, b] };
+        (sheet.crosses(own, other) && !sheet.is_loose(own, other, &centre)).then_some(seen_from_right)
+    };
+    let facets: Vec<[u32; 3]> = mesh.facets().into_iter().filter_map(in_sheet).collect();
+    mesh.facet_sets.insert(MIDSAGITTAL.to_owned(), facets);
+    Ok(mesh)
 }
 
 #[cfg(test)]
@@ -297,11 +358,35 @@ mod tests {
         assert!((inner_mm3 / ball(20.0) - 1.0).abs() < 0.01, "{inner_mm3}");
         assert!((shell_mm3 / (ball(30.0) - ball(20.0)) - 1.0).abs() < 0.01, "{shell_mm3}");
         let shape = shape_quality(&mesh);
-        assert!(shape.dihedral_min_deg > 15.0 && shape.non_manifold_outer_edges == 0, "{shape:?}");
+        assert!(
+            shape.dihedral_min_deg > 15.0 && shape.non_manifold_outer_edges + shape.crossing_facets == 0,
+            "{shape:?}"
+        );
         assert!(shape.radius_ratio_min > 0.1 && shape.radius_ratio_mean > 0.7, "{shape:?}");
         assert!(shape.scaled_jacobian_min > 0.05, "{shape:?}");
         let border = surface_distance(&mesh, &ball_in_shell(), &[]).unwrap();
         assert!(border.mean_mm < 0.5 && border.percentile_95_mm < 1.0, "{border:?}");
+    }
+
+    #[test]
+    fn split_labels_leave_a_sheet_of_facets_in_the_midplane() {
+        let size = MeshSize::Cells(8000);
+        let split = MidplaneSplit { labels: vec![2], above_yz_mm: Vec::new() };
+        let settings = MeshSettings { size, split: Some(split), ..MeshSettings::default() };
+        let (mesh, _) = mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap();
+        let sheet = &mesh.facet_sets[MIDSAGITTAL];
+        let area: f64 = sheet.iter().map(|&f| mesh.area_vector_mm2(f).norm()).sum();
+        let seen: f64 = sheet.iter().map(|&f| mesh.area_vector_mm2(f).x).sum();
+        // The shell's cut: a ring between the radii.
+        let ring = std::f64::consts::PI * (900.0 - 400.0);
+        assert!((area / ring - 1.0).abs() < 0.03, "{area}");
+        assert!(seen / area > 0.98, "the facets lie in the plane and are seen from the right: {seen} of {area}");
+        // Where the sheet meets other interfaces at a sharp angle, a node may stay beside the plane for the sake of shape.
+        let corners = sheet.as_flattened();
+        let flat = corners.iter().filter(|&&n| mesh.nodes_mm()[n as usize][0].abs() < 1e-9).count();
+        assert!(flat as f64 > 0.95 * corners.len() as f64, "{flat} of {}", corners.len());
+        let shape = shape_quality(&mesh);
+        assert!(shape.dihedral_min_deg > 15.0 && shape.radius_ratio_min > 0.1, "{shape:?}");
     }
 
     #[test]

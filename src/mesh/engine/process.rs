@@ -75,12 +75,32 @@ pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<
     if status.success() {
         return Ok(out);
     }
+    if err.ends_with(format!("{TIMED_OUT}\n").as_bytes()) {
+        return Err(ProcessError::TimedOut { time_s: limits.time_s });
+    }
     let said = String::from_utf8_lossy(if err.is_empty() { &out } else { &err }).into_owned();
     let tail: Vec<&str> = said.lines().rev().filter(|l| !l.trim().is_empty()).take(3).collect();
     let last_words = tail.into_iter().rev().collect::<Vec<_>>().join(" | ");
     let last_words = if last_words.is_empty() { "without a word".to_owned() } else { last_words };
     Err(ProcessError::Failed { status: status.to_string(), last_words })
 }
+
+/// A script for the shell in a folder of its own, which goes when the script ends; the program is `$0`, and `run` in front of
+/// it stops it in time, with its children, which killing the shell would not.
+pub(crate) fn scratch_command(program: &std::path::Path, script: &str, limits: &Limits) -> Command {
+    let mut shell = Command::new("/bin/sh");
+    // A little before the shell itself would be killed, so that it can clean up.
+    let seconds = 0.95 * limits.time_s;
+    shell.arg("-c").arg(format!(
+        "d=$(mktemp -d) || exit 1; trap 'rm -rf \"$d\"' EXIT; cd \"$d\" || exit 1; \
+         run() {{ timeout -k 1 {seconds:.3} \"$@\" || {{ s=$?; [ $s = 124 ] && echo '{TIMED_OUT}' >&2; exit $s; }}; }}; {script}"
+    ));
+    shell.arg(program);
+    shell
+}
+
+/// What a script says when its program was stopped.
+const TIMED_OUT: &str = "hgm: stopped in time";
 
 /// The command behind the shell's `ulimit -v`, where there is such a shell: the limit is the kernel's, not a hope.
 fn capped(command: &Command, memory_mb: u64) -> Command {
@@ -121,6 +141,20 @@ mod tests {
         let started = Instant::now();
         assert!(matches!(run(&sh("exec sleep 30"), Vec::new(), &limits), Err(ProcessError::TimedOut { .. })));
         assert!(started.elapsed() < Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_script_stops_its_program_in_time_and_leaves_nothing() {
+        let limits = Limits { time_s: 0.3, ..Limits::default() };
+        let started = Instant::now();
+        let script = scratch_command(std::path::Path::new("/bin/sleep"), "run \"$0\" 30", &limits);
+        assert!(matches!(run(&script, Vec::new(), &limits), Err(ProcessError::TimedOut { .. })));
+        assert!(started.elapsed() < Duration::from_secs(10));
+        let limits = Limits::default();
+        let script = scratch_command(std::path::Path::new("/bin/cat"), "cat > a && run \"$0\" a && pwd", &limits);
+        let said = String::from_utf8(run(&script, b"here ".to_vec(), &limits).unwrap()).unwrap();
+        let folder = said.strip_prefix("here ").unwrap().trim();
+        assert!(folder.starts_with('/') && !std::path::Path::new(folder).exists(), "{folder}");
     }
 
     #[test]

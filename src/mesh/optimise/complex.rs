@@ -1,5 +1,6 @@
 //! A tetrahedral complex that can be edited: tets around every vertex, cells replaced cavity by cavity.
 
+use crate::mesh::sheet::Sheet;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -9,10 +10,15 @@ pub(crate) type Point = Vector3<f64>;
 /// Field number of a tet that has been taken out.
 pub(crate) const GONE: u8 = u8::MAX;
 
+/// Field number of a tet outside the labels. Such tets are no part of the mesh. A layer of them around it, where an engine gives
+/// one, keeps its outer surface from passing through itself: like any tet they may not be turned inside out, but their shape
+/// is nobody's concern.
+pub(crate) const AIR: u8 = 0;
+
 /// The six edges of a tet by local corners.
 pub(crate) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// A facet between two fields: corners seen counter-clockwise from the side of `above`; 0 is the outside.
+/// A facet between two fields: corners seen counter-clockwise from the side of `above`, which alone may be the outside, 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct InterfaceFacet {
     pub corners: [u32; 3],
@@ -20,13 +26,17 @@ pub(crate) struct InterfaceFacet {
     pub above: u8,
 }
 
-/// Tets with a field number each (never 0: the outside has no tets), editable.
+/// Tets with a field number each, editable. See [`AIR`] for those outside the labels.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Complex {
     pub x: Vec<Point>,
     pub tets: Vec<[u32; 4]>,
     pub field: Vec<u8>,
     pub star: Vec<Vec<u32>>,
+    /// Where fields are halves of one label.
+    pub sheet: Option<Sheet>,
+    /// Vertices that move in the midplane only; empty when none do.
+    pub flat: Vec<bool>,
     free: Vec<u32>,
 }
 
@@ -38,15 +48,35 @@ impl Complex {
                 star[v as usize].push(t as u32);
             }
         }
-        Self { x, tets, field, star, free: Vec::new() }
+        Self { x, tets, field, star, sheet: None, flat: Vec::new(), free: Vec::new() }
     }
 
     pub fn alive(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.tets.len() as u32).filter(|&t| self.field[t as usize] != GONE)
     }
 
+    /// The tets of the mesh: alive and not [`AIR`].
+    pub fn solid(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.tets.len() as u32).filter(|&t| self.is_solid(t))
+    }
+
+    #[inline]
+    pub fn is_solid(&self, t: u32) -> bool {
+        !matches!(self.field[t as usize], GONE | AIR)
+    }
+
+    /// Number of tets of the mesh.
     pub fn count(&self) -> usize {
-        self.tets.len() - self.free.len()
+        self.solid().count()
+    }
+
+    /// Takes a tet out of the mesh: it becomes air where there is air, so that the layer stays whole.
+    pub fn vent(&mut self, t: u32) {
+        if self.field.contains(&AIR) {
+            self.field[t as usize] = AIR;
+        } else {
+            self.take_out(t);
+        }
     }
 
     #[inline]
@@ -60,9 +90,9 @@ impl Complex {
         quality(&a, &b, &c, &d)
     }
 
-    /// Worst quality around a vertex.
+    /// Worst quality of the mesh's tets around a vertex.
     pub fn star_quality(&self, v: u32) -> f64 {
-        self.star[v as usize].iter().map(|&t| self.quality(t)).fold(f64::MAX, f64::min)
+        self.star[v as usize].iter().filter(|&&t| self.is_solid(t)).map(|&t| self.quality(t)).fold(f64::MAX, f64::min)
     }
 
     /// The other tet at the face of `t` opposite its local corner, or `None` at the outside.
@@ -103,6 +133,26 @@ impl Complex {
         t
     }
 
+    /// Whether the face between fields `a` and `b` counts for nothing (see [`Sheet::is_loose`]).
+    #[inline]
+    pub fn is_loose(&self, a: u8, b: u8, face: [u32; 3]) -> bool {
+        self.sheet.as_ref().is_some_and(|sheet| {
+            sheet.crosses(a, b)
+                && sheet.is_loose(a, b, &(face.iter().map(|&v| self.x[v as usize]).sum::<Point>() / 3.0))
+        })
+    }
+
+    /// The part of a step of a vertex that it may take.
+    #[inline]
+    pub fn allowed(&self, v: u32, step: Point) -> Point {
+        match &self.sheet {
+            Some(sheet) if self.flat.get(v as usize) == Some(&true) => {
+                step - sheet.normal() * sheet.normal().dot(&step)
+            }
+            _ => step,
+        }
+    }
+
     /// For every vertex: bit k when field k meets it, bit 0 when it is on the outer boundary.
     pub fn all_fields(&self) -> Vec<u64> {
         let mut mask = vec![0u64; self.x.len()];
@@ -130,7 +180,7 @@ impl Complex {
 
     /// Every facet between two fields and every outer facet, in an order that depends on the complex only.
     pub fn interface_facets(&self) -> Vec<InterfaceFacet> {
-        let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * self.count());
+        let mut faces: Vec<([u32; 3], u32)> = Vec::with_capacity(4 * self.tets.len());
         for t in self.alive() {
             for corner in 0..4u32 {
                 let tet = self.tets[t as usize];
@@ -150,8 +200,12 @@ impl Complex {
             n += 1 + usize::from(partner.is_some());
             if above != below {
                 let tet = self.tets[id as usize / 4];
-                let corners = crate::mesh::TET_FACES[id as usize % 4].map(|c| tet[c]);
-                facets.push(InterfaceFacet { corners, below, above });
+                let [a, b, c] = crate::mesh::TET_FACES[id as usize % 4].map(|c| tet[c]);
+                facets.push(if below == AIR {
+                    InterfaceFacet { corners: [a, c, b], below: above, above: below }
+                } else {
+                    InterfaceFacet { corners: [a, b, c], below, above }
+                });
             }
         }
         facets
@@ -194,10 +248,10 @@ impl Complex {
         None
     }
 
-    /// Drops what is gone and numbers the rest anew, in order.
+    /// The mesh alone, without what is gone or air, numbered anew in order.
     pub fn compacted(&self) -> (Vec<Point>, Vec<[u32; 4]>, Vec<u8>) {
         let mut number = vec![u32::MAX; self.x.len()];
-        for t in self.alive() {
+        for t in self.solid() {
             for v in self.tets[t as usize] {
                 number[v as usize] = 0;
             }
@@ -207,8 +261,8 @@ impl Complex {
             *number = x.len() as u32;
             x.push(self.x[v]);
         }
-        let tets = self.alive().map(|t| self.tets[t as usize].map(|v| number[v as usize])).collect();
-        (x, tets, self.alive().map(|t| self.field[t as usize]).collect())
+        let tets = self.solid().map(|t| self.tets[t as usize].map(|v| number[v as usize])).collect();
+        (x, tets, self.solid().map(|t| self.field[t as usize]).collect())
     }
 }
 
@@ -262,6 +316,17 @@ pub(crate) fn min_sine(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
 /// degrees (sine 0.31) they are raised to at least 0.15 and 0.08. Angles alone leave tets with three corners nearly on a line.
 const RADIUS_RATIO_WEIGHT: f64 = 2.0;
 const SCALED_JACOBIAN_WEIGHT: f64 = 4.0;
+
+/// Six volumes of a tet over its longest edge at `a`, cubed: what tets of air keep at least [`THIN`] of, so that nothing touches.
+#[inline]
+pub(crate) fn thickness(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
+    let (ab, ac, ad) = (b - a, c - a, d - a);
+    let scale = ab.norm_squared().max(ac.norm_squared()).max(ad.norm_squared()).max(f64::MIN_POSITIVE);
+    ab.cross(&ac).dot(&ad) / (scale * scale.sqrt())
+}
+
+/// See [`thickness`].
+pub(crate) const THIN: f64 = 1e-3;
 
 /// Smallest dihedral sine (see [`min_sine`]), radius ratio and scaled Jacobian (see `ShapeQuality`), all negative for an
 /// inverted tet.

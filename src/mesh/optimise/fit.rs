@@ -91,7 +91,8 @@ fn pull(complex: &Complex, field: &LabelField, facet: &InterfaceFacet, step: f64
 /// One sweep: every interface vertex moves to its lumped least-squares place, as far as the quality `floor` lets it.
 /// Returns the root mean square of the wanted moves in mm.
 pub(crate) fn sweep(complex: &mut Complex, field: &LabelField, floor: f64) -> f64 {
-    let facets = complex.interface_facets();
+    let mut facets = complex.interface_facets();
+    facets.retain(|f| !complex.is_loose(f.below, f.above, f.corners));
     let step = 0.6 * field.spacing_mm().into_iter().fold(f64::MAX, f64::min);
     let pulls: Vec<Pull> = facets.par_iter().map(|f| pull(complex, field, f, step)).collect();
     let mut system = vec![(Matrix3::<f64>::zeros(), Point::zeros(), 0.0f64); complex.x.len()];
@@ -111,7 +112,7 @@ pub(crate) fn sweep(complex: &mut Complex, field: &LabelField, floor: f64) -> f6
         }
         // The small diagonal keeps the vertex from sliding where its facets are coplanar.
         let Some(inverse) = (matrix + Matrix3::identity() * (0.05 * weight)).try_inverse() else { continue };
-        let step = inverse * moment;
+        let step = complex.allowed(v as u32, inverse * moment);
         let goal = complex.x[v] + step;
         sum += step.norm_squared();
         count += 1;

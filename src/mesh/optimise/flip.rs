@@ -5,7 +5,7 @@
 //! the ring is then triangulated on each side of the new diagonal, which is a flip of the interface itself, allowed
 //! where it moves the interface by less than [`Limits::interface_shift`] of the edge length.
 
-use super::complex::{Complex, EDGES, Point, Ring, quality};
+use super::complex::{AIR, Complex, EDGES, Point, Ring, quality};
 use crate::mesh::TET_FACES;
 
 /// What a change may do.
@@ -22,6 +22,9 @@ impl Default for Limits {
         Self { interface_shift: 0.12, longest_ring: 8 }
     }
 }
+
+/// Quality above which a tet of air is neither inside out nor flat.
+const FLAT: f64 = 1e-3;
 
 /// An improvement below this is not worth a change (and could cycle).
 const GAIN: f64 = 1e-4;
@@ -114,7 +117,8 @@ pub(crate) fn remove_edge(complex: &mut Complex, a: u32, b: u32, limits: &Limits
     if ring.tets.len() > limits.longest_ring {
         return None;
     }
-    let old = ring.tets.iter().map(|&t| complex.quality(t)).fold(f64::MAX, f64::min);
+    let solid = ring.tets.iter().filter(|&&t| complex.is_solid(t));
+    let old = solid.map(|&t| complex.quality(t)).fold(f64::MAX, f64::min);
     let beat = old + GAIN;
     let parts = sectors(complex, &ring);
     let whole = ring.closed && parts.len() == 1;
@@ -130,13 +134,15 @@ pub(crate) fn remove_edge(complex: &mut Complex, a: u32, b: u32, limits: &Limits
         if joined != thin || (thin && !edge_is_inside(complex, p, q)) {
             return None;
         }
-        if shift(complex, a, b, p, q) > limits.interface_shift {
+        let loose = parts.len() == 2 && [p, q].iter().all(|&v| complex.is_loose(parts[0].0, parts[1].0, [a, b, v]));
+        if !loose && shift(complex, a, b, p, q) > limits.interface_shift {
             return None;
         }
     }
     let mut fresh: Vec<([u32; 4], u8)> = Vec::new();
     for (field, chain) in &parts {
-        let (_, triangles) = triangulate(complex, chain, a, b, beat)?;
+        // Outside the mesh a tet need only be right-handed.
+        let (_, triangles) = triangulate(complex, chain, a, b, if *field == AIR { FLAT } else { beat })?;
         for [i, j, k] in triangles {
             fresh.push(([i, j, k, b], *field));
             fresh.push(([i, k, j, a], *field));
@@ -157,7 +163,7 @@ pub(crate) fn remove_edge(complex: &mut Complex, a: u32, b: u32, limits: &Limits
 pub(crate) fn face_to_edge(complex: &mut Complex, t: u32, corner: usize) -> Option<Vec<u32>> {
     let other = complex.across(t, corner)?;
     let field = complex.field[t as usize];
-    if complex.field[other as usize] != field {
+    if complex.field[other as usize] != field || field == AIR {
         return None;
     }
     let tet = complex.tets[t as usize];
@@ -201,6 +207,7 @@ pub(crate) fn collapse(
         }
         let moved = tet.map(|v| if v == a { b } else { v });
         let p: [Point; 4] = moved.map(|v| complex.x[v as usize]);
+        let beat = if complex.is_solid(t) { beat } else { FLAT };
         if quality(&p[0], &p[1], &p[2], &p[3]) <= beat {
             return None;
         }
@@ -249,7 +256,7 @@ pub(crate) fn collapse(
     Some(fresh.into_iter().map(|(tet, field)| complex.put_in(tet, field)).collect())
 }
 
-/// Area vectors (away from the lower tet) and corners of the interface facets at a vertex.
+/// Area vectors (away from the lower tet) and corners of the interface facets at a vertex that are not loose.
 pub(crate) fn interface_normals(complex: &Complex, v: u32) -> Vec<(Point, [u32; 3])> {
     let mut normals = Vec::new();
     for &t in &complex.star[v as usize] {
@@ -260,6 +267,9 @@ pub(crate) fn interface_normals(complex: &Complex, v: u32) -> Vec<(Point, [u32; 
             // Each facet once: from its lower-numbered tet, or from its only one.
             if across.is_none_or(|other| field(other) != field(t) && t < other) {
                 let face = TET_FACES[corner].map(|c| tet[c]);
+                if across.is_some_and(|other| complex.is_loose(field(t), field(other), face)) {
+                    continue;
+                }
                 let [p, q, r] = face.map(|v| complex.x[v as usize]);
                 normals.push(((q - p).cross(&(r - p)) * 0.5, face));
             }

@@ -6,13 +6,13 @@
 
 mod complex;
 mod fit;
+mod flatten;
 mod flip;
 mod relax;
 mod smooth;
 mod volume;
 
-use complex::GONE;
-pub(crate) use complex::{Complex, Point, min_sine};
+pub(crate) use complex::{AIR, Complex, Point, min_sine};
 
 use super::label_field::LabelField;
 use flip::Limits;
@@ -39,10 +39,11 @@ impl Default for OptimiseSettings {
     }
 }
 
-/// Fits and improves in place; field k shall fill `wanted_mm3[k]`.
+/// Fits and improves in place; the fields with the label of field k together shall fill `wanted_mm3[k]`.
 pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, wanted_mm3: &[f64], settings: &OptimiseSettings) {
     let target = settings.target_angle_deg.to_radians().sin();
     let floor = settings.fit_floor_deg.to_radians().sin();
+    flatten::flatten(complex, PRESSED);
     raise(complex, target, 3);
     for _ in 0..settings.rounds {
         for _ in 0..settings.sweeps {
@@ -51,9 +52,11 @@ pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, wanted_mm3: &[
         for _ in 0..settings.relaxing {
             relax::sweep(complex, target, false);
         }
+        flatten::flatten(complex, PRESSED);
         raise(complex, target, 3);
     }
     raise(complex, target, 6);
+    flatten::flatten(complex, target);
     // The last word: places as near the interface as the target allows.
     volume::match_volumes(complex, field, wanted_mm3, target);
     for _ in 0..settings.relaxing {
@@ -61,13 +64,16 @@ pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, wanted_mm3: &[
     }
 }
 
+/// Quality to which laying the sheet flat may press a tet that is raised again afterwards.
+const PRESSED: f64 = 0.03;
+
 /// Raises tets below `target` (sine of the smallest dihedral angle) in at most `passes` passes.
 pub(crate) fn raise(complex: &mut Complex, target: f64, passes: usize) {
     let limits = Limits::default();
     for _ in 0..passes {
         let fields = complex.all_fields();
         let mut bad: Vec<(f64, u32)> =
-            complex.alive().map(|t| (complex.quality(t), t)).filter(|(q, _)| *q < target).collect();
+            complex.solid().map(|t| (complex.quality(t), t)).filter(|(q, _)| *q < target).collect();
         if bad.is_empty() {
             return;
         }
@@ -80,7 +86,7 @@ pub(crate) fn raise(complex: &mut Complex, target: f64, passes: usize) {
                 if budget == 0 {
                     break;
                 }
-                if complex.field[t as usize] == GONE || complex.quality(t) >= target {
+                if !complex.is_solid(t) || complex.quality(t) >= target {
                     continue;
                 }
                 budget -= 1;

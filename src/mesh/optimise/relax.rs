@@ -1,6 +1,6 @@
 //! Moving vertices to raise the mean radius ratio, where raising the worst has nothing more to say.
 
-use super::complex::{Complex, Point, quality, shape};
+use super::complex::{Complex, Point, THIN, quality, shape, thickness};
 use super::smooth::quadric;
 use crate::mesh::TET_FACES;
 
@@ -15,18 +15,22 @@ pub(crate) fn sweep(complex: &mut Complex, floor: f64, inner: bool) {
     let fields = complex.all_fields();
     for v in 0..complex.x.len() as u32 {
         let mask = fields[v as usize];
-        if mask == 0 || mask.count_ones() > if inner { 1 } else { 2 } {
+        if mask <= 1 || mask.count_ones() > if inner { 1 } else { 2 } {
             continue;
         }
         let start = complex.x[v as usize];
-        let faces: Vec<[Point; 3]> = complex.star[v as usize]
-            .iter()
-            .map(|&t| {
-                let tet = complex.tets[t as usize];
-                let corner = tet.iter().position(|&w| w == v).unwrap_or(0);
-                TET_FACES[corner].map(|c| complex.x[tet[c] as usize])
-            })
-            .collect();
+        let mut faces: Vec<[Point; 3]> = Vec::new();
+        let mut air: Vec<([Point; 3], f64)> = Vec::new();
+        for &t in &complex.star[v as usize] {
+            let tet = complex.tets[t as usize];
+            let corner = tet.iter().position(|&w| w == v).unwrap_or(0);
+            let face = TET_FACES[corner].map(|c| complex.x[tet[c] as usize]);
+            if complex.is_solid(t) {
+                faces.push(face);
+            } else {
+                air.push((face, thickness(&start, &face[0], &face[1], &face[2]).min(THIN)));
+            }
+        }
         let measure = |x: &Point, least: f64| {
             let (mut sum, mut worst) = (0.0, f64::MAX);
             for [a, b, c] in &faces {
@@ -36,7 +40,7 @@ pub(crate) fn sweep(complex: &mut Complex, floor: f64, inner: bool) {
                 }
                 sum += shape(x, a, b, c)[1];
             }
-            Some((sum, worst))
+            air.iter().all(|([a, b, c], least)| thickness(x, a, b, c) >= *least).then_some((sum, worst))
         };
         let Some((sum, worst)) = measure(&start, f64::MIN) else { continue };
         let mut goal = Point::zeros();
@@ -53,6 +57,7 @@ pub(crate) fn sweep(complex: &mut Complex, floor: f64, inner: bool) {
             let flat = plane.eigenvalues.iter().enumerate().filter(|(_, e)| **e < TANGENT);
             step = flat.map(|(n, _)| plane.eigenvectors.column(n) * plane.eigenvectors.column(n).dot(&step)).sum();
         }
+        let step = complex.allowed(v, step);
         for share in [1.0, 0.5, 0.2] {
             let x = start + step * share;
             if measure(&x, worst.min(floor)).is_some_and(|(s, _)| s > sum) {

@@ -1,6 +1,6 @@
 //! Moving a vertex to raise the worst quality around it.
 
-use super::complex::{Complex, Point, quality};
+use super::complex::{Complex, Point, THIN, quality, thickness};
 use super::flip::interface_normals;
 use nalgebra::{Matrix3, Vector3};
 
@@ -27,28 +27,35 @@ const DIRECTIONS: [[f64; 3]; 14] = [
 
 /// The link of a vertex, oriented so that a tet is (vertex, p, q, r).
 struct Link {
+    /// Faces of the mesh's tets.
     faces: Vec<[Point; 3]>,
+    /// Faces of tets outside and the thickness that these keep at least: that of today or [`THIN`].
+    air: Vec<([Point; 3], f64)>,
 }
 
 impl Link {
     fn of(complex: &Complex, v: u32) -> Self {
-        let mut faces: Vec<(f64, [Point; 3])> = complex.star[v as usize]
-            .iter()
-            .map(|&t| {
-                let tet = complex.tets[t as usize];
-                let corner = tet.iter().position(|&w| w == v).unwrap_or(0);
-                // The face opposite corner c, seen from outside, is turned around for (v, p, q, r).
-                let [p, q, r] = crate::mesh::TET_FACES[corner].map(|c| complex.x[tet[c] as usize]);
-                let face = [p, q, r];
-                (quality(&complex.x[v as usize], &face[0], &face[1], &face[2]), face)
-            })
-            .collect();
+        let x = complex.x[v as usize];
+        let mut faces: Vec<(f64, [Point; 3])> = Vec::with_capacity(complex.star[v as usize].len());
+        let mut air = Vec::new();
+        for &t in &complex.star[v as usize] {
+            let tet = complex.tets[t as usize];
+            let corner = tet.iter().position(|&w| w == v).unwrap_or(0);
+            // The face opposite corner c, seen from outside, is turned around for (v, p, q, r).
+            let face = crate::mesh::TET_FACES[corner].map(|c| complex.x[tet[c] as usize]);
+            if complex.is_solid(t) {
+                faces.push((quality(&x, &face[0], &face[1], &face[2]), face));
+            } else {
+                air.push((face, thickness(&x, &face[0], &face[1], &face[2]).min(THIN)));
+            }
+        }
         // Worst first, so that a bad candidate is refused early.
         faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Self { faces: faces.into_iter().map(|f| f.1).collect() }
+        Self { faces: faces.into_iter().map(|f| f.1).collect(), air }
     }
 
-    /// Worst quality with the vertex at `p`, or some value not above `enough` when it is not above.
+    /// Worst quality with the vertex at `p`, or some value not above `enough` when it is not above or a tet outside gets
+    /// too thin.
     fn quality(&self, p: &Point, enough: f64) -> f64 {
         let mut worst = f64::MAX;
         for [a, b, c] in &self.faces {
@@ -57,7 +64,8 @@ impl Link {
                 return worst;
             }
         }
-        worst
+        let crushed = |([a, b, c], least): &([Point; 3], f64)| thickness(p, a, b, c) < *least;
+        if self.air.iter().any(crushed) { enough.min(-1.0) } else { worst }
     }
 }
 
@@ -104,7 +112,7 @@ pub(crate) fn improve_position(complex: &mut Complex, v: u32, on_interface: bool
             moved = false;
             turns += 1;
             for direction in DIRECTIONS {
-                let candidate = at + Vector3::from(direction) * step;
+                let candidate = at + complex.allowed(v, Vector3::from(direction) * step);
                 let cost = penalty(&candidate);
                 let quality = link.quality(&candidate, score + cost) - cost;
                 if quality > score + 1e-6 {

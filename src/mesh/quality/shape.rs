@@ -1,6 +1,7 @@
 //! Shape of tets: dihedral angles, radius ratio, scaled Jacobian.
 
-use crate::mesh::{TET_FACES, TetMesh};
+use super::crossing::crossings;
+use crate::mesh::{TET_FACES, TetMesh, TriMesh};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +27,8 @@ pub struct ShapeQuality {
     pub scaled_jacobian_min: f64,
     /// Edges of the outer surface without exactly two outer facets.
     pub non_manifold_outer_edges: usize,
+    /// Pairs of outer facets that pass through each other: places where the mesh overlaps itself.
+    pub crossing_facets: usize,
 }
 
 /// Figures of one tet.
@@ -84,6 +87,7 @@ pub fn shape_quality(mesh: &TetMesh) -> ShapeQuality {
         radius_ratio_mean: ratio_sum / count as f64,
         scaled_jacobian_min: jacobian,
         non_manifold_outer_edges: non_manifold_outer_edges(mesh),
+        crossing_facets: crossings(&TriMesh::from_facets(mesh.nodes_mm(), &mesh.boundary_facets(|_| true)).0).len(),
     }
 }
 
@@ -137,11 +141,8 @@ mod tests {
         // Four points near a square: no short edge, no volume.
         let h = 0.02;
         let nodes = [[0.0, 0.0, h], [1.0, 0.0, -h], [1.0, 1.0, h], [0.0, 1.0, -h]];
-        let tet = if crate::mesh::TetMesh::new(nodes.to_vec(), vec![[0, 1, 2, 3]], vec![2]).is_ok() {
-            [0, 1, 2, 3]
-        } else {
-            [0, 2, 1, 3]
-        };
+        let tet =
+            if TetMesh::new(nodes.to_vec(), vec![[0, 1, 2, 3]], vec![2]).is_ok() { [0, 1, 2, 3] } else { [0, 2, 1, 3] };
         let quality = shape_quality(&mesh(&nodes, &[tet]));
         assert!(quality.dihedral_min_deg < 10.0 && quality.dihedral_below_10_percent == 100.0);
         assert!(quality.radius_ratio_min < 0.1 && quality.scaled_jacobian_min < 0.1);
