@@ -268,7 +268,7 @@ pub fn mesh_labels<F: Frame>(
         }
     }
     if complex.count() == 0 {
-        let centre_mm = centre_of_mass(&field);
+        let centre_mm = centre_mm(&map);
         return Err(EngineError::TooSmall { engine: name, centre_mm, volume_mm3, edge_mm });
     }
     let complex = polish(complex);
@@ -285,17 +285,13 @@ fn positive(what: &'static str, value: f64) -> Result<f64, EngineError> {
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err(EngineError::Setting { what, value }) }
 }
 
-fn centre_of_mass(field: &LabelField) -> [f64; 3] {
-    let [nx, ny, _] = field.dims();
-    let spacing = field.spacing_mm();
-    let (mut sum, mut count) = (Point::zeros(), 0.0);
-    for (v, _) in field.largest().iter().enumerate().filter(|(_, l)| **l != 0) {
-        let c = [v % nx, v / nx % ny, v / (nx * ny)];
-        sum += Point::from(std::array::from_fn::<f64, 3, _>(|a| c[a] as f64 * spacing[a]));
-        count += 1.0;
-    }
-    let centre = sum / f64::max(count, 1.0);
-    field.frame_from_box().transform_point(&centre.into()).coords.into()
+/// Mean place of the labelled voxels.
+fn centre_mm<F: Frame>(map: &LabelMap<F>) -> [f64; 3] {
+    let labelled = (0..map.data.len()).filter(|&v| map.data[v] != 0);
+    let (sum, count) = labelled.fold((Point::zeros(), 0.0), |(sum, count), v| {
+        (sum + Point::from(map.grid.voxel(v).map(|c| c as f64)), count + 1.0)
+    });
+    map.grid.position((sum / f64::max(count, 1.0)).into()).mm.coords.into()
 }
 
 /// Box coordinates to the map's frame; a mirroring affine turns the tets around.
