@@ -1,19 +1,18 @@
 //! `hgm estimate`: the moduli that explain what was observed, with error bars.
 
 use super::case::{
-    self, Anatomy, Case, ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, OUTCOME, REFERENCE_STATE, REST_MESH,
+    self, Case, ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, OUTCOME, REFERENCE_STATE, REST_MESH,
 };
+use super::patient::Patient;
 use super::{Failure, Reject, Session};
 use crate::artefact::Manifest;
 use crate::experiment::estimate::EstimateOutcome;
-use crate::experiment::observed::ObservedSurfaces;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
+use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::phantom::PhantomSettings;
-use crate::experiment::resection::{ResectionSettings, improvement};
+use crate::experiment::resection::improvement;
 use crate::experiment::sweep::Reference;
 use crate::mesh::format::{Field, vtu};
-use anyhow::{Context, anyhow};
-use serde::de::DeserializeOwned;
+use anyhow::anyhow;
 use std::path::PathBuf;
 
 /// Shear moduli by optimisation with solver sensitivities: most probable values, 95 % intervals, what limits them
@@ -31,26 +30,22 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = Case::open(&args.case, session);
     let options: EstimateOptions = session.settings("estimate")?;
-    let facts = if case.path(REFERENCE_STATE).exists() {
-        of_phantom(&case, args.tissues, &options, session)?
-    } else {
-        of_patient(&case, args.tissues, &options, session)?
+    if case.path(REFERENCE_STATE).exists() {
+        let facts = of_phantom(&case, args.tissues, &options, session)?;
+        let mut outcome = ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?;
+        with_estimate(&mut outcome, &facts);
+        case.write_outcome(&outcome)?;
+        let page = case.write_page()?;
+        return session.emit(&facts.estimate, &(table(&facts) + &page));
+    }
+    let patient = Patient::open(&case, args.tissues, session)?;
+    let earlier = match case.path(OUTCOME).exists() {
+        true => Some(ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?),
+        false => None,
     };
-    let page = add_to_outcome(&case, &facts)?;
-    session.emit(&facts.estimate, &(table(&facts) + &page))
-}
-
-/// The settings the case was made with, unless the settings file of this call has the table.
-fn settings_of<T: DeserializeOwned + Default>(case: &Case, room: &str, session: &Session) -> Result<T, Failure> {
-    if session.has_table(room) || !case.path("settings.toml").exists() {
-        return session.settings(room);
-    }
-    let text = case.read_text("settings.toml")?;
-    let table: toml::Table = text.parse().context("settings.toml: not a TOML file").reject()?;
-    match table.get(room) {
-        None => session.settings(room),
-        Some(table) => table.clone().try_into().with_context(|| format!("settings.toml: table [{room}]")).reject(),
-    }
+    let (outcome, facts, page) = patient.estimate(&options, earlier, session)?;
+    session.emit(&facts.estimate, &(table(&facts) + &comparison(&outcome, &facts) + &page))?;
+    patient.quality_gate()
 }
 
 fn of_phantom(
@@ -59,7 +54,7 @@ fn of_phantom(
     options: &EstimateOptions,
     session: &Session,
 ) -> Result<EstimateFacts, Failure> {
-    let mut settings: PhantomSettings = settings_of(case, "phantom", session)?;
+    let settings: PhantomSettings = case.settings_of("phantom", session)?;
     if tissues.is_some_and(|t| usize::from(t) != settings.tissues) {
         return Err(Failure::Rejected(anyhow!(
             "--tissues: the phantom in this folder has {}; make another with `hgm phantom --tissues {}`",
@@ -67,10 +62,10 @@ fn of_phantom(
             tissues.unwrap_or_default()
         )));
     }
-    settings.tissues = tissues.map_or(settings.tissues, usize::from);
-    let (mesh_bytes, reference_bytes) = (case.read(REST_MESH)?, case.read(REFERENCE_STATE)?);
+    let mesh_bytes = case.read(REST_MESH)?;
     let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
-    let reference = vtu::decode(&reference_bytes, REFERENCE_STATE).reject()?;
+    let (made, _): (Manifest, SampleOutcome) = case.stage_facts("reference")?;
+    let reference = vtu::decode(&case.read(REFERENCE_STATE)?, REFERENCE_STATE).reject()?;
     let displacement = reference.point_field("displacement").and_then(Field::vectors);
     let displacement =
         displacement.ok_or_else(|| anyhow!("{REFERENCE_STATE}: no array `displacement`; run with --force"))?;
@@ -80,63 +75,10 @@ fn of_phantom(
         tissues: &settings.tissue_list(),
         poisson_ratio: settings.poisson_ratio,
         reference: &Reference::Nodes(displacement),
-        reference_bytes: &reference_bytes,
+        after: &made,
         noise_mm: options.phantom_noise_mm,
     };
     Ok(case::estimate(case, &input, options, session)?.1)
-}
-
-fn of_patient(
-    case: &Case,
-    tissues: Option<u8>,
-    options: &EstimateOptions,
-    session: &Session,
-) -> Result<EstimateFacts, Failure> {
-    let mut settings: ResectionSettings = settings_of(case, "resection", session)?;
-    settings.tissues = tissues.map_or(settings.tissues, usize::from);
-    let coarsest_voxel_mm = case.anat_facts()?.coarsest_voxel_mm;
-    Ok(patient_estimate(case, &settings, settings.noise_floor(coarsest_voxel_mm), options, session)?.1)
-}
-
-/// The estimate of a prepared patient's case.
-///
-/// # Errors
-/// A case without mesh or masks, or settings that the solver refuses.
-pub fn patient_estimate(
-    case: &Case,
-    settings: &ResectionSettings,
-    floor: NoiseFloor,
-    options: &EstimateOptions,
-    session: &Session,
-) -> Result<(Manifest, EstimateFacts), Failure> {
-    let anatomy = Anatomy::read(case)?;
-    let mesh_bytes = case.read(REST_MESH)?;
-    let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
-    let mut reference_bytes = anatomy.cavity.data.iter().map(|&b| u8::from(b)).collect::<Vec<u8>>();
-    reference_bytes.extend(anatomy.post_ventricle.data.iter().map(|&b| u8::from(b)));
-    let surfaces = ObservedSurfaces::new(&mesh, case::observed_surfaces(&anatomy)).reject()?;
-    let input = EstimateInput {
-        mesh: (&mesh, &mesh_bytes),
-        scenario: &settings.scenario(),
-        tissues: &settings.tissue_list(),
-        poisson_ratio: settings.poisson_ratio,
-        reference: &Reference::Surfaces(surfaces),
-        reference_bytes: &reference_bytes,
-        noise_mm: floor.combined_mm().unwrap_or(options.descent.noise_mm),
-    };
-    case::estimate(case, &input, options, session)
-}
-
-/// Puts the estimate beside the samples of `sim/outcome.json` and makes the page again.
-fn add_to_outcome(case: &Case, facts: &EstimateFacts) -> Result<String, Failure> {
-    let mut outcome = if case.path(OUTCOME).exists() {
-        ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?
-    } else {
-        ExperimentOutcome { kind: ExperimentKind::Resection, ..ExperimentOutcome::default() }
-    };
-    with_estimate(&mut outcome, facts);
-    case.write_outcome(&outcome)?;
-    case.write_page()
 }
 
 /// The outcome with the estimate as one more sample; it is the best one where no sweep has chosen another.

@@ -14,13 +14,16 @@ mod gp;
 mod law;
 mod man;
 mod mesh;
+mod patient;
 mod phantom;
 mod prep;
+mod reduce;
 mod register;
 mod report;
 mod run;
 mod session;
 mod simulate;
+mod sweep;
 mod synth;
 
 pub use failure::{Failure, Reject};
@@ -45,6 +48,8 @@ enum Command {
     Prep(prep::Args),
     Run(run::Args),
     Phantom(phantom::Args),
+    Sweep(sweep::Args),
+    Reduce(reduce::Args),
     Estimate(estimate::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
@@ -67,6 +72,8 @@ pub fn main() -> ExitCode {
         Command::Prep(args) => prep::run(&args, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
+        Command::Sweep(args) => sweep::run(&args, &session),
+        Command::Reduce(args) => reduce::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),

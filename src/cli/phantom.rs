@@ -1,6 +1,6 @@
 //! `hgm phantom`: known moduli go in and must come out.
 
-use super::case::{self, Case, MeshOptions, Sweep};
+use super::case::{self, Case, MeshOptions, SampleMode, Sweep};
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
@@ -82,8 +82,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let reference = Reference::Nodes(displacement);
     let sweep =
-        Sweep { mesh: &mesh, template: &scenario, tissues: &tissues, reference: &reference, after: &referenced };
-    let solved = case::samples(&case, &sweep, &list, session)?;
+        Sweep { mesh: &mesh, template: &scenario, tissues: &tissues, reference: &reference, after: &[&referenced] };
+    let solved = case::samples(&case, &sweep, &list, SampleMode::Run, session)?;
     let (samples, mut manifests): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
 
     let prior_only: Vec<SampleOutcome> = samples.iter().filter(|s| s.id != truth.id).cloned().collect();

@@ -62,6 +62,17 @@ pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, 
 }
 
 impl Prepared {
+    /// What an earlier `prep` or `run` left in the folder.
+    ///
+    /// # Errors
+    /// Rejected when it has not been prepared.
+    pub fn read(case: &Case) -> Result<Self, Failure> {
+        let (registered, registration) = case.stage_facts("registration")?;
+        let (segmented, anat) = case.stage_facts("anat")?;
+        let (meshed, mesh) = case.stage_facts("mesh")?;
+        Ok(Self { manifests: vec![registered, segmented, meshed], registration, anat, mesh })
+    }
+
     /// The part of an outcome that is known before any simulation.
     pub fn outcome(&self) -> ExperimentOutcome {
         ExperimentOutcome {

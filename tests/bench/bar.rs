@@ -24,3 +24,59 @@ impl Bar {
 pub fn data() -> Option<std::path::PathBuf> {
     std::env::var_os("HGM_BENCH_DATA").map(Into::into)
 }
+
+/// Processor seconds of this process so far (user and system).
+pub fn cpu_seconds() -> f64 {
+    ticks("/proc/self/stat").unwrap_or(f64::NAN)
+}
+
+/// Kernel ticks are 1/100 s on every Linux that distributions ship.
+fn ticks(path: &str) -> Option<f64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
+    Some((fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?) / 100.0)
+}
+
+/// A finished run of the program.
+pub struct Finished {
+    /// Exit code 0.
+    pub ok: bool,
+    /// Wall time, s.
+    pub wall_s: f64,
+    /// Processor time, s.
+    pub cpu_s: f64,
+    /// Largest resident memory, GB.
+    pub peak_gb: f64,
+    /// Standard output.
+    pub printed: String,
+}
+
+/// Runs the release program and watches its time and memory.
+pub fn run_hgm(arguments: &[&str]) -> Finished {
+    let begin = std::time::Instant::now();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_hgm"))
+        .args(arguments)
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program is built with the benchmark");
+    let folder = format!("/proc/{}", child.id());
+    let (mut cpu_s, mut peak_gb) = (0.0, 0.0);
+    let status = loop {
+        if let Some(seconds) = ticks(&format!("{folder}/stat")) {
+            cpu_s = seconds;
+        }
+        let status = std::fs::read_to_string(format!("{folder}/status")).unwrap_or_default();
+        let peak =
+            status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix("kB")?.trim().parse().ok());
+        peak_gb = peak.map_or(peak_gb, |kb: f64| kb / 1e6);
+        match child.try_wait().expect("the program can be waited for") {
+            Some(status) => break status,
+            None => std::thread::sleep(std::time::Duration::from_millis(50)),
+        }
+    };
+    let mut printed = String::new();
+    if let Some(mut stdout) = child.stdout.take() {
+        std::io::Read::read_to_string(&mut stdout, &mut printed).ok();
+    }
+    Finished { ok: status.success(), wall_s: begin.elapsed().as_secs_f64(), cpu_s, peak_gb, printed }
+}

@@ -4,6 +4,9 @@ mod bar;
 mod fem;
 mod material;
 mod mesh;
+mod experiment;
+mod imaging;
+mod job;
 
 use bar::Bar;
 
@@ -11,6 +14,8 @@ type Room = (&'static str, fn() -> Vec<Bar>);
 
 fn main() {
     let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars), ("mesh", mesh::bars)];
+    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars)];
+    let rooms: Vec<Room> = vec![("imaging", imaging::bars), ("experiment", experiment::bars), ("job", job::bars)];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if bar::data().is_none() {
         println!("HGM_BENCH_DATA is not set: bars that need the measuring data are skipped, each room says which.");

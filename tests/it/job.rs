@@ -10,11 +10,11 @@ fn hgm() -> Command {
     Command::new(std::env::var_os("HGM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_hgm").into()))
 }
 
-fn sample(name: &str) -> PathBuf {
+pub fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sample-data").join(name)
 }
 
-fn output(arguments: &[&str]) -> Output {
+pub fn output(arguments: &[&str]) -> Output {
     hgm().args(arguments).output().unwrap()
 }
 
@@ -98,29 +98,56 @@ fn slow_the_phantom_finds_the_sample_nearest_to_what_went_in() {
 }
 
 #[test]
-fn a_scan_that_cannot_be_used_ends_with_3_names_the_file_and_writes_nothing() {
+fn slow_shards_in_any_order_give_the_bytes_of_one_run_and_a_gap_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let good = std::fs::read(sample("pre.nii.gz")).unwrap();
-    let mut flipped = good.clone();
-    flipped[good.len() / 2] ^= 1;
-    let files: [(&str, Vec<u8>); 4] = [
-        ("truncated.nii.gz", good[..good.len() / 3].to_vec()),
-        ("flipped.nii.gz", flipped),
-        ("text.nii", b"not an image".to_vec()),
-        ("same.nii.gz", good.clone()),
-    ];
-    let pre = sample("pre.nii.gz").to_str().unwrap().to_owned();
-    for (name, bytes) in &files {
-        std::fs::write(path(name), bytes).unwrap();
-        let result = output(&["run", &pre, &path(name), "-o", &path("case")]);
-        let message = String::from_utf8_lossy(&result.stderr).into_owned();
-        assert_eq!(result.status.code(), Some(3), "{name}: {message}");
-        assert!(message.contains(name), "{message}");
-        assert!(!folder.path().join("case").exists(), "{name}: something was written");
+    let mesh = ["--mesher", "lattice", "--cells", "8000"];
+    assert!(output(&[&["phantom", "-o", &path("phantom")], &mesh[..]].concat()).status.success());
+    // A phantom is no patient: it has no masks to sweep against.
+    assert_eq!(output(&["sweep", &path("phantom")]).status.code(), Some(3));
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let scans = [pre.to_str().unwrap(), post.to_str().unwrap()];
+    let prep = [&["prep", scans[0], scans[1], "-o", &path("parts")], &mesh[..]].concat();
+    assert!(output(&prep).status.success());
+    copy(&folder.path().join("parts"), &folder.path().join("whole"));
+    assert!(output(&["sweep", &path("whole")]).status.success());
+    for part in ["3/3", "1/3"] {
+        assert!(output(&["sweep", &path("parts"), "--shard", part, "--threads", "1"]).status.success());
     }
-    let missing = output(&["run", &pre, &path("nowhere.nii.gz"), "-o", &path("case")]);
-    assert_eq!(missing.status.code(), Some(3));
+    let gap = output(&["reduce", &path("parts")]);
+    assert_eq!(gap.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&gap.stderr).contains("sample-01 is not done"));
+    assert!(output(&["sweep", &path("parts"), "--shard", "2/3"]).status.success());
+    assert!(output(&["reduce", &path("parts")]).status.success());
+    assert!(contents(&folder.path().join("parts")) == contents(&folder.path().join("whole")));
+    let estimate = output(&["estimate", &path("whole"), "--json"]);
+    let estimate: serde_json::Value = serde_json::from_slice(&estimate.stdout).unwrap();
+    let [low, high] = [0, 1].map(|n| estimate["posterior"]["interval_95"][0][n].as_f64().unwrap());
+    assert!(0.0 < low && low < estimate["posterior"]["mode"][0].as_f64().unwrap() && high.is_finite());
+}
+
+#[test]
+fn slow_the_estimate_finds_both_moduli_of_a_phantom() {
+    let folder = tempfile::tempdir().unwrap();
+    let phantom = folder.path().join("phantom").to_str().unwrap().to_owned();
+    let settings = folder.path().join("settings.toml");
+    std::fs::write(&settings, "[phantom]\nsd_levels = [0.0]\n").unwrap();
+    let made = ["--config", settings.to_str().unwrap(), "phantom", "--tissues", "2", "-o", &phantom];
+    assert!(output(&[&made, &["--mesher", "lattice", "--cells", "8000"][..]].concat()).status.success());
+    assert_eq!(output(&["estimate", &phantom, "--tissues", "1"]).status.code(), Some(3));
+    let result: serde_json::Value = serde_json::from_slice(&output(&["estimate", &phantom, "--json"]).stdout).unwrap();
+    for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {
+        let found = result["posterior"]["mode"][n].as_f64().unwrap();
+        assert!((found / truth - 1.0).abs() < 1e-3, "{found} for {truth}");
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    for (name, bytes) in contents(from) {
+        let path = to.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
 }
 
 #[test]

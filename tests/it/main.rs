@@ -9,6 +9,7 @@ mod mesh_files;
 mod nifti_guard;
 mod pipelines;
 mod python;
+mod refused_inputs;
 mod rooms;
 mod simulate;
 mod slicer_files;

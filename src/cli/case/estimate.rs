@@ -64,8 +64,8 @@ pub struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
-    /// Everything the reference was made from.
-    pub reference_bytes: &'a [u8],
+    /// The manifest of the stage that made the reference.
+    pub after: &'a Manifest,
     /// Standard deviation of one observation, mm.
     pub noise_mm: f64,
 }
@@ -93,7 +93,7 @@ pub fn estimate(
     let posed = (input.scenario, input.tissues, input.poisson_ratio, input.noise_mm, options, &prior);
     let stage = Stage::new(ESTIMATE, VERSION, &case.folder, &posed)
         .input("mesh", input.mesh.1)
-        .input("reference", input.reference_bytes)
+        .after(input.after)
         .frame(Mni::NAME);
     case.run(&stage, ESTIMATE, || {
         let bar = session.progress(1, "estimate");

@@ -16,7 +16,7 @@ pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, esti
 pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, programs};
 pub use observed::{observed_surfaces, reference};
 pub use registration::{RegistrationFacts, registration};
-pub use samples::{Sweep, rest_mesh, samples};
+pub use samples::{SampleMode, Sweep, rest_mesh, samples};
 pub use scans::{Overrides, Scans};
 
 use super::Session;
@@ -39,6 +39,8 @@ pub const REST_MESH: &str = "mesh/rest.vtu";
 /// The experiment's numbers.
 pub const OUTCOME: &str = "sim/outcome.json";
 
+/// Every setting that was used, by room.
+const SETTINGS: &str = "settings.toml";
 /// A phantom's reference state.
 pub const REFERENCE_STATE: &str = "sim/reference.vtu";
 
@@ -82,15 +84,37 @@ impl Case {
         Ok(write_whole(&self.path("sim/samples.csv"), samples_table(outcome).as_bytes())?)
     }
 
-    /// What the stage `anat` said of the masks.
+    /// The settings of a room: this call's where its settings file has the table, else those the case was made with.
     ///
     /// # Errors
-    /// Rejected when the case has not been prepared.
-    pub fn anat_facts(&self) -> Result<AnatFacts, Failure> {
-        const NAME: &str = ".stages/anat.manifest.json";
+    /// A table that is not of this room.
+    pub fn settings_of<T: DeserializeOwned + Default>(&self, room: &str, session: &Session) -> Result<T, Failure> {
+        if session.has_table(room) || !self.path(SETTINGS).exists() {
+            return session.settings(room);
+        }
+        let table: toml::Table =
+            self.read_text(SETTINGS)?.parse().context("settings.toml: not a TOML file").reject()?;
+        match table.get(room) {
+            None => session.settings(room),
+            Some(table) => table.clone().try_into().with_context(|| format!("settings.toml: table [{room}]")).reject(),
+        }
+    }
+
+    /// Takes `settings.toml` away, so that only this call's settings count.
+    pub fn forget_settings(&self) {
+        std::fs::remove_file(self.path(SETTINGS)).ok();
+    }
+
+    /// A stage's manifest and facts as an earlier call left them.
+    ///
+    /// # Errors
+    /// Rejected when the stage has not been run here.
+    pub fn stage_facts<T: DeserializeOwned>(&self, stage: &str) -> Result<(Manifest, T), Failure> {
+        let name = format!(".stages/{stage}.manifest.json");
         let manifest: Manifest =
-            serde_json::from_slice(&self.read(NAME)?).with_context(|| format!("{NAME}: not a manifest")).reject()?;
-        serde_json::from_value(manifest.facts).with_context(|| format!("{NAME}: facts of another version")).reject()
+            serde_json::from_slice(&self.read(&name)?).with_context(|| format!("{name}: not a manifest")).reject()?;
+        let facts = serde_json::from_value(manifest.facts.clone());
+        Ok((manifest, facts.with_context(|| format!("{name}: facts of another version; run again")).reject()?))
     }
 
     /// `settings.toml`: every setting that was used, by room.
@@ -101,7 +125,7 @@ impl Case {
         // TOML has no null: what is null is left out.
         let mut settings = serde_json::to_value(settings)?;
         without_nulls(&mut settings);
-        Ok(write_whole(&self.path("settings.toml"), toml::to_string(&settings)?.as_bytes())?)
+        Ok(write_whole(&self.path(SETTINGS), toml::to_string(&settings)?.as_bytes())?)
     }
 
     /// `provenance.json`: program, stages, checksums of inputs and outputs.

@@ -10,6 +10,7 @@ use crate::fem::Scenario;
 use crate::geometry::{Frame, Mni};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
+use anyhow::anyhow;
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 2;
@@ -25,8 +26,17 @@ pub struct Sweep<'a> {
     pub tissues: &'a [Tissue],
     /// What the samples are compared with.
     pub reference: &'a Reference,
-    /// The manifest of the stage that made mesh and reference.
-    pub after: &'a Manifest,
+    /// The manifests of the stages that made mesh and reference.
+    pub after: &'a [&'a Manifest],
+}
+
+/// Whether samples that are not there are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleMode {
+    /// Make them.
+    Run,
+    /// Refuse and say which.
+    Gather,
 }
 
 /// Runs (or skips) every sample; the records come back in order.
@@ -37,15 +47,23 @@ pub fn samples(
     case: &Case,
     sweep: &Sweep<'_>,
     list: &[Sample],
+    mode: SampleMode,
     session: &Session,
 ) -> Result<Vec<(SampleOutcome, Manifest)>, Failure> {
     let bar = session.progress(list.len() as u64, "simulation");
     let mut records = Vec::with_capacity(list.len());
     for sample in list {
-        let stage =
-            Stage::new(&format!("sim-{}", sample.id), VERSION, &case.folder, &(sweep.template, sweep.tissues, sample))
-                .after(sweep.after)
-                .frame(Mni::NAME);
+        let settings = (sweep.template, sweep.tissues, sample);
+        let stage = Stage::new(&format!("sim-{}", sample.id), VERSION, &case.folder, &settings).frame(Mni::NAME);
+        let stage = sweep.after.iter().fold(stage, |stage, earlier| stage.after(earlier));
+        if mode == SampleMode::Gather
+            && let Some(reason) = stage.why().first()
+        {
+            return Err(Failure::Rejected(anyhow!(
+                "{} is not done ({reason}); run `hgm sweep` on the shard it belongs to, with the same settings",
+                sample.id
+            )));
+        }
         let (manifest, record) = case.run(&stage, &sample.id, || {
             let show = |p: &crate::fem::Progress| {
                 bar.set_message(format!("{} residual {:.1e}", sample.id, p.relative_residual));

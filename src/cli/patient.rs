@@ -1,0 +1,174 @@
+//! A prepared patient's case: what `run`, `sweep`, `reduce` and `estimate` share.
+
+use super::case::{self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, REST_MESH, SampleMode, Sweep};
+use super::estimate::with_estimate;
+use super::prep::Prepared;
+use super::{Failure, Reject, Session};
+use crate::artefact::Manifest;
+use crate::experiment::observed::ObservedSurfaces;
+use crate::experiment::outcome::{ExperimentOutcome, NoiseFloor};
+use crate::experiment::prior::{PriorSettings, samples_of_prior};
+use crate::experiment::resection::ResectionSettings;
+use crate::experiment::sample::shard;
+use crate::experiment::sweep::{Reference, best_sample};
+use crate::mesh::TetMesh;
+use crate::mesh::format::vtu;
+use std::collections::BTreeMap;
+
+/// Which samples of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of them, then outcome and page.
+    All,
+    /// Those of one shard (1-based), and nothing else.
+    Shard {
+        /// Which.
+        number: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// None: every sample must be there already; then outcome and page.
+    Gather,
+}
+
+/// Mesh, reference and settings of a prepared case.
+#[derive(Debug)]
+pub struct Patient {
+    case: Case,
+    prepared: Prepared,
+    settings: ResectionSettings,
+    mesh: TetMesh,
+    mesh_bytes: Vec<u8>,
+    reference: Reference,
+    /// prep's stages, then the reference.
+    manifests: Vec<Manifest>,
+}
+
+impl Patient {
+    /// Reads mesh and masks and writes the reference surfaces.
+    ///
+    /// # Errors
+    /// Files that are missing or damaged; sets or surfaces that are empty.
+    pub fn new(case: &Case, prepared: Prepared, settings: ResectionSettings) -> Result<Self, Failure> {
+        let mesh_bytes = case.read(REST_MESH)?;
+        let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
+        let surfaces = case::observed_surfaces(&Anatomy::read(case)?);
+        let mut manifests = prepared.manifests.clone();
+        manifests.push(case::reference(case, &surfaces, &prepared.manifests[1])?);
+        let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces).reject()?);
+        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference, manifests })
+    }
+
+    /// A case that `hgm prep` or `hgm run` has made, with the settings it was made with.
+    ///
+    /// # Errors
+    /// As [`Patient::new`]; also a folder that has not been prepared.
+    pub fn open(case: &Case, tissues: Option<u8>, session: &Session) -> Result<Self, Failure> {
+        let mut settings: ResectionSettings = case.settings_of("resection", session)?;
+        settings.tissues = tissues.map_or(settings.tissues, usize::from);
+        Self::new(case, Prepared::read(case)?, settings)
+    }
+
+    fn floor(&self) -> NoiseFloor {
+        self.settings.noise_floor(self.prepared.anat.coarsest_voxel_mm)
+    }
+
+    fn rest_rmse_mm(&self) -> BTreeMap<String, f64> {
+        self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]).rmse_mm
+    }
+
+    /// Simulates the samples of `part`; with all of them there, writes outcome and page and returns both.
+    ///
+    /// # Errors
+    /// A scenario that the solver refuses; samples that are missing when they are gathered.
+    pub fn sweep(&self, part: Part, session: &Session) -> Result<Option<(ExperimentOutcome, String)>, Failure> {
+        let prior: PriorSettings = self.case.settings_of("prior", session)?;
+        let (scenario, tissues) = (self.settings.scenario(), self.settings.tissue_list());
+        let list =
+            samples_of_prior(&tissues, &self.settings.sd_levels, self.settings.poisson_ratio, &prior).reject()?;
+        let after = [&self.manifests[2], &self.manifests[3]];
+        let shared = Sweep {
+            mesh: &self.mesh,
+            template: &scenario,
+            tissues: &tissues,
+            reference: &self.reference,
+            after: &after,
+        };
+        let used = BTreeMap::from([
+            ("resection", serde_json::to_value(&self.settings)?),
+            ("prior", serde_json::to_value(&prior)?),
+        ]);
+        if let Part::Shard { number, of } = part {
+            case::samples(&self.case, &shared, &shard(&list, number, of), SampleMode::Run, session)?;
+            self.case.write_settings(&used)?;
+            return Ok(None);
+        }
+        let mode = if part == Part::Gather { SampleMode::Gather } else { SampleMode::Run };
+        let (samples, made): (Vec<_>, Vec<_>) =
+            case::samples(&self.case, &shared, &list, mode, session)?.into_iter().unzip();
+        let mut outcome = self.posed_outcome();
+        outcome.warnings.extend(made.iter().flat_map(|m| m.warnings.iter().cloned()));
+        outcome.tissues = tissues.iter().map(|t| t.name.clone()).collect();
+        outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
+        outcome.samples = samples;
+        let manifests: Vec<Manifest> = self.manifests.iter().cloned().chain(made).collect();
+        let page = self.case.finish(&outcome, &used, &manifests)?;
+        Ok(Some((outcome, page)))
+    }
+
+    /// Estimates the moduli against the post-operative surfaces. The samples of an `earlier` outcome stay beside it.
+    ///
+    /// # Errors
+    /// A scenario that the solver refuses, or a prior that does not exist.
+    pub fn estimate(
+        &self,
+        options: &EstimateOptions,
+        earlier: Option<ExperimentOutcome>,
+        session: &Session,
+    ) -> Result<(ExperimentOutcome, EstimateFacts, String), Failure> {
+        let input = EstimateInput {
+            mesh: (&self.mesh, &self.mesh_bytes),
+            scenario: &self.settings.scenario(),
+            tissues: &self.settings.tissue_list(),
+            poisson_ratio: self.settings.poisson_ratio,
+            reference: &self.reference,
+            after: &self.manifests[3],
+            noise_mm: self.floor().combined_mm().unwrap_or(options.descent.noise_mm),
+        };
+        let (manifest, facts) = case::estimate(&self.case, &input, options, session)?;
+        let mut outcome = earlier.filter(|o| !o.samples.is_empty()).unwrap_or_else(|| self.posed_outcome());
+        with_estimate(&mut outcome, &facts);
+        let used = BTreeMap::from([
+            ("resection", serde_json::to_value(&self.settings)?),
+            ("estimate", serde_json::to_value(options)?),
+        ]);
+        let manifests: Vec<Manifest> = self.manifests.iter().cloned().chain([manifest]).collect();
+        let page = self.case.finish(&outcome, &used, &manifests)?;
+        Ok((outcome, facts, page))
+    }
+
+    /// What is known before any material is tried.
+    fn posed_outcome(&self) -> ExperimentOutcome {
+        let [gx, gy, gz] = self.settings.gravity_m_per_s2;
+        let loads = format!(
+            "gravity ({gx}, {gy}, {gz}) m/s2 on tissue of {} kg/m3, with {} held",
+            self.settings.density_kg_per_m3,
+            self.settings.fixed.join(" and ")
+        );
+        ExperimentOutcome {
+            reference: "ventricle wall and cavity surface of the post-operative scan (closest points)".to_owned(),
+            rest_rmse_mm: self.rest_rmse_mm(),
+            noise_floor: Some(self.floor()),
+            loads: vec![loads],
+            ..self.prepared.outcome()
+        }
+    }
+
+    /// Exit code 4 when a boundary set is not to be believed.
+    ///
+    /// # Errors
+    /// [`Failure::QualityGate`].
+    pub fn quality_gate(&self) -> Result<(), Failure> {
+        self.prepared.quality_gate()
+    }
+}

@@ -1,0 +1,136 @@
+//! What a user may hand to `hgm run` that cannot be used: exit code 3, a message with file, field and remedy, and nothing
+//! written.
+
+use crate::job::{output, sample};
+use std::io::{Read, Write};
+use std::path::Path;
+
+fn unpacked(bytes: &[u8]) -> Vec<u8> {
+    let mut plain = Vec::new();
+    flate2::read::GzDecoder::new(bytes).read_to_end(&mut plain).unwrap();
+    plain
+}
+
+fn packed(bytes: &[u8], level: u32) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::new(level));
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// A copy with some bytes of the header replaced.
+fn with(plain: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut copy = plain.to_vec();
+    copy[at..at + bytes.len()].copy_from_slice(bytes);
+    copy
+}
+
+/// The voxels of a 16-bit file, all replaced.
+fn filled(plain: &[u8], value: i16) -> Vec<u8> {
+    let mut copy = plain[..352].to_vec();
+    for _ in 0..(plain.len() - 352) / 2 {
+        copy.extend(value.to_le_bytes());
+    }
+    copy
+}
+
+#[test]
+fn each_unusable_file_ends_with_3_and_leaves_nothing_behind() {
+    let good = std::fs::read(sample("pre.nii.gz")).unwrap();
+    let plain = unpacked(&good);
+    let short = |n: i16| n.to_le_bytes().to_vec();
+    let float = |x: f32| x.to_le_bytes().to_vec();
+    let mut flipped = good.clone();
+    let middle = good.len() / 2;
+    flipped[middle] ^= 1;
+    let mut bad_crc = good.clone();
+    let crc = good.len() - 8;
+    bad_crc[crc] ^= 1;
+    // Offsets of NIfTI-1: dim 40, datatype 70, bitpix 72, pixdim 76, scl_slope 112, form codes 252, srow 280, magic 344.
+    let cases: Vec<(&str, Vec<u8>, &[&str])> = vec![
+        ("empty.nii.gz", vec![], &["sizeof_hdr", "again"]),
+        ("text.nii", b"these are words and not an image at all".repeat(20), &["sizeof_hdr", "dcm2niix"]),
+        ("cut.nii.gz", good[..good.len() / 3].to_vec(), &["gzip", "again"]),
+        ("cut.nii", plain[..plain.len() - 1000].to_vec(), &["dim", "truncated", "again"]),
+        ("flipped.nii.gz", flipped, &["gzip", "again"]),
+        ("crc.nii.gz", bad_crc, &["gzip", "again"]),
+        ("header.nii", plain[..300].to_vec(), &["sizeof_hdr", "again"]),
+        ("magic.nii", with(&plain, 344, b"n+7\0"), &["magic", "again"]),
+        ("half.nii", with(&plain, 344, b"ni1\0"), &["magic", ".hdr"]),
+        ("rgb.nii", with(&with(&plain, 70, &short(128)), 72, &short(24)), &["datatype", "RGB24"]),
+        ("complex.nii", with(&with(&plain, 70, &short(32)), 72, &short(64)), &["datatype", "complex64"]),
+        ("volumes.nii", with(&plain, 40, &[short(4), plain[42..48].to_vec(), short(3)].concat()), &["dim", "--volume"]),
+        ("negative.nii", with(&plain, 44, &short(-5)), &["dim", "-5"]),
+        ("spacing.nii", with(&plain, 80, &float(0.0)), &["pixdim"]),
+        ("wide.nii", with(&plain, 80, &float(40.0)), &["pixdim"]),
+        ("nowhere.nii", with(&plain, 252, &[0; 4]), &["qform_code and sform_code"]),
+        ("forms.nii", with(&plain, 292, &float(77.0)), &["sform and qform", "--prefer"]),
+        ("singular.nii", with(&plain, 280, &[0; 48]), &["srow"]),
+        ("slope.nii", with(&plain, 112, &float(f32::NAN)), &["scl_slope", "set scl_slope to 1"]),
+        ("constant.nii.gz", packed(&filled(&plain, 9), 1), &["voxels", "every voxel is"]),
+        ("same.nii.gz", good.clone(), &["the same", "pre-operative"]),
+        ("again.nii.gz", packed(&plain, 1), &["same voxels", "surgery"]),
+        ("scan.dcm", good.clone(), &["dcm2niix"]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let pre = path("pre.nii.gz");
+    std::fs::write(&pre, &good).unwrap();
+    assert!(cases.len() >= 20);
+    for (name, bytes, words) in &cases {
+        std::fs::write(path(name), bytes).unwrap();
+        refuses(&["run", &pre, &path(name), "-o", &path("case")], name, words, &path("case"));
+    }
+    refuses(&["run", &pre, &path("no.nii"), "-o", &path("case")], "no.nii", &["check the path"], &path("case"));
+    refuses(&["run", &pre, &path("."), "-o", &path("case")], "", &["is a folder"], &path("case"));
+}
+
+fn refuses(arguments: &[&str], name: &str, words: &[&str], case: &str) {
+    let result = output(arguments);
+    let message = String::from_utf8_lossy(&result.stderr).into_owned();
+    assert_eq!(result.status.code(), Some(3), "{name}: {message}");
+    for word in words.iter().chain(&[name]) {
+        assert!(message.contains(word), "{name}: {message:?} lacks {word:?}");
+    }
+    assert_eq!(message.trim().lines().count(), 1, "{message}");
+    assert!(!Path::new(case).exists(), "{name}: something was written");
+}
+
+#[test]
+fn slow_masks_that_do_not_fit_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let plain = unpacked(&std::fs::read(&pre).unwrap());
+    let masks: [(&str, &str, Vec<u8>, &[&str]); 3] = [
+        ("--brain-mask", "empty.nii.gz", packed(&filled(&plain, 0), 1), &["empty.nii.gz"]),
+        // The first voxel lies ten millimetres from where the scan's does.
+        (
+            "--cavity-mask",
+            "elsewhere.nii.gz",
+            {
+                let moved = |at: usize, copy: Vec<u8>| {
+                    let old = f32::from_le_bytes(copy[at..at + 4].try_into().unwrap());
+                    with(&copy, at, &(old + 10.0).to_le_bytes())
+                };
+                let mut mask = moved(292, moved(268, filled(&plain, 0)));
+                let middle = 352 + (mask.len() - 352) / 4 * 2;
+                mask[middle] = 1;
+                packed(&mask, 1)
+            },
+            &["elsewhere.nii.gz", "resample"],
+        ),
+        ("--resected-mask", "labels.nii.gz", packed(&plain, 1), &["labels.nii.gz"]),
+    ];
+    for (option, name, bytes, words) in &masks {
+        std::fs::write(path(name), bytes).unwrap();
+        let arguments =
+            ["run", pre.to_str().unwrap(), post.to_str().unwrap(), option, &path(name), "-o", &path("case")];
+        let result = output(&arguments);
+        let message = String::from_utf8_lossy(&result.stderr).into_owned();
+        assert_eq!(result.status.code(), Some(3), "{name}: {message}");
+        for word in *words {
+            assert!(message.contains(word), "{name}: {message:?} lacks {word:?}");
+        }
+        assert!(!folder.path().join("case/anat").exists(), "{name}: masks were written");
+    }
+}
