@@ -21,6 +21,7 @@ mod reduce;
 mod register;
 mod report;
 mod run;
+mod segment;
 mod session;
 mod simulate;
 mod sweep;
@@ -60,6 +61,7 @@ enum Command {
     Man(man::Args),
     Register(register::Args),
     Mesh(mesh::Args),
+    Segment(segment::Args),
     Report(report::Args),
 }
 
@@ -84,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Man(args) => man::run(&args, &session),
         Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
+        Command::Segment(args) => segment::run(&args, &session),
         Command::Report(args) => report::run(&args, &session),
     });
     match outcome {

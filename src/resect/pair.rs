@@ -6,13 +6,14 @@ use super::{
     CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, csf_grey_border, find_cavity, on_the_scale_of,
     subtract,
 };
-use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::geometry::{Mni, Post, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::segment::{
-    AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, label, segment_with_priors,
+    HeadError, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, label, segment_head,
+    segment_with_priors,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -73,21 +74,13 @@ pub struct OperatedBrain {
 /// Why a pair could not be taken apart.
 #[derive(Debug, Error)]
 pub enum PairError {
-    /// The template does not fit the head.
+    /// A scan cannot be taken apart, or the brain of one not be found in the other.
     #[error("{scan}: {source}")]
-    Atlas {
+    Head {
         /// `pre` or `post`.
         scan: &'static str,
-        /// The fit's own words.
-        source: DeformableError,
-    },
-    /// A scan cannot be segmented.
-    #[error("{scan}: {source}")]
-    Segment {
-        /// `pre` or `post`.
-        scan: &'static str,
-        /// The segmentation's own words.
-        source: SegmentError,
+        /// The fit's or the segmentation's own words.
+        source: HeadError,
     },
     /// No cavity, or one outside the brain.
     #[error(transparent)]
@@ -122,12 +115,9 @@ pub fn take_pair_apart(
     let grid = atlas::template().grid();
 
     step("pre-operative tissue");
-    let pre_fit = fitted_template(pre, mni_from_pre, &settings.deformable)
-        .map_err(|source| PairError::Atlas { scan: "pre", source })?;
     let brain = SegmentOverrides { brain: given.brain.as_ref() };
-    let pre_priors = AtlasPriors::through(&grid, |p| Some(pre_fit.atlas_from_subject.apply(p)), MISFIT_MM);
-    let before = segment_with_priors(pre, mni_from_pre, &pre_priors, &brain, &settings.segment)
-        .map_err(|source| PairError::Segment { scan: "pre", source })?;
+    let (before, pre_fit) = segment_head(pre, mni_from_pre, &brain, &settings.deformable, &settings.segment)
+        .map_err(|source| PairError::Head { scan: "pre", source })?;
 
     step("cavity");
     let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
@@ -157,7 +147,7 @@ pub fn take_pair_apart(
 
     step("sag");
     let sag = fitted_sag(&before, &post_t1, &post_on_mni.inside, &finding.cavity, &settings.sag)
-        .map_err(|source| PairError::Atlas { scan: "post", source })?;
+        .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
     if computed {
         let carried_labels = sag.atlas_from_subject.warp_labels(&before.labels_mni, &grid);
         let pair = SaggedPair {
@@ -179,11 +169,10 @@ pub fn take_pair_apart(
     }
 
     step("post-operative tissue");
-    let on_template = |p| Some(pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
-    let post_priors = AtlasPriors::through(&grid, on_template, MISFIT_MM);
+    let post_priors = carried_priors(|p| pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
     let after =
         segment_with_priors(post, &mni_from_post, &post_priors, &SegmentOverrides::default(), &settings.segment)
-            .map_err(|source| PairError::Segment { scan: "post", source })?;
+            .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);
@@ -194,21 +183,6 @@ pub fn take_pair_apart(
 
 /// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
 const RIM_MM: f64 = 5.0;
-
-/// What is left of the misfit between the carried template and a head, mm: about a voxel of the fit's finest level.
-const MISFIT_MM: f64 = 1.5;
-
-/// The template deformed onto a head; both in the MNI frame reached rigidly.
-fn fitted_template<F: Frame>(
-    t1: &Volume<f32, F>,
-    mni_from_t1: &RigidTransform<F, Mni>,
-    settings: &DeformableSettings,
-) -> Result<AtlasFit<Mni>, DeformableError> {
-    let template = atlas::template().t1_f32();
-    let affine = mni_from_t1.inverse().to_affine();
-    let on_grid = resample(t1, &template.grid, &affine, Interpolation::Linear, f32::NAN);
-    fit_atlas(&on_grid.volume, &template, None, settings)
-}
 
 /// The pre-operative brain deformed onto the post-operative one around the cavity. Both lie on one grid.
 fn fitted_sag(

@@ -4,6 +4,7 @@ pub mod atlas;
 mod atlas_labels;
 mod bias;
 mod brain;
+mod carried;
 pub mod label;
 mod mixture;
 pub mod native;
@@ -14,6 +15,7 @@ mod ventricle;
 
 pub use bias::LogBias;
 pub use brain::BrainSettings;
+pub use carried::{HeadError, carried_priors, fit_template, segment_head};
 pub use priors::AtlasPriors;
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,

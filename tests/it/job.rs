@@ -107,8 +107,7 @@ fn slow_shards_in_any_order_give_the_bytes_of_one_run_and_a_gap_is_named() {
     assert_eq!(output(&["sweep", &path("phantom")]).status.code(), Some(3));
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let scans = [pre.to_str().unwrap(), post.to_str().unwrap()];
-    let prep = [&["prep", scans[0], scans[1], "-o", &path("parts")], &mesh[..]].concat();
-    assert!(output(&prep).status.success());
+    assert!(output(&[&["prep", scans[0], scans[1], "-o", &path("parts")], &mesh[..]].concat()).status.success());
     copy(&folder.path().join("parts"), &folder.path().join("whole"));
     assert!(output(&["sweep", &path("whole")]).status.success());
     for part in ["3/3", "1/3"] {
@@ -132,8 +131,10 @@ fn slow_the_estimate_finds_both_moduli_of_a_phantom() {
     let phantom = folder.path().join("phantom").to_str().unwrap().to_owned();
     let settings = folder.path().join("settings.toml");
     std::fs::write(&settings, "[phantom]\nsd_levels = [0.0]\n").unwrap();
-    let made = ["--config", settings.to_str().unwrap(), "phantom", "--tissues", "2", "-o", &phantom];
-    assert!(output(&[&made, &["--mesher", "lattice", "--cells", "8000"][..]].concat()).status.success());
+    let settings = settings.to_str().unwrap();
+    let made =
+        ["--config", settings, "phantom", "--tissues", "2", "-o", &phantom, "--mesher", "lattice", "--cells", "8000"];
+    assert!(output(&made).status.success());
     assert_eq!(output(&["estimate", &phantom, "--tissues", "1"]).status.code(), Some(3));
     let result: serde_json::Value = serde_json::from_slice(&output(&["estimate", &phantom, "--json"]).stdout).unwrap();
     for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {

@@ -1,0 +1,114 @@
+//! `hgm segment`: one T1 to a label map.
+
+use super::session::read_input;
+use super::{Failure, Reject, Session};
+use crate::artefact::write_whole;
+use crate::geometry::Native;
+use crate::image::nifti::{self, ReadOptions, encode_mask, encode_u8};
+use crate::image::{Mask, Volume};
+use crate::register::deformable::DeformableSettings;
+use crate::register::{RigidSettings, register_to_template};
+use crate::segment::{SegmentOverrides, SegmentSettings, TissueVolumes, atlas, segment_head};
+use anyhow::{Context, anyhow};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// A T1 to labels in its own grid: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle
+///
+/// Example: hgm segment t1.nii.gz -o dseg.nii.gz
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// T1-weighted scan (.nii or .nii.gz)
+    t1: PathBuf,
+    /// Label map to write (.nii.gz)
+    #[arg(short, long, value_name = "DSEG")]
+    output: PathBuf,
+    /// A brain mask of your own in the scan's grid (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    brain_mask: Option<PathBuf>,
+    /// Also write the brain mask here
+    #[arg(long, value_name = "FILE")]
+    write_brain_mask: Option<PathBuf>,
+    /// Labels on the 1 mm MNI grid instead of the scan's own: what `hgm mesh` needs for its boundary sets
+    #[arg(long)]
+    mni: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Summary {
+    labels: PathBuf,
+    volumes: TissueVolumes,
+    tissue_means: [f64; 3],
+    warnings: Vec<String>,
+}
+
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let register: RigidSettings = session.settings("register")?;
+    let deformable: DeformableSettings = session.settings("deformable")?;
+    let settings: SegmentSettings = session.settings("segment")?;
+    for path in [Some(&args.output), args.write_brain_mask.as_ref()].into_iter().flatten() {
+        if !path.to_string_lossy().ends_with(".nii.gz") {
+            return Err(Failure::Rejected(anyhow!(
+                "{}: labels are written as .nii.gz; name such a file",
+                path.display()
+            )));
+        }
+    }
+    let name = args.t1.display().to_string();
+    let read = nifti::decode(&read_input(&args.t1)?, &name, &session.settings::<ReadOptions>("image")?).reject()?;
+    let t1 = read.volume;
+    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1)).transpose()?;
+
+    let bar = session.progress(2, "segment");
+    bar.set_message("to MNI");
+    let fit =
+        register_to_template(&t1, &atlas::template().t1_f32(), &register).with_context(|| name.clone()).reject()?;
+    bar.inc(1);
+    bar.set_message("labels");
+    let overrides = SegmentOverrides { brain: brain.as_ref() };
+    let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &deformable, &settings)
+        .with_context(|| name.clone())
+        .reject()?;
+    bar.finish_and_clear();
+
+    let (labels, mask) = if args.mni {
+        (encode_u8(&found.labels_mni), encode_mask(&found.brain_mni))
+    } else {
+        (encode_u8(&found.labels), encode_mask(&found.brain))
+    };
+    write_whole(&args.output, &labels)?;
+    if let Some(path) = &args.write_brain_mask {
+        write_whole(path, &mask)?;
+    }
+    let warnings: Vec<String> = (read.warnings.iter().map(ToString::to_string))
+        .chain(fit.warnings.iter().map(ToString::to_string))
+        .chain(found.warnings.iter().map(ToString::to_string))
+        .collect();
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
+    let v = found.volumes;
+    let text = format!(
+        "{}\nbrain {:.0} cc: grey matter {:.0}, white matter {:.0}, ventricles {:.1}, other CSF {:.0}",
+        args.output.display(),
+        v.brain_cc,
+        v.grey_matter_cc,
+        v.white_matter_cc,
+        v.ventricle_cc,
+        v.csf_cc
+    );
+    let labels = args.output.clone();
+    session.emit(&Summary { labels, volumes: v, tissue_means: found.tissue_means, warnings }, &text)
+}
+
+fn brain_mask(path: &Path, t1: &Volume<f32, Native>) -> Result<Mask<Native>, Failure> {
+    let name = path.display().to_string();
+    let (mask, _) = nifti::decode_mask(&read_input(path)?, &name, &ReadOptions::default()).reject()?;
+    if !mask.grid.coincides(&t1.grid, 0.1) {
+        return Err(Failure::Rejected(anyhow!(
+            "{name}: dim or affine are not the scan's; resample the mask to it first"
+        )));
+    }
+    Ok(mask)
+}
