@@ -29,6 +29,9 @@ impl Default for BrainSettings {
     }
 }
 
+/// CSF of the template at least this deep, in mm, is a cistern; sulci are narrower than twice this.
+const CISTERN_DEPTH_MM: f32 = 2.0;
+
 /// The mask of the brain (tissue, ventricles and sulci) on the working grid; may be empty.
 ///
 /// `t1` has its bias taken out. Tissue lies between the border of CSF and grey matter and three deviations above white
@@ -58,8 +61,12 @@ pub(super) fn brain_mask(
         known.data[n] && priors.brain_mm.data[n] < reach && (closed.data[n] || priors.brain_mm.data[n] < -2.0 * depth)
     });
     let filled = fill_holes(&solid);
-    // Cisterns and the fourth ventricle reach deep between the lobes; the template leaves them out of its brain.
-    let filled = at_each(t1, |n| filled.data[n] && (tissue.data[n] || priors.brain_mm.data[n] < 0.5));
+    // Cisterns and the fourth ventricle reach deep between the lobes, wider than any sulcus: the template knows where, the
+    // patient's dark voxels how far.
+    let wide =
+        dilate(&at_each(t1, |n| priors.cistern_mm.data[n] < -CISTERN_DEPTH_MM), f64::from(CISTERN_DEPTH_MM) + 0.5);
+    let left_out = |n: usize| !tissue.data[n] && (priors.brain_mm.data[n] >= 0.5 || wide.data[n]);
+    let filled = at_each(t1, |n| filled.data[n] && !left_out(n));
     // Stairs and single voxels at the surface carry no information.
     let smooth = gaussian(&filled.map(|inside| f32::from(u8::from(inside))), 0.8);
     let mask = at_each(t1, |n| known.data[n] && smooth.data[n] > 0.5);
