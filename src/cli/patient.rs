@@ -1,13 +1,15 @@
 //! A prepared patient's case: what `run`, `sweep`, `reduce` and `estimate` share.
 
-use super::case::{self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, REST_MESH, SampleMode, Sweep};
+use super::case::{
+    self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, PriorOptions, REST_MESH, SampleMode, Sweep,
+};
 use super::estimate::with_estimate;
 use super::prep::Prepared;
 use super::{Failure, Reject, Session};
 use crate::artefact::Manifest;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentOutcome, NoiseFloor};
-use crate::experiment::prior::{PriorSettings, samples_of_prior};
+use crate::experiment::prior::samples_of_prior;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::shard;
 use crate::experiment::sweep::{Reference, best_sample};
@@ -81,8 +83,13 @@ impl Patient {
     ///
     /// # Errors
     /// A scenario that the solver refuses; samples that are missing when they are gathered.
-    pub fn sweep(&self, part: Part, session: &Session) -> Result<Option<(ExperimentOutcome, String)>, Failure> {
-        let prior: PriorSettings = self.case.settings_of("prior", session)?;
+    pub fn sweep(
+        &self,
+        part: Part,
+        options: &PriorOptions,
+        session: &Session,
+    ) -> Result<Option<(ExperimentOutcome, String)>, Failure> {
+        let prior = options.over(self.case.settings_of("prior", session)?);
         let (scenario, tissues) = (self.settings.scenario(), self.settings.tissue_list());
         let list =
             samples_of_prior(&tissues, &self.settings.sd_levels, self.settings.poisson_ratio, &prior).reject()?;

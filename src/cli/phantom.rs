@@ -1,11 +1,11 @@
 //! `hgm phantom`: known moduli go in and must come out.
 
-use super::case::{self, Case, MeshOptions, SampleMode, Sweep};
+use super::case::{self, Case, MeshOptions, PriorOptions, SampleMode, Sweep};
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
 use crate::experiment::phantom::{PhantomSettings, nearest_sample};
-use crate::experiment::prior::{PriorSettings, samples_of_prior};
+use crate::experiment::prior::samples_of_prior;
 use crate::experiment::sweep::{Reference, best_sample, solve_sample};
 use crate::mesh::format::{Field, vtu};
 use crate::segment::atlas;
@@ -25,6 +25,8 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
+    #[command(flatten)]
+    prior: PriorOptions,
     /// Also try the reference's own moduli
     #[arg(long)]
     include_reference: bool,
@@ -38,7 +40,7 @@ pub struct Args {
 impl Args {
     /// What the demo runs.
     pub fn demo(output: PathBuf, mesh: MeshOptions) -> Self {
-        Self { tissues: Some(1), include_reference: false, output, mesh }
+        Self { tissues: Some(1), prior: PriorOptions::default(), include_reference: false, output, mesh }
     }
 }
 
@@ -48,7 +50,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         settings.tissues = usize::from(tissues);
     }
     settings.include_reference |= args.include_reference;
-    let prior: PriorSettings = session.settings("prior")?;
+    let prior = args.prior.over(session.settings("prior")?);
     let case = Case::open(&args.output, session);
 
     let template = atlas::template();

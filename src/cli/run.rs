@@ -1,6 +1,6 @@
 //! `hgm run`: prep, sweep, report.
 
-use super::case::{Case, EstimateOptions, MeshOptions, Overrides};
+use super::case::{Case, EstimateOptions, MeshOptions, Overrides, PriorOptions};
 use super::patient::{Part, Patient};
 use super::prep;
 use super::{Failure, Session};
@@ -18,6 +18,8 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
+    #[command(flatten)]
+    prior: PriorOptions,
     /// Estimate the moduli with their intervals instead of trying the prior's samples
     #[arg(long)]
     estimate: bool,
@@ -29,6 +31,7 @@ impl Args {
         Self {
             prep: prep::Args { pre, post, output, overrides: Overrides::default(), mesh },
             tissues: Some(1),
+            prior: PriorOptions::default(),
             estimate: false,
         }
     }
@@ -49,7 +52,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let (outcome, facts, page) = patient.estimate(&options, None, session)?;
         let text = super::estimate::table(&facts) + &super::estimate::comparison(&outcome, &facts) + &page;
         session.emit(&outcome, &text)?;
-    } else if let Some((outcome, page)) = patient.sweep(Part::All, session)? {
+    } else if let Some((outcome, page)) = patient.sweep(Part::All, &args.prior, session)? {
         session.emit(&outcome, &summary(&outcome, &page))?;
     }
     patient.quality_gate()

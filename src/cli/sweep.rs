@@ -1,6 +1,6 @@
 //! `hgm sweep`: the prior's samples on a prepared case, all of them or a part.
 
-use super::case::Case;
+use super::case::{Case, PriorOptions};
 use super::patient::{Part, Patient};
 use super::run::summary;
 use super::{Failure, Session};
@@ -16,6 +16,8 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples) [default: as the case was made]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
+    #[command(flatten)]
+    prior: PriorOptions,
     /// Only every N-th sample, beginning with the K-th (from 1); any order, any machine, the same bytes
     #[arg(long, value_name = "K/N", value_parser = part)]
     shard: Option<Part>,
@@ -32,7 +34,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = Case::open(&args.case, session);
     let patient = Patient::open(&case, args.tissues, session)?;
     let part = args.shard.unwrap_or(Part::All);
-    match patient.sweep(part, session)? {
+    match patient.sweep(part, &args.prior, session)? {
         Some((outcome, page)) => session.emit(&outcome, &summary(&outcome, &page))?,
         None => session.emit(
             &serde_json::json!({ "shard": format!("{part:?}"), "case": args.case }),

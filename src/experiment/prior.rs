@@ -2,19 +2,29 @@
 
 use super::estimate::LogPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
-use crate::material::Task;
 use crate::material::generative::{SampleSettings, SampledMaterial, sample_shear_moduli};
-use crate::material::law::Material;
 use crate::material::meta_model::FitError;
+use crate::material::meta_model::MetaModel;
+use crate::material::{Region, StudyKind, Task};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Which prior.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
     pub published: bool,
+    /// Whose studies: elastography, linear elasticity or hyperelastic tests.
+    pub study: StudyKind,
+    /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
+    pub law: MetaModel,
+}
+
+impl Default for PriorSettings {
+    fn default() -> Self {
+        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NeoHookean }
+    }
 }
 
 /// Why there are no samples.
@@ -36,26 +46,28 @@ pub enum PriorError {
     NoLevels,
 }
 
-/// The hyperelastic task of a tissue: healthy brain, grey or white matter.
+/// The task of a tissue among these studies: healthy brain, grey or white matter.
 ///
 /// # Errors
 /// [`PriorError::UnknownTissue`].
-pub fn task_of(tissue: &Tissue) -> Result<Task, PriorError> {
-    match tissue.name.as_str() {
-        "brain" => Ok(Task::HYPERELASTIC_HEALTHY),
-        "grey_matter" => Ok(Task::HYPERELASTIC_GREY),
-        "white_matter" => Ok(Task::HYPERELASTIC_WHITE),
-        other => Err(PriorError::UnknownTissue(other.to_owned())),
-    }
+pub fn task_of(tissue: &Tissue, study: StudyKind) -> Result<Task, PriorError> {
+    let region = match tissue.name.as_str() {
+        "brain" => Region::Healthy,
+        "grey_matter" => Region::Grey,
+        "white_matter" => Region::White,
+        other => return Err(PriorError::UnknownTissue(other.to_owned())),
+    };
+    Ok(Task { kind: study, region })
 }
 
 fn materials(tissue: &Tissue, levels: &[f64], prior: &PriorSettings) -> Result<Vec<SampledMaterial>, PriorError> {
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
-    sample_shear_moduli(task_of(tissue)?, levels, &settings)
+    let settings = SampleSettings { model: prior.law, ..settings };
+    sample_shear_moduli(task_of(tissue, prior.study)?, levels, &settings)
         .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
 }
 
-/// Every combination of the tissues' levels as neo-Hookean materials of the given Poisson's ratio.
+/// Every combination of the tissues' levels as materials of the given Poisson's ratio.
 ///
 /// # Errors
 /// [`PriorError`].
@@ -74,7 +86,7 @@ pub fn samples_of_prior(
         let sample = |m: &SampledMaterial| TissueSample {
             sd_level: m.sd_level,
             shear_modulus_pa: m.shear_modulus_pa,
-            material: Material::neo_hookean(m.shear_modulus_pa, poisson_ratio),
+            material: m.fit.material(poisson_ratio),
         };
         levels.push((tissue.clone(), list.iter().map(sample).collect()));
     }
@@ -103,8 +115,13 @@ mod tests {
     #[test]
     fn nine_levels_of_two_tissues_are_the_papers_81_samples() {
         let levels = crate::material::generative::nine_levels();
-        let samples =
-            samples_of_prior(&Tissue::grey_and_white(), &levels, 0.45, &PriorSettings { published: true }).unwrap();
+        let samples = samples_of_prior(
+            &Tissue::grey_and_white(),
+            &levels,
+            0.45,
+            &PriorSettings { published: true, ..PriorSettings::default() },
+        )
+        .unwrap();
         assert_eq!(samples.len(), 81);
         // Granados et al. 2021, Table 1: grey at +2 SD 2299 Pa, white at 0 SD 610 Pa.
         let last = &samples[80].tissues["grey_matter"];

@@ -52,7 +52,7 @@ pub fn bars() -> Vec<Bar> {
         &settings.tissue_list(),
         &settings.sd_levels,
         settings.poisson_ratio,
-        &PriorSettings { published: true },
+        &PriorSettings { published: true, ..PriorSettings::default() },
     );
     let reference = Reference::Nodes(u.clone());
     let outcomes: Vec<_> = samples

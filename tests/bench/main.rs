@@ -5,8 +5,10 @@ mod fem;
 mod material;
 mod mesh;
 mod experiment;
+mod fem;
 mod imaging;
 mod job;
+mod material;
 
 use bar::Bar;
 
@@ -16,6 +18,13 @@ fn main() {
     let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars), ("mesh", mesh::bars)];
     let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars)];
     let rooms: Vec<Room> = vec![("imaging", imaging::bars), ("experiment", experiment::bars), ("job", job::bars)];
+    let rooms: Vec<Room> = vec![
+        ("imaging", imaging::bars),
+        ("material", material::bars),
+        ("fem", fem::bars),
+        ("experiment", experiment::bars),
+        ("job", job::bars),
+    ];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if bar::data().is_none() {
         println!("HGM_BENCH_DATA is not set: bars that need the measuring data are skipped, each room says which.");

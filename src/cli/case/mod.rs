@@ -16,7 +16,7 @@ pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, esti
 pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, programs};
 pub use observed::{observed_surfaces, reference};
 pub use registration::{RegistrationFacts, registration};
-pub use samples::{SampleMode, Sweep, rest_mesh, samples};
+pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, samples};
 pub use scans::{Overrides, Scans};
 
 use super::Session;

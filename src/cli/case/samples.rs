@@ -4,16 +4,43 @@ use super::{Case, Failure, REST_MESH, Reject, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::SampleOutcome;
+use crate::experiment::prior::PriorSettings;
 use crate::experiment::sample::{Sample, Tissue};
 use crate::experiment::sweep::{Reference, SolvedSample, solve_sample};
 use crate::fem::Scenario;
 use crate::geometry::{Frame, Mni};
+use crate::material::StudyKind;
+use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use anyhow::anyhow;
+use serde::de::DeserializeOwned;
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 2;
+
+/// The prior as the command line gives it.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct PriorOptions {
+    /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
+    #[arg(long, value_name = "KIND", value_parser = named::<StudyKind>)]
+    study: Option<StudyKind>,
+    /// The law fitted to every sample: neo-hookean, mooney-rivlin, ogden or ogden-high [default: neo-hookean]
+    #[arg(long, value_name = "LAW", value_parser = named::<MetaModel>)]
+    law: Option<MetaModel>,
+}
+
+impl PriorOptions {
+    /// These options over the settings file's.
+    pub fn over(&self, settings: PriorSettings) -> PriorSettings {
+        let PriorSettings { study, law, .. } = settings;
+        PriorSettings { study: self.study.unwrap_or(study), law: self.law.unwrap_or(law), ..settings }
+    }
+}
+
+fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
+    serde_json::from_value(name.into()).map_err(|e| e.to_string())
+}
 
 /// What every sample of a sweep shares.
 #[derive(Debug)]
