@@ -1,25 +1,21 @@
 //! `./run bench [ROOM ...]`: measures the bars of the issues and prints them side by side. Never part of a timed test.
 
 mod bar;
-mod fem;
-mod material;
-mod mesh;
 mod experiment;
 mod fem;
 mod imaging;
 mod job;
 mod material;
+mod mesh;
 
 use bar::Bar;
 
 type Room = (&'static str, fn() -> Vec<Bar>);
 
 fn main() {
-    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars), ("mesh", mesh::bars)];
-    let rooms: Vec<Room> = vec![("fem", fem::bars), ("material", material::bars)];
-    let rooms: Vec<Room> = vec![("imaging", imaging::bars), ("experiment", experiment::bars), ("job", job::bars)];
     let rooms: Vec<Room> = vec![
         ("imaging", imaging::bars),
+        ("mesh", mesh::bars),
         ("material", material::bars),
         ("fem", fem::bars),
         ("experiment", experiment::bars),
