@@ -235,7 +235,7 @@ impl Model {
             if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
-            let needed = 0.3 * settings.relative_residual / relative;
+            let needed = 0.5 * settings.relative_residual / relative;
             let forcing = if iteration == 0 {
                 stage.first_forcing.max(needed).min(0.5)
             } else {
