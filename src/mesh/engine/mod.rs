@@ -256,6 +256,11 @@ pub fn mesh_labels<F: Frame>(
             inside.map_err(failed)
         }
     };
+    if settings.engine == Engine::Cgal && matches!(settings.size, MeshSize::Cells(_)) {
+        // Brains again: the coarser the mesh, the larger the share of tets that interfaces make smaller than the edge asks
+        // for. A good first guess spares a second run of the program.
+        edge_mm *= 1.0 + (0.0125 * (edge_mm - 4.0)).clamp(0.0, 0.05);
+    }
     let mut complex = make(edge_mm)?;
     if let MeshSize::Cells(wanted) = settings.size {
         for _ in 0..4 {
