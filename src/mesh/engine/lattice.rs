@@ -73,7 +73,9 @@ fn lattice(field: &LabelField, cube_mm: f64) -> Lattice {
         let before = near.clone();
         for tet in &tets {
             if tet.iter().any(|&v| before[v as usize]) {
-                tet.iter().for_each(|&v| near[v as usize] = true);
+                for &v in tet {
+                    near[v as usize] = true;
+                }
             }
         }
     }
@@ -181,7 +183,9 @@ pub(crate) fn mesh(field: &LabelField, cube_mm: f64) -> Complex {
     // Of the outside, the layer that touches the mesh stays.
     let mut used = vec![false; x.len()];
     for (tet, _) in tets.iter().zip(&fields).filter(|(_, f)| **f != 0) {
-        tet.iter().for_each(|&v| used[v as usize] = true);
+        for &v in tet {
+            used[v as usize] = true;
+        }
     }
     let kept: Vec<usize> =
         (0..tets.len()).filter(|&n| fields[n] != 0 || tets[n].iter().any(|&v| used[v as usize])).collect();

@@ -225,8 +225,9 @@ pub fn mesh_labels<F: Frame>(
     };
     let seeds = sizing::interface_seeds(&field);
     let voxel_mm3 = map.grid.voxel_volume_mm3();
-    let wanted_mm3 = |label: &u8| map.data.iter().filter(|l| *l == label).count() as f64 * voxel_mm3;
-    let wanted_mm3: Vec<f64> = field.labels().iter().map(wanted_mm3).collect();
+    let mut voxels = [0usize; 256];
+    map.data.iter().for_each(|&l| voxels[l as usize] += 1);
+    let wanted_mm3: Vec<f64> = field.labels().iter().map(|&l| voxels[l as usize] as f64 * voxel_mm3).collect();
     let polish = |mut complex: Complex| {
         repair::separate(&mut complex);
         complex.sheet = field.sheet().cloned();

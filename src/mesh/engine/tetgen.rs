@@ -33,8 +33,11 @@ fn lines(text: &str) -> impl Iterator<Item = Vec<f64>> + '_ {
     text.lines().map(|line| line.split('#').next().unwrap_or("").trim()).filter(|line| !line.is_empty()).map(numbers)
 }
 
+/// Nodes, tets and the region of each.
+type Parsed = (Vec<Point>, Vec<[u32; 4]>, Vec<i64>);
+
 /// Reads `.node` and `.ele`, one after the other; tets with the number of their region.
-fn parse(text: &str) -> Option<(Vec<Point>, Vec<[u32; 4]>, Vec<i64>)> {
+fn parse(text: &str) -> Option<Parsed> {
     let mut lines = lines(text);
     let nodes = *lines.next()?.first()? as usize;
     let mut x = Vec::new();
