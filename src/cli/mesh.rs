@@ -83,7 +83,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let name = args.labels.display().to_string();
     let bytes = read_input(&args.labels)?;
     let (labels, odd) = nifti::decode_labels(&bytes, &name, &ReadOptions::default()).reject()?;
-    odd.iter().for_each(|w| tracing::warn!("{name}: {w}"));
+    for warning in &odd {
+        tracing::warn!("{name}: {warning}");
+    }
 
     let programs = case::programs();
     let mut settings = case::mesh_settings(&args.mesh, &programs, session)?;
