@@ -110,6 +110,22 @@ pub(crate) fn separate(complex: &mut Complex) {
     }
 }
 
+/// Turns ears into air: tets that hang on by one facet and stick out of the body. A label's coarse tets leave them where
+/// the outer surface cuts a thin wedge; they carry no load and look like thorns. The label's volume is matched later.
+pub(crate) fn drop_ears(complex: &mut Complex) {
+    loop {
+        let lonely = |complex: &Complex, v: u32| {
+            complex.star[v as usize].iter().filter(|&&t| complex.is_solid(t)).take(2).count() == 1
+        };
+        let ear = |t: &u32| complex.tets[*t as usize].iter().filter(|&&v| lonely(complex, v)).count() == 1;
+        let ears: Vec<u32> = complex.solid().filter(ear).collect();
+        if ears.is_empty() {
+            return;
+        }
+        ears.into_iter().for_each(|t| complex.vent(t));
+    }
+}
+
 fn six_volumes(complex: &Complex, t: u32) -> f64 {
     let [a, b, c, d] = complex.points(&complex.tets[t as usize]);
     (b - a).cross(&(c - a)).dot(&(d - a))

@@ -229,6 +229,7 @@ pub fn mesh_labels<F: Frame>(
     map.data.iter().for_each(|&l| voxels[l as usize] += 1);
     let wanted_mm3: Vec<f64> = field.labels().iter().map(|&l| voxels[l as usize] as f64 * voxel_mm3).collect();
     let polish = |mut complex: Complex| {
+        repair::drop_ears(&mut complex);
         repair::separate(&mut complex);
         complex.sheet = field.sheet().cloned();
         optimise::optimise(&mut complex, &field, &wanted_mm3, &settings.optimise);
