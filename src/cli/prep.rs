@@ -12,6 +12,8 @@ use std::path::PathBuf;
 ///
 /// Example: hgm prep pre.nii.gz post.nii.gz -o case
 #[derive(Debug, clap::Args)]
+// Flattened into `run`, whose own group of arguments has this name.
+#[group(skip)]
 pub struct Args {
     /// Pre-operative T1 (.nii or .nii.gz)
     pub pre: PathBuf,

@@ -69,7 +69,7 @@ fn each_unusable_file_ends_with_3_and_leaves_nothing_behind() {
         ("constant.nii.gz", packed(&filled(&plain, 9), 1), &["voxels", "every voxel is"]),
         ("same.nii.gz", good.clone(), &["the same", "pre-operative"]),
         ("again.nii.gz", packed(&plain, 1), &["same voxels", "surgery"]),
-        ("scan.dcm", good.clone(), &["dcm2niix"]),
+        ("scan.dcm", packed(&plain, 2), &["dcm2niix"]),
     ];
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -119,7 +119,7 @@ fn slow_masks_that_do_not_fit_are_refused_by_name() {
             },
             &["elsewhere.nii.gz", "resample"],
         ),
-        ("--resected-mask", "labels.nii.gz", packed(&plain, 1), &["labels.nii.gz"]),
+        ("--resected-mask", "labels.nii.gz", packed(&plain, 1), &["outside the brain", "check the masks"]),
     ];
     for (option, name, bytes, words) in &masks {
         std::fs::write(path(name), bytes).unwrap();

@@ -223,7 +223,7 @@ pub fn mesh_labels<F: Frame>(
         Some(split) => field.split_at_midplane(&split.labels, &split.above_yz_mm),
         None => field,
     };
-    let seeds = sizing::interface_seeds(&field);
+    let seeds = sizing::interface_seeds(&field, SEEDS);
     let voxel_mm3 = map.grid.voxel_volume_mm3();
     let mut voxels = [0usize; 256];
     map.data.iter().for_each(|&l| voxels[l as usize] += 1);
@@ -243,7 +243,16 @@ pub fn mesh_labels<F: Frame>(
         Engine::Lattice => Ok(lattice(edge_mm)),
         Engine::Cgal => {
             let program = programs.cgal.as_ref().ok_or(missing("hgm-cgal-mesher"))?;
-            cgal::mesh(program, &field, &EdgeField::uniform(edge_mm), &seeds, &settings.limits).map_err(failed)
+            let edge = EdgeField::uniform(edge_mm);
+            // A thin shell can lie between a few seeds without any facet of theirs across it: then they must be denser.
+            let again = |error| match error {
+                ProcessError::Answer => {
+                    let dense = sizing::interface_seeds(&field, DENSE_SEEDS);
+                    cgal::mesh(program, &field, &edge, &dense, &settings.limits)
+                }
+                other => Err(other),
+            };
+            cgal::mesh(program, &field, &edge, &seeds, &settings.limits).or_else(again).map_err(failed)
         }
         Engine::Gmsh | Engine::Tetgen => {
             let is_gmsh = settings.engine == Engine::Gmsh;
@@ -282,6 +291,11 @@ pub fn mesh_labels<F: Frame>(
     let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
     Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
 }
+
+/// Points on the border of every part of a label that CGAL starts from.
+const SEEDS: usize = 12;
+/// The same when it found nothing with those.
+const DENSE_SEEDS: usize = 400;
 
 /// Volume of a tet per cubed edge length in a mesh of this kind (a regular one has 0.118, CGAL's average 0.17).
 const TET_SHARE: f64 = 0.17;

@@ -18,9 +18,9 @@ impl EdgeField {
     }
 }
 
-/// Points on the interfaces: some on the border of every connected part of every field, so that no part is missed.
-pub(crate) fn interface_seeds(field: &LabelField) -> Vec<Point> {
-    const PER_PART: usize = 12;
+/// Points on the interfaces: up to `per_part` on the border of every connected part of every field, so that no part is
+/// missed.
+pub(crate) fn interface_seeds(field: &LabelField, per_part: usize) -> Vec<Point> {
     let [nx, ny, nz] = field.dims();
     let largest = field.largest();
     let spacing = field.spacing_mm();
@@ -52,7 +52,7 @@ pub(crate) fn interface_seeds(field: &LabelField) -> Vec<Point> {
             }
         }
         border.sort_by_key(|b| b.0);
-        let count = PER_PART.min(border.len());
+        let count = per_part.min(border.len());
         for n in 0..count {
             let (v, axis, sign) = border[n * border.len() / count];
             let c = [v % nx, v / nx % ny, v / (nx * ny)];
