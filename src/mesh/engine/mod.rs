@@ -244,15 +244,10 @@ pub fn mesh_labels<F: Frame>(
         Engine::Cgal => {
             let program = programs.cgal.as_ref().ok_or(missing("hgm-cgal-mesher"))?;
             let edge = EdgeField::uniform(edge_mm);
+            let run = |seeds: &[_]| cgal::mesh(program, &field, &edge, seeds, &settings.limits).map_err(failed);
+            let found = run(&seeds)?;
             // A thin shell can lie between a few seeds without any facet of theirs across it: then they must be denser.
-            let again = |error| match error {
-                ProcessError::Answer => {
-                    let dense = sizing::interface_seeds(&field, DENSE_SEEDS);
-                    cgal::mesh(program, &field, &edge, &dense, &settings.limits)
-                }
-                other => Err(other),
-            };
-            cgal::mesh(program, &field, &edge, &seeds, &settings.limits).or_else(again).map_err(failed)
+            if found.count() == 0 { run(&sizing::interface_seeds(&field, DENSE_SEEDS)) } else { Ok(found) }
         }
         Engine::Gmsh | Engine::Tetgen => {
             let is_gmsh = settings.engine == Engine::Gmsh;
