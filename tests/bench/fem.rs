@@ -293,6 +293,7 @@ pub fn bars() -> Vec<Bar> {
         println!("fem: all bars need HGM_BENCH_DATA with brain5k.vtu and brain30k.vtu; skipped");
         return Vec::new();
     };
+    let folder = folder.join("meshes");
     let (Some(small), Some(large)) = (mesh(&folder, "brain5k.vtu"), mesh(&folder, "brain30k.vtu")) else {
         println!("fem: brain5k.vtu or brain30k.vtu is missing or damaged in HGM_BENCH_DATA; skipped");
         return Vec::new();
