@@ -121,7 +121,7 @@ fn coverage(mesh: &TetMesh, scenario: &Scenario, u: &[[f64; 3]]) -> Bar {
 }
 
 fn held(mesh: &TetMesh) -> Vec<String> {
-    ["base", "falx"].into_iter().filter(|set| mesh.node_sets.contains_key(*set)).map(str::to_owned).collect()
+    ["base", "falx", "fixed"].into_iter().filter(|set| mesh.node_sets.contains_key(*set)).map(str::to_owned).collect()
 }
 
 fn estimated(
