@@ -38,16 +38,6 @@ pub fn on_the_scale_of(
     Volume::from_data(post.grid, data)
 }
 
-/// The intensity at which CSF and grey matter are equally far in their standard deviations; means and deviations of
-/// CSF, grey matter, white matter.
-///
-/// ```
-/// assert_eq!(hgm::resect::csf_grey_border(&[20.0, 80.0, 110.0], &[10.0, 20.0, 8.0]), 40.0);
-/// ```
-pub fn csf_grey_border(means: &[f64; 3], deviations: &[f64; 3]) -> f64 {
-    (means[0] * deviations[1] + means[1] * deviations[0]) / (deviations[0] + deviations[1])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,5 +6,5 @@ mod intensity;
 mod pair;
 
 pub use cavity::{CavityFinding, CavityPair, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
-pub use intensity::{csf_grey_border, on_the_scale_of};
+pub use intensity::on_the_scale_of;
 pub use pair::{GivenMasks, OperatedBrain, PairError, PairSettings, take_pair_apart};

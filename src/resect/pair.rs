@@ -3,8 +3,7 @@
 use super::blood::{SaggedPair, with_blood};
 use super::cavity::{both, either};
 use super::{
-    CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, csf_grey_border, find_cavity, on_the_scale_of,
-    subtract,
+    CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, find_cavity, on_the_scale_of, subtract,
 };
 use crate::geometry::{Mni, Post, Pre, RigidTransform};
 use crate::image::morphology::dilate;
@@ -130,33 +129,34 @@ pub fn take_pair_apart(
         &known_tissue,
         settings.cavity.bias_sigma_mm,
     );
-    let border = csf_grey_border(&before.tissue_means, &before.tissue_deviations);
-    let dark_part = |_| {
+    let computed = by_hand.is_none();
+    let mut finding = if let Some(finding) = by_hand {
+        finding
+    } else {
         let pair = CavityPair {
             pre: &before.t1_mni,
             pre_labels: &before.labels_mni,
             pre_brain: &before.brain_mni,
             post: &post_t1,
             post_known: &post_on_mni.inside,
-            csf_grey_border: border,
+            csf_grey_border: before.csf_grey_border,
         };
-        find_cavity(&pair, &settings.cavity)
+        find_cavity(&pair, &settings.cavity)?
     };
-    let computed = by_hand.is_none();
-    let mut finding = by_hand.map_or_else(|| dark_part(()), Ok)?;
 
     step("sag");
     let sag = fitted_sag(&before, &post_t1, &post_on_mni.inside, &finding.cavity, &settings.sag)
         .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
     if computed {
-        let carried_labels = sag.atlas_from_subject.warp_labels(&before.labels_mni, &grid);
+        let carried = [&before.t1_mni, &tissue.map(f32::from), &before.brain_mni.map(f32::from)];
+        let [pre, tissue, brain] = sag.atlas_from_subject.warp(carried, &grid);
         let pair = SaggedPair {
-            pre: &sag.atlas_from_subject.warp(&before.t1_mni, &grid, 0.0),
-            tissue: &tissue_of(&carried_labels),
-            brain: &sag.atlas_from_subject.warp_mask(&before.brain_mni, &grid),
+            pre: &pre,
+            tissue: &tissue.map(|share| share >= 0.5),
+            brain: &brain.map(|share| share >= 0.5),
             post: &post_t1,
             post_known: &post_on_mni.inside,
-            csf_grey_border: border,
+            csf_grey_border: before.csf_grey_border,
             grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
         };
         finding.cavity = with_blood(&finding.cavity, &pair, &settings.cavity);
@@ -204,8 +204,8 @@ fn fitted_sag(
 /// The tissue that filled the cavity: what lies where it is now, and what lies there once the sag is undone. Tissue closes
 /// in on a cavity, so that neither alone is all of it.
 fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
-    let undone = sag.subject_from_atlas.warp_mask(cavity, &before.brain_mni.grid);
-    both(&either(cavity, &undone), &before.brain_mni)
+    let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid);
+    both(&either(cavity, &undone.map(|share| share >= 0.5)), &before.brain_mni)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

@@ -38,7 +38,7 @@ pub fn fit_template<F: Frame>(
 
 /// The template's maps read through `template_from_patient`, a map that [`fit_template`] made.
 pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync) -> AtlasPriors {
-    AtlasPriors::through(&atlas::template().grid(), |p| Some(template_from_patient(p)), MISFIT_MM)
+    AtlasPriors::through(&atlas::template().grid(), template_from_patient, MISFIT_MM)
 }
 
 /// Labels of a head that has been registered rigidly to the template: fits the template, then [`segment_with_priors`].

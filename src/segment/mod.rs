@@ -1,5 +1,6 @@
 //! T1 volume to label map: grey, white, ventricle, other CSF; brain mask.
 
+mod appearance;
 pub mod atlas;
 mod atlas_labels;
 mod bias;

@@ -6,7 +6,7 @@ use crate::geometry::{Mni, Position};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::close;
-use crate::image::resample::{Interpolation, resample_through};
+use crate::image::resample::resample_together;
 use crate::image::{Grid, Volume};
 use std::sync::OnceLock;
 
@@ -66,31 +66,28 @@ fn template_fields() -> &'static TemplateFields {
 }
 
 impl AtlasPriors {
-    /// The template's fields at `template_from_patient(p)` for every voxel centre `p` of the grid; `None` is far outside.
+    /// The template's fields at `template_from_patient(p)` for every voxel centre `p` of the grid.
     /// `misfit_mm` is the expected error of that map (standard deviation): the tissue maps are blurred by it.
     #[must_use]
     pub fn through(
         grid: &Grid<Mni>,
-        template_from_patient: impl Fn(Position<Mni>) -> Option<Position<Mni>> + Sync,
+        template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
         misfit_mm: f64,
     ) -> Self {
         let fields = template_fields();
-        let warped = |field: &Volume<f32, Mni>, outside: f32| {
-            resample_through(field, grid, &template_from_patient, Interpolation::Linear, outside).volume
-        };
-        let tissue = fields.tissue.each_ref().map(|map| gaussian(&warped(map, 0.0), misfit_mm));
-        Self {
-            brain_mm: warped(&fields.brain_mm, FAR_MM),
-            tissue,
-            ventricle_mm: warped(&fields.ventricle_mm, FAR_MM),
-            cistern_mm: warped(&fields.cistern_mm, FAR_MM),
-        }
+        let [csf, grey, white] = &fields.tissue;
+        let maps = [csf, grey, white, &fields.brain_mm, &fields.ventricle_mm, &fields.cistern_mm];
+        let outside = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM];
+        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm] =
+            resample_together(maps, grid, template_from_patient, outside);
+        let tissue = [csf, grey, white].map(|map| gaussian(&map, misfit_mm));
+        Self { brain_mm, tissue, ventricle_mm, cistern_mm }
     }
 
     /// The template as it stands, for a patient who has only been aligned rigidly: misfits of several millimetres are
     /// expected.
     #[must_use]
     pub fn rigid(grid: &Grid<Mni>) -> Self {
-        Self::through(grid, Some, 3.0)
+        Self::through(grid, |p| p, 3.0)
     }
 }

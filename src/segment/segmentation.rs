@@ -80,10 +80,11 @@ pub struct Segmentation<F: Frame> {
     pub brain_mni: Mask<Mni>,
     /// Labels on the template's grid.
     pub labels_mni: LabelMap<Mni>,
-    /// Mean intensities of CSF, grey matter and white matter after the bias is taken out, in the image's own units.
+    /// Mean intensities of voxels full of CSF, grey matter and white matter after the bias is taken out, in the image's
+    /// own units.
     pub tissue_means: [f64; 3],
-    /// Standard deviations of the same.
-    pub tissue_deviations: [f64; 3],
+    /// Intensity of a voxel that is half CSF and half grey matter.
+    pub csf_grey_border: f64,
     /// Volumes on the template's grid.
     pub volumes: TissueVolumes,
     /// What a reader should know.
@@ -263,7 +264,7 @@ pub fn segment_with_priors<F: Frame>(
         brain_mni: brain,
         labels_mni,
         tissue_means: model.means,
-        tissue_deviations: model.deviations,
+        csf_grey_border: model.csf_grey_border(),
         volumes,
         warnings,
     })
@@ -321,7 +322,7 @@ fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture) -> Volume<f32, Mni> {
 
 fn most_probable(like: &Volume<f32, Mni>, model: &Mixture) -> LabelMap<Mni> {
     let mut labels = Volume::filled(like.grid, label::BACKGROUND);
-    for (&n, p) in model.voxels.iter().zip(&model.probabilities) {
+    for (&n, p) in model.voxels.iter().zip(&model.contents) {
         labels.data[n as usize] = if p[0] > p[1] && p[0] > p[2] {
             label::CSF
         } else if p[1] >= p[2] {

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
 const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
 const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";

@@ -2,7 +2,7 @@
 
 use super::velocity::{Cell, VectorField};
 use crate::geometry::{Frame, Position};
-use crate::image::resample::{Interpolation, Resampled, resample_through};
+use crate::image::resample::resample_together;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -60,32 +60,14 @@ impl<F: Frame> DisplacementField<F> {
         Position::from_point(Point3::from(self.after.linear * moved + self.after.shift_mm))
     }
 
-    /// An image seen through the map on a grid: the value at `p` is the image's at `apply(p)`, linearly interpolated;
-    /// `outside` where the image has none.
+    /// Images seen through the map on a grid: the value at `p` is the image's at `apply(p)`, linearly interpolated; 0 where
+    /// the images have none. A mask goes as 0 and 1, and is inside again from one half on.
+    ///
+    /// # Panics
+    /// When the images lie on different grids.
     #[must_use]
-    pub fn warp(&self, image: &Volume<f32, F>, onto: &Grid<F>, outside: f32) -> Volume<f32, F> {
-        let Resampled { volume, .. } =
-            resample_through(image, onto, |p| Some(self.apply(p)), Interpolation::Linear, outside);
-        volume
-    }
-
-    /// A mask seen through the map: inside where the linearly interpolated mask is at least one half.
-    #[must_use]
-    pub fn warp_mask(&self, mask: &Mask<F>, onto: &Grid<F>) -> Mask<F> {
-        self.warp(&mask.map(f32::from), onto, 0.0).map(|x| x >= 0.5)
-    }
-
-    /// Labels seen through the map, nearest voxel.
-    #[must_use]
-    pub fn warp_labels(&self, labels: &Volume<u8, F>, onto: &Grid<F>) -> Volume<u8, F> {
-        let mut data = vec![0u8; onto.len()];
-        data.par_chunks_mut(1 << 14).enumerate().for_each(|(c, chunk)| {
-            for (i, out) in chunk.iter_mut().enumerate() {
-                let p = onto.position(Point3::from(onto.voxel((c << 14) + i).map(|x| x as f64)));
-                *out = labels.nearest(self.apply(p)).unwrap_or(0);
-            }
-        });
-        Volume::from_data(*onto, data)
+    pub fn warp<const N: usize>(&self, images: [&Volume<f32, F>; N], onto: &Grid<F>) -> [Volume<f32, F>; N] {
+        resample_together(images, onto, |p| self.apply(p), [0.0; N])
     }
 
     /// Smallest and largest determinant of the map's gradient at the voxels of the mask (on the field's grid), by central
