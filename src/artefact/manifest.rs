@@ -1,7 +1,9 @@
 //! What is known of a file: where it came from, by which settings.
 
+use super::write::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Beside every output: program version, settings, checksums of inputs and output, seed, frame, units, warnings.
 /// No time, no path, no patient's name: the same input and settings give the same bytes.
@@ -26,6 +28,46 @@ pub struct Manifest {
     pub warnings: Vec<String>,
     /// Figures a later stage or the report needs.
     pub facts: serde_json::Value,
+}
+
+impl Manifest {
+    /// Where the manifest of a stage lies below its folder.
+    pub fn path_of_stage(folder: &Path, stage: &str) -> PathBuf {
+        folder.join(format!(".stages/{stage}.manifest.json"))
+    }
+
+    /// The manifest of a stage, when it has finished in this folder.
+    pub fn of_stage(folder: &Path, stage: &str) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(Self::path_of_stage(folder, stage)).ok()?).ok()
+    }
+
+    /// One checksum of everything the stage made: what a later stage takes as its input.
+    ///
+    /// # Panics
+    /// Never: checksums are plain data.
+    pub fn made_sha256(&self) -> String {
+        let all = serde_json::to_string(&(&self.outputs, &self.facts)).expect("checksums are plain data");
+        sha256_hex(all.as_bytes())
+    }
+
+    /// One line per output that is not in `folder` as it was written.
+    pub fn changed_outputs(&self, folder: &Path) -> Vec<String> {
+        let change = |(name, record): (&String, &OutputRecord)| match std::fs::read(folder.join(name)) {
+            Err(_) => Some(format!("output `{name}` is missing")),
+            Ok(bytes) if sha256_hex(&bytes) != record.sha256 => Some(format!("output `{name}` was changed")),
+            Ok(_) => None,
+        };
+        self.outputs.iter().filter_map(change).collect()
+    }
+
+    /// One line per earlier stage whose files in `folder` are not those this stage was made from.
+    pub fn changed_stages(&self, folder: &Path) -> Vec<String> {
+        let change = |(role, sum): (&String, &String)| {
+            let earlier = Self::of_stage(folder, role.strip_prefix("stage ")?)?;
+            (earlier.made_sha256() != *sum).then(|| format!("input `{role}` changed"))
+        };
+        self.inputs.iter().filter_map(change).collect()
+    }
 }
 
 /// One output file.

@@ -35,6 +35,8 @@ pub struct Produced {
 pub struct StageOutcome {
     /// Whether the files were already there.
     pub skipped: bool,
+    /// Why it ran (see [`Stage::why`]); empty when it was skipped or forced.
+    pub reasons: Vec<String>,
     /// The manifest, old or new.
     pub manifest: Manifest,
 }
@@ -74,15 +76,26 @@ impl Stage {
         self
     }
 
+    /// The same for bytes of which only the checksum is known.
+    #[must_use]
+    pub fn input_sha256(mut self, role: &str, sha256: &str) -> Self {
+        self.inputs.insert(role.to_owned(), sha256.to_owned());
+        self
+    }
+
     /// Adds everything an earlier stage made as one input.
     ///
     /// # Panics
     /// Never: checksums are plain data.
     #[must_use]
-    pub fn after(mut self, earlier: &Manifest) -> Self {
-        let all = serde_json::to_string(&(&earlier.outputs, &earlier.facts)).expect("checksums are plain data");
-        self.inputs.insert(format!("stage {}", earlier.stage), sha256_hex(all.as_bytes()));
-        self
+    pub fn after(self, earlier: &Manifest) -> Self {
+        let sum = earlier.made_sha256();
+        self.input_sha256(&format!("stage {}", earlier.stage), &sum)
+    }
+
+    /// The stage's name.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// States the frame of the coordinates.
@@ -110,7 +123,7 @@ impl Stage {
 
     /// The manifest left by an earlier run, if it can be read.
     pub fn previous(&self) -> Option<Manifest> {
-        serde_json::from_slice(&std::fs::read(self.manifest_path()).ok()?).ok()
+        Manifest::of_stage(&self.folder, &self.name)
     }
 
     /// Why the stage would run now: one line per changed input or setting; empty when it would be skipped.
@@ -125,15 +138,7 @@ impl Stage {
             }
         }
         changed_settings("", &old.settings, &self.settings, &mut reasons);
-        for (name, record) in &old.outputs {
-            match std::fs::read(self.folder.join(name)) {
-                Err(_) => reasons.push(format!("output `{name}` is missing")),
-                Ok(bytes) if sha256_hex(&bytes) != record.sha256 => {
-                    reasons.push(format!("output `{name}` was changed"));
-                }
-                Ok(_) => {}
-            }
-        }
+        reasons.extend(old.changed_outputs(&self.folder));
         if reasons.is_empty() && old.key != self.key() {
             reasons.push("the program, the stage's code or the seed changed".to_owned());
         }
@@ -153,11 +158,12 @@ impl Stage {
         force: bool,
         compute: impl FnOnce() -> Result<Produced, E>,
     ) -> Result<StageOutcome, StageError<E>> {
+        let reasons = self.why();
         if !force
-            && self.why().is_empty()
+            && reasons.is_empty()
             && let Some(manifest) = self.previous()
         {
-            return Ok(StageOutcome { skipped: true, manifest });
+            return Ok(StageOutcome { skipped: true, reasons, manifest });
         }
         let produced = compute().map_err(StageError::Compute)?;
         // The old manifest must not vouch for a mixture of old and new files.
@@ -185,11 +191,11 @@ impl Stage {
         }
         manifest.outputs = outputs;
         write_whole(&self.manifest_path(), text(&manifest).as_bytes())?;
-        Ok(StageOutcome { skipped: false, manifest })
+        Ok(StageOutcome { skipped: false, reasons, manifest })
     }
 
     fn manifest_path(&self) -> PathBuf {
-        self.folder.join(format!(".stages/{}.manifest.json", self.name))
+        Manifest::path_of_stage(&self.folder, &self.name)
     }
 }
 

@@ -19,7 +19,8 @@ impl Failure {
         ExitCode::from(self.code())
     }
 
-    fn code(&self) -> u8 {
+    /// The same as a number.
+    pub fn code(&self) -> u8 {
         match self {
             Self::Failed(_) => 1,
             Self::Rejected(_) => 3,
@@ -27,7 +28,8 @@ impl Failure {
         }
     }
 
-    fn parts(&self) -> (&'static str, &anyhow::Error) {
+    /// What kind it is, and the error.
+    pub fn parts(&self) -> (&'static str, &anyhow::Error) {
         match self {
             Self::Failed(error) => ("failed", error),
             Self::Rejected(error) => ("input rejected", error),

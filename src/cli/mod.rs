@@ -4,6 +4,7 @@
 //! stdout (JSON with `--json`), logs and progress to stderr. Exit codes: 0 done, 1 failed, 2 usage, 3 input rejected,
 //! 4 computed but the quality gate refused it (outputs kept).
 
+mod bids;
 mod case;
 mod completions;
 mod demo;
@@ -26,6 +27,7 @@ mod session;
 mod simulate;
 mod sweep;
 mod synth;
+mod why;
 
 pub use failure::{Failure, Reject};
 pub use session::{GlobalOptions, Session};
@@ -63,6 +65,8 @@ enum Command {
     Mesh(mesh::Args),
     Segment(segment::Args),
     Report(report::Args),
+    Bids(bids::Args),
+    Why(why::Args),
 }
 
 /// Entry point of the program: parses, runs, turns failures into exit codes.
@@ -88,6 +92,8 @@ pub fn main() -> ExitCode {
         Command::Register(args) => register::run(&args, &session),
         Command::Segment(args) => segment::run(&args, &session),
         Command::Report(args) => report::run(&args, &session),
+        Command::Bids(args) => bids::run(&args, &session),
+        Command::Why(args) => why::run(&args, &session),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

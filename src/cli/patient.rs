@@ -8,7 +8,7 @@ use super::prep::Prepared;
 use super::{Failure, Reject, Session};
 use crate::artefact::Manifest;
 use crate::experiment::observed::ObservedSurfaces;
-use crate::experiment::outcome::{ExperimentOutcome, NoiseFloor};
+use crate::experiment::outcome::{ExperimentOutcome, NoiseFloor, SampleOutcome};
 use crate::experiment::prior::samples_of_prior;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::shard;
@@ -17,20 +17,16 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
 use std::collections::BTreeMap;
 
-/// Which samples of a sweep.
+/// Settings by room, as `settings.toml` keeps them.
+type UsedSettings = BTreeMap<&'static str, serde_json::Value>;
+
+/// A part of a sweep's samples (see [`shard`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// All of them, then outcome and page.
-    All,
-    /// Those of one shard (1-based), and nothing else.
-    Shard {
-        /// Which.
-        number: usize,
-        /// Of how many.
-        of: usize,
-    },
-    /// None: every sample must be there already; then outcome and page.
-    Gather,
+pub struct Shard {
+    /// Which, from 1.
+    pub number: usize,
+    /// Of how many.
+    pub of: usize,
 }
 
 /// Mesh, reference and settings of a prepared case.
@@ -42,12 +38,10 @@ pub struct Patient {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
-    /// prep's stages, then the reference.
-    manifests: Vec<Manifest>,
 }
 
 impl Patient {
-    /// Reads mesh and masks and writes the reference surfaces.
+    /// Reads mesh and masks.
     ///
     /// # Errors
     /// Files that are missing or damaged; sets or surfaces that are empty.
@@ -55,10 +49,8 @@ impl Patient {
         let mesh_bytes = case.read(REST_MESH)?;
         let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
         let surfaces = case::observed_surfaces(&Anatomy::read(case)?);
-        let mut manifests = prepared.manifests.clone();
-        manifests.push(case::reference(case, &surfaces, &prepared.manifests[1])?);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces).reject()?);
-        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference, manifests })
+        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference })
     }
 
     /// A case that `hgm prep` or `hgm run` has made, with the settings it was made with.
@@ -79,21 +71,53 @@ impl Patient {
         self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]).rmse_mm
     }
 
-    /// Simulates the samples of `part`; with all of them there, writes outcome and page and returns both.
+    /// Simulates the samples of one shard and nothing else.
+    ///
+    /// # Errors
+    /// A scenario that the solver refuses.
+    pub fn sweep_shard(&self, part: Shard, options: &PriorOptions, session: &Session) -> Result<(), Failure> {
+        let (_, used) = self.simulate(Some(part), SampleMode::Run, options, session)?;
+        self.case.write_settings(&used)
+    }
+
+    /// All samples, then outcome and page, and returns both.
     ///
     /// # Errors
     /// A scenario that the solver refuses; samples that are missing when they are gathered.
     pub fn sweep(
         &self,
-        part: Part,
+        mode: SampleMode,
         options: &PriorOptions,
         session: &Session,
-    ) -> Result<Option<(ExperimentOutcome, String)>, Failure> {
+    ) -> Result<(ExperimentOutcome, String), Failure> {
+        let (solved, used) = self.simulate(None, mode, options, session)?;
+        let (samples, made): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
+        let mut outcome = self.posed_outcome();
+        outcome.warnings.extend(made.iter().flat_map(|m| m.warnings.iter().cloned()));
+        outcome.tissues = self.settings.tissue_list().iter().map(|t| t.name.clone()).collect();
+        outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
+        outcome.samples = samples;
+        let manifests: Vec<Manifest> = self.prepared.manifests.iter().cloned().chain(made).collect();
+        let page = self.case.finish(&outcome, &used, &manifests)?;
+        Ok((outcome, page))
+    }
+
+    /// The samples and the settings they were made with.
+    fn simulate(
+        &self,
+        part: Option<Shard>,
+        mode: SampleMode,
+        options: &PriorOptions,
+        session: &Session,
+    ) -> Result<(Vec<(SampleOutcome, Manifest)>, UsedSettings), Failure> {
         let prior = options.over(self.case.settings_of("prior", session)?);
         let (scenario, tissues) = (self.settings.scenario(), self.settings.tissue_list());
-        let list =
+        let mut list =
             samples_of_prior(&tissues, &self.settings.sd_levels, self.settings.poisson_ratio, &prior).reject()?;
-        let after = [&self.manifests[2], &self.manifests[3]];
+        if let Some(Shard { number, of }) = part {
+            list = shard(&list, number, of);
+        }
+        let after = [&self.prepared.manifests[2], &self.prepared.manifests[3]];
         let shared = Sweep {
             mesh: &self.mesh,
             template: &scenario,
@@ -105,22 +129,7 @@ impl Patient {
             ("resection", serde_json::to_value(&self.settings)?),
             ("prior", serde_json::to_value(&prior)?),
         ]);
-        if let Part::Shard { number, of } = part {
-            case::samples(&self.case, &shared, &shard(&list, number, of), SampleMode::Run, session)?;
-            self.case.write_settings(&used)?;
-            return Ok(None);
-        }
-        let mode = if part == Part::Gather { SampleMode::Gather } else { SampleMode::Run };
-        let (samples, made): (Vec<_>, Vec<_>) =
-            case::samples(&self.case, &shared, &list, mode, session)?.into_iter().unzip();
-        let mut outcome = self.posed_outcome();
-        outcome.warnings.extend(made.iter().flat_map(|m| m.warnings.iter().cloned()));
-        outcome.tissues = tissues.iter().map(|t| t.name.clone()).collect();
-        outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
-        outcome.samples = samples;
-        let manifests: Vec<Manifest> = self.manifests.iter().cloned().chain(made).collect();
-        let page = self.case.finish(&outcome, &used, &manifests)?;
-        Ok(Some((outcome, page)))
+        Ok((case::samples(&self.case, &shared, &list, mode, session)?, used))
     }
 
     /// Estimates the moduli against the post-operative surfaces. The samples of an `earlier` outcome stay beside it.
@@ -139,7 +148,7 @@ impl Patient {
             tissues: &self.settings.tissue_list(),
             poisson_ratio: self.settings.poisson_ratio,
             reference: &self.reference,
-            after: &self.manifests[3],
+            after: &self.prepared.manifests[3],
             noise_mm: self.floor().combined_mm().unwrap_or(options.descent.noise_mm),
         };
         let (manifest, facts) = case::estimate(&self.case, &input, options, session)?;
@@ -149,7 +158,7 @@ impl Patient {
             ("resection", serde_json::to_value(&self.settings)?),
             ("estimate", serde_json::to_value(options)?),
         ]);
-        let manifests: Vec<Manifest> = self.manifests.iter().cloned().chain([manifest]).collect();
+        let manifests: Vec<Manifest> = self.prepared.manifests.iter().cloned().chain([manifest]).collect();
         let page = self.case.finish(&outcome, &used, &manifests)?;
         Ok((outcome, facts, page))
     }

@@ -4,6 +4,8 @@ use super::case::{self, AnatFacts, Anatomy, Case, MeshFacts, MeshOptions, Overri
 use super::{Failure, Session};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use crate::experiment::prior::PriorSettings;
+use crate::experiment::resection::ResectionSettings;
 use anyhow::anyhow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -32,7 +34,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = Case::open(&args.output, session);
     let prepared = prepare(&case, args, session)?;
     let outcome = prepared.outcome();
-    let page = case.finish(&outcome, &BTreeMap::new(), &prepared.manifests)?;
+    // Sweeps of this case, in however many shards, start from these.
+    let settings = BTreeMap::from([
+        ("resection", serde_json::to_value(session.settings::<ResectionSettings>("resection")?)?),
+        ("prior", serde_json::to_value(session.settings::<PriorSettings>("prior")?)?),
+    ]);
+    let page = case.finish(&outcome, &settings, &prepared.manifests)?;
     session.emit(&outcome, &page)?;
     prepared.quality_gate()
 }
@@ -40,7 +47,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// What `prep` leaves for the experiments.
 #[derive(Debug)]
 pub struct Prepared {
-    /// The stages' manifests, in order.
+    /// The stages' manifests, in order: registration, anat, mesh, reference.
     pub manifests: Vec<Manifest>,
     /// Registration figures.
     pub registration: RegistrationFacts,
@@ -58,9 +65,10 @@ pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, 
     let scans = Scans::read(&args.pre, &args.post, session)?;
     let (registered, registration) = case::registration(case, &scans, session)?;
     let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
-    let labels = Anatomy::read(case)?.labels;
-    let (meshed, mesh) = case::mesh(case, &labels, &args.mesh, &segmented, session)?;
-    Ok(Prepared { manifests: vec![registered, segmented, meshed], registration, anat, mesh })
+    let anatomy = Anatomy::read(case)?;
+    let (meshed, mesh) = case::mesh(case, &anatomy.labels, &args.mesh, &segmented, session)?;
+    let observed = case::reference(case, &anatomy, &segmented)?;
+    Ok(Prepared { manifests: vec![registered, segmented, meshed, observed], registration, anat, mesh })
 }
 
 impl Prepared {
@@ -72,7 +80,8 @@ impl Prepared {
         let (registered, registration) = case.stage_facts("registration")?;
         let (segmented, anat) = case.stage_facts("anat")?;
         let (meshed, mesh) = case.stage_facts("mesh")?;
-        Ok(Self { manifests: vec![registered, segmented, meshed], registration, anat, mesh })
+        let (observed, ()) = case.stage_facts("reference")?;
+        Ok(Self { manifests: vec![registered, segmented, meshed, observed], registration, anat, mesh })
     }
 
     /// The part of an outcome that is known before any simulation.

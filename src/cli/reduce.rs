@@ -1,7 +1,7 @@
 //! `hgm reduce`: the parts of a sweep joined.
 
-use super::case::{Case, PriorOptions};
-use super::patient::{Part, Patient};
+use super::case::{Case, PriorOptions, SampleMode};
+use super::patient::Patient;
 use super::run::summary;
 use super::{Failure, Session};
 use std::path::PathBuf;
@@ -18,8 +18,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = Case::open(&args.case, session);
     let patient = Patient::open(&case, None, session)?;
-    if let Some((outcome, page)) = patient.sweep(Part::Gather, &PriorOptions::default(), session)? {
-        session.emit(&outcome, &summary(&outcome, &page))?;
-    }
+    let (outcome, page) = patient.sweep(SampleMode::Gather, &PriorOptions::default(), session)?;
+    session.emit(&outcome, &summary(&outcome, &page))?;
     patient.quality_gate()
 }

@@ -1,7 +1,7 @@
 //! `hgm run`: prep, sweep, report.
 
-use super::case::{Case, EstimateOptions, MeshOptions, Overrides, PriorOptions};
-use super::patient::{Part, Patient};
+use super::case::{Case, EstimateOptions, MeshOptions, Overrides, PriorOptions, SampleMode};
+use super::patient::Patient;
 use super::prep;
 use super::{Failure, Session};
 use crate::experiment::outcome::ExperimentOutcome;
@@ -14,15 +14,22 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    prep: prep::Args,
+    pub prep: prep::Args,
+    #[command(flatten)]
+    pub analysis: AnalysisOptions,
+}
+
+/// What is asked of a prepared patient.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct AnalysisOptions {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
-    tissues: Option<u8>,
+    pub tissues: Option<u8>,
     #[command(flatten)]
-    prior: PriorOptions,
+    pub prior: PriorOptions,
     /// Estimate the moduli with their intervals instead of trying the prior's samples
     #[arg(long)]
-    estimate: bool,
+    pub estimate: bool,
 }
 
 impl Args {
@@ -30,32 +37,52 @@ impl Args {
     pub fn demo(pre: PathBuf, post: PathBuf, output: PathBuf, mesh: MeshOptions) -> Self {
         Self {
             prep: prep::Args { pre, post, output, overrides: Overrides::default(), mesh },
-            tissues: Some(1),
-            prior: PriorOptions::default(),
-            estimate: false,
+            analysis: AnalysisOptions { tissues: Some(1), ..AnalysisOptions::default() },
         }
     }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let Analysed { outcome, text, patient } = analyse(args, session)?;
+    session.emit(&outcome, &text)?;
+    patient.quality_gate()
+}
+
+/// A patient's job, done.
+pub struct Analysed {
+    /// The numbers.
+    pub outcome: ExperimentOutcome,
+    /// The numbers that matter, for a terminal.
+    pub text: String,
+    /// The patient.
+    pub patient: Patient,
+}
+
+/// Runs (or skips) every stage from the scans to the page.
+///
+/// # Errors
+/// The first stage that is rejected or fails.
+pub fn analyse(args: &Args, session: &Session) -> Result<Analysed, Failure> {
     let case = Case::open(&args.prep.output, session);
     let prepared = prep::prepare(&case, &args.prep, session)?;
     let mut settings: ResectionSettings = session.settings("resection")?;
-    if let Some(tissues) = args.tissues {
+    if let Some(tissues) = args.analysis.tissues {
         settings.tissues = usize::from(tissues);
     }
     // The settings of an earlier run of this folder are not this run's.
     case.forget_settings();
     let patient = Patient::new(&case, prepared, settings)?;
-    if args.estimate {
+    let (outcome, text) = if args.analysis.estimate {
         let options: EstimateOptions = session.settings("estimate")?;
         let (outcome, facts, page) = patient.estimate(&options, None, session)?;
         let text = super::estimate::table(&facts) + &super::estimate::comparison(&outcome, &facts) + &page;
-        session.emit(&outcome, &text)?;
-    } else if let Some((outcome, page)) = patient.sweep(Part::All, &args.prior, session)? {
-        session.emit(&outcome, &summary(&outcome, &page))?;
-    }
-    patient.quality_gate()
+        (outcome, text)
+    } else {
+        let (outcome, page) = patient.sweep(SampleMode::Run, &args.analysis.prior, session)?;
+        let text = summary(&outcome, &page);
+        (outcome, text)
+    };
+    Ok(Analysed { outcome, text, patient })
 }
 
 /// Best sample, errors and verdicts for a terminal.

@@ -1,7 +1,7 @@
 //! `hgm sweep`: the prior's samples on a prepared case, all of them or a part.
 
-use super::case::{Case, PriorOptions};
-use super::patient::{Part, Patient};
+use super::case::{Case, PriorOptions, SampleMode};
+use super::patient::{Patient, Shard};
 use super::run::summary;
 use super::{Failure, Session};
 use std::path::PathBuf;
@@ -19,27 +19,30 @@ pub struct Args {
     #[command(flatten)]
     prior: PriorOptions,
     /// Only every N-th sample, beginning with the K-th (from 1); any order, any machine, the same bytes
-    #[arg(long, value_name = "K/N", value_parser = part)]
-    shard: Option<Part>,
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    shard: Option<Shard>,
 }
 
-fn part(text: &str) -> Result<Part, String> {
+fn shard(text: &str) -> Result<Shard, String> {
     let wrong = || format!("`{text}` is not K/N with 1 <= K <= N, such as 2/4");
     let (number, of) = text.split_once('/').ok_or_else(wrong)?;
     let (number, of): (usize, usize) = (number.parse().map_err(|_| wrong())?, of.parse().map_err(|_| wrong())?);
-    if (1..=of).contains(&number) { Ok(Part::Shard { number, of }) } else { Err(wrong()) }
+    if (1..=of).contains(&number) { Ok(Shard { number, of }) } else { Err(wrong()) }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = Case::open(&args.case, session);
     let patient = Patient::open(&case, args.tissues, session)?;
-    let part = args.shard.unwrap_or(Part::All);
-    match patient.sweep(part, &args.prior, session)? {
-        Some((outcome, page)) => session.emit(&outcome, &summary(&outcome, &page))?,
-        None => session.emit(
-            &serde_json::json!({ "shard": format!("{part:?}"), "case": args.case }),
+    if let Some(shard) = args.shard {
+        patient.sweep_shard(shard, &args.prior, session)?;
+        let Shard { number, of } = shard;
+        session.emit(
+            &serde_json::json!({ "shard": number, "of": of }),
             "shard done; when all are, join them with `hgm reduce`",
-        )?,
+        )?;
+    } else {
+        let (outcome, page) = patient.sweep(SampleMode::Run, &args.prior, session)?;
+        session.emit(&outcome, &summary(&outcome, &page))?;
     }
     patient.quality_gate()
 }
@@ -50,9 +53,9 @@ mod tests {
 
     #[test]
     fn a_shard_is_a_part_of_a_whole() {
-        assert_eq!(part("2/4"), Ok(Part::Shard { number: 2, of: 4 }));
+        assert_eq!(shard("2/4"), Ok(Shard { number: 2, of: 4 }));
         for wrong in ["0/4", "5/4", "1", "a/b", "1/", "-1/2"] {
-            assert!(part(wrong).unwrap_err().contains(wrong));
+            assert!(shard(wrong).unwrap_err().contains(wrong));
         }
     }
 }

@@ -2,7 +2,9 @@
 
 pub mod case;
 pub mod chart;
+pub mod cohort;
 pub mod colour;
+pub mod derivatives;
 pub mod figure;
 pub mod hand_off;
 pub mod html;

@@ -6,8 +6,12 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// The optimised program where the test runner names one, else the one built with the tests.
+pub fn program() -> PathBuf {
+    std::env::var_os("HGM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_hgm").into()).into()
+}
+
 fn hgm() -> Command {
-    Command::new(std::env::var_os("HGM_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_hgm").into()))
+    Command::new(program())
 }
 
 pub fn sample(name: &str) -> PathBuf {
@@ -19,7 +23,7 @@ pub fn output(arguments: &[&str]) -> Output {
 }
 
 /// Every file below a folder by its relative name.
-fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(next) = folders.pop() {
@@ -77,6 +81,33 @@ fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threa
     let page = String::from_utf8(whole["report.html"].clone()).unwrap();
     assert!(page.len() < 10_000_000 && page.contains("not a medical device"));
     assert!(!page.contains(folder.path().to_str().unwrap()), "no path in the page");
+    asks_why(&folder.path().join("whole"));
+}
+
+/// Nothing would run again with the same options; a changed setting, file and scan are each named, and what follows too.
+fn asks_why(case: &Path) {
+    let why = |rest: &[&str]| -> BTreeMap<String, Vec<String>> {
+        let mesh = ["why", case.to_str().unwrap(), "--json", "--mesher", "lattice"];
+        let said: serde_json::Value = serde_json::from_slice(&output(&[&mesh, rest].concat()).stdout).unwrap();
+        let stages = said["stages"].as_array().unwrap().iter().filter(|stage| stage["would_run"] == true);
+        let reasons = |stage: &serde_json::Value| {
+            stage["reasons"].as_array().unwrap().iter().map(|r| r.as_str().unwrap().to_owned()).collect()
+        };
+        stages.map(|stage| (stage["stage"].as_str().unwrap().to_owned(), reasons(stage))).collect()
+    };
+    let same = ["--cells", "8000"];
+    assert!(why(&same).is_empty(), "{:?}", why(&same));
+    let finer = why(&["--cells", "9000"]);
+    assert_eq!(finer["mesh"], ["setting `mesh.size.cells` changed from 8000 to 9000"]);
+    assert!(finer["sim-sample-04"][0].contains("follows mesh") && !finer.contains_key("anat"));
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let scans =
+        |pre: &Path| why(&["--cells", "8000", "--pre", pre.to_str().unwrap(), "--post", post.to_str().unwrap()]);
+    assert!(scans(&pre).is_empty());
+    assert_eq!(scans(&post)["registration"], ["input `pre` changed"]);
+    std::fs::remove_file(case.join("sim/sample-03.vtu")).unwrap();
+    assert_eq!(why(&same)["sim-sample-03"], ["output `sim/sample-03.vtu` is missing"]);
+    assert_eq!(output(&["why", case.to_str().unwrap(), "meshes"]).status.code(), Some(3));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
+mod bids;
 mod damaged_files;
 mod fem;
 mod job;
@@ -8,6 +9,7 @@ mod mesh_engines;
 mod mesh_files;
 mod nifti_guard;
 mod pipelines;
+mod privacy;
 mod python;
 mod refused_inputs;
 mod rooms;

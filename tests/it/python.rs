@@ -24,6 +24,19 @@ pub fn pipeline(folder: &Path, program: &str, arguments: &[&str]) -> (i32, Strin
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
 
+/// A program that is installed beside the interpreter.
+pub fn tool_path(program: &str) -> PathBuf {
+    interpreter().with_file_name(program)
+}
+
+/// Runs such a program and returns what it printed, however it ended.
+pub fn tool(folder: &Path, program: &str, arguments: &[&str]) -> String {
+    let path = tool_path(program);
+    let output = Command::new(&path).args(arguments).current_dir(folder).output();
+    let output = output.unwrap_or_else(|e| panic!("{}: {e}; `./run test` provides it", path.display()));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     let interpreter = interpreter();
     Command::new(&interpreter)

@@ -2,7 +2,7 @@
 
 use super::registration::transforms;
 use super::scans::{GivenMask, given_mask};
-use super::{Case, Failure, Overrides, Reject, Scans, facts};
+use super::{Case, Failure, Overrides, Reject, ScanSums, Scans, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::ResectionVolumes;
@@ -68,6 +68,25 @@ impl Anatomy {
     }
 }
 
+/// The stage with its settings and its inputs but for the user's own masks.
+///
+/// # Errors
+/// A settings table that does not fit.
+pub fn anat_stage(
+    case: &Case,
+    sums: &ScanSums,
+    after: &Manifest,
+    session: &Session,
+) -> Result<(Stage, PairSettings), Failure> {
+    let settings: PairSettings = session.settings("anat")?;
+    let stage = Stage::new("anat", VERSION, &case.folder, &settings)
+        .input_sha256("pre", &sums.pre)
+        .input_sha256("post", &sums.post)
+        .after(after)
+        .frame(Mni::NAME);
+    Ok((stage, settings))
+}
+
 /// Resamples, segments and finds the cavity; a user's own masks win.
 ///
 /// # Errors
@@ -79,12 +98,7 @@ pub fn anat(
     after: &Manifest,
     session: &Session,
 ) -> Result<(Manifest, AnatFacts), Failure> {
-    let settings: PairSettings = session.settings("anat")?;
-    let mut stage = Stage::new("anat", VERSION, &case.folder, &settings)
-        .input("pre", &scans.pre_bytes)
-        .input("post", &scans.post_bytes)
-        .after(after)
-        .frame(Mni::NAME);
+    let (mut stage, settings) = anat_stage(case, &scans.sums, after, session)?;
     let mut given = |role: &str, path: &Option<PathBuf>| -> Result<Option<GivenMask>, Failure> {
         let Some(path) = path else { return Ok(None) };
         let (mask, bytes) = given_mask(path, scans, session)?;

@@ -90,7 +90,10 @@ pub fn estimate(
     session: &Session,
 ) -> Result<(Manifest, EstimateFacts), Failure> {
     let prior: PriorSettings = session.settings("prior")?;
-    let posed = (input.scenario, input.tissues, input.poisson_ratio, input.noise_mm, options, &prior);
+    let posed = serde_json::json!({
+        "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
+        "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
+    });
     let stage = Stage::new(ESTIMATE, VERSION, &case.folder, &posed)
         .input("mesh", input.mesh.1)
         .after(input.after)

@@ -58,6 +58,27 @@ pub fn programs() -> EnginePrograms {
     EnginePrograms::find(std::env::current_exe().ok().as_deref(), |name| std::env::var_os(name))
 }
 
+/// The stage with its settings, and how the boundary is tagged.
+///
+/// # Errors
+/// A settings table that does not fit.
+pub fn mesh_stage(
+    case: &Case,
+    options: &MeshOptions,
+    after: &Manifest,
+    session: &Session,
+) -> Result<(Stage, MeshSettings, TagSettings), Failure> {
+    let mut settings = mesh_settings(options, &programs(), session)?;
+    settings.without = vec![label::CSF];
+    let tag_settings: TagSettings = session.settings("tag")?;
+    if tag_settings.falx && settings.split.is_none() {
+        settings.split = Some(falx_sheet());
+    }
+    let both = serde_json::json!({ "mesh": settings, "tag": tag_settings });
+    let stage = Stage::new("mesh", VERSION, &case.folder, &both).after(after).frame(Mni::NAME);
+    Ok((stage, settings, tag_settings))
+}
+
 /// Meshes a label map (grey, white, ventricle, resected), tags the sets, leaves only the tissue, writes the rest mesh.
 ///
 /// # Errors
@@ -69,17 +90,10 @@ pub fn mesh(
     after: &Manifest,
     session: &Session,
 ) -> Result<(Manifest, MeshFacts), Failure> {
-    let programs = programs();
-    let mut settings = mesh_settings(options, &programs, session)?;
-    settings.without = vec![label::CSF];
-    let tag_settings: TagSettings = session.settings("tag")?;
-    if tag_settings.falx && settings.split.is_none() {
-        settings.split = Some(falx_sheet());
-    }
-    let stage = Stage::new("mesh", VERSION, &case.folder, &(&settings, &tag_settings)).after(after).frame(Mni::NAME);
+    let (stage, settings, tag_settings) = mesh_stage(case, options, after, session)?;
     case.run(&stage, "mesh", || {
         let body = with_closed_sulci(labels, SULCUS_MM);
-        let (mut whole, record) = mesh_labels(&body, &settings, &programs).reject()?;
+        let (mut whole, record) = mesh_labels(&body, &settings, &programs()).reject()?;
         let tags = tag_boundary_sets(&mut whole, &tag_settings).map_err(|error| match error {
             TagError::Empty { .. } => Failure::QualityGate(error.into()),
             TagError::NoTissue => Failure::Rejected(error.into()),

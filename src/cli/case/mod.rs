@@ -11,13 +11,13 @@ mod registration;
 mod samples;
 mod scans;
 
-pub use anat::{AnatFacts, Anatomy, anat};
+pub use anat::{AnatFacts, Anatomy, anat, anat_stage};
 pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, estimate};
-pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, programs};
-pub use observed::{observed_surfaces, reference};
-pub use registration::{RegistrationFacts, registration};
-pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, samples};
-pub use scans::{Overrides, Scans};
+pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_stage, programs};
+pub use observed::{observed_surfaces, reference, reference_stage};
+pub use registration::{RegistrationFacts, registration, registration_stage};
+pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, sample_stage, samples};
+pub use scans::{Overrides, ScanSums, Scans};
 
 use super::Session;
 use super::failure::{Failure, Reject};
@@ -111,8 +111,10 @@ impl Case {
     /// Rejected when the stage has not been run here.
     pub fn stage_facts<T: DeserializeOwned>(&self, stage: &str) -> Result<(Manifest, T), Failure> {
         let name = format!(".stages/{stage}.manifest.json");
-        let manifest: Manifest =
-            serde_json::from_slice(&self.read(&name)?).with_context(|| format!("{name}: not a manifest")).reject()?;
+        self.read(&name)?;
+        let manifest = Manifest::of_stage(&self.folder, stage)
+            .ok_or_else(|| anyhow!("{name}: not a manifest of this version; run again with --force"))
+            .reject()?;
         let facts = serde_json::from_value(manifest.facts.clone());
         Ok((manifest, facts.with_context(|| format!("{name}: facts of another version; run again")).reject()?))
     }
@@ -187,6 +189,9 @@ impl Case {
             StageError::Write(error) => Failure::Failed(error.into()),
         })?;
         tracing::info!("{name}: {}", if outcome.skipped { "already there, skipped" } else { "done" });
+        for reason in &outcome.reasons {
+            tracing::info!("{name}: it ran because {reason}");
+        }
         for warning in &outcome.manifest.warnings {
             tracing::warn!("{name}: {warning}");
         }

@@ -18,16 +18,21 @@ pub fn observed_surfaces(anatomy: &Anatomy) -> BTreeMap<String, TriMesh> {
     ])
 }
 
+/// The stage with its input.
+pub fn reference_stage(case: &Case, after: &Manifest) -> Stage {
+    Stage::new("reference", VERSION, &case.folder, &()).after(after)
+}
+
 /// Writes the surfaces as GIFTI.
 ///
 /// # Errors
 /// The disk's.
-pub fn reference(case: &Case, surfaces: &BTreeMap<String, TriMesh>, after: &Manifest) -> Result<Manifest, Failure> {
-    let stage = Stage::new("reference", VERSION, &case.folder, &()).after(after);
-    let (manifest, ()) = case.run(&stage, "reference", || {
+pub fn reference(case: &Case, anatomy: &Anatomy, after: &Manifest) -> Result<Manifest, Failure> {
+    let (manifest, ()) = case.run(&reference_stage(case, after), "reference", || {
         let file = |(set, surface): (&String, &TriMesh)| {
             (format!("mesh/reference_{set}.surf.gii"), gifti::encode_surface(surface, Space::Mni152, set))
         };
+        let surfaces = observed_surfaces(anatomy);
         Ok(Produced { files: surfaces.iter().map(file).collect(), ..Produced::default() })
     })?;
     Ok(manifest)

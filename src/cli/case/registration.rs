@@ -1,6 +1,6 @@
 //! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
 
-use super::{Case, Failure, MNI_FROM_PRE, PRE_FROM_POST, Reject, Scans, facts};
+use super::{Case, Failure, MNI_FROM_PRE, PRE_FROM_POST, Reject, ScanSums, Scans, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::RegistrationOutcome;
@@ -22,16 +22,25 @@ pub struct RegistrationFacts {
     pub fits: Vec<RegistrationOutcome>,
 }
 
+/// The stage with its settings and inputs.
+///
+/// # Errors
+/// A settings table that does not fit.
+pub fn registration_stage(case: &Case, sums: &ScanSums, session: &Session) -> Result<(Stage, RigidSettings), Failure> {
+    let settings: RigidSettings = session.settings("register")?;
+    let stage = Stage::new("registration", VERSION, &case.folder, &settings)
+        .input_sha256("pre", &sums.pre)
+        .input_sha256("post", &sums.post)
+        .frame(Mni::NAME);
+    Ok((stage, settings))
+}
+
 /// Fits both scans and writes both transforms as text and as ITK .tfm.
 ///
 /// # Errors
 /// Rejected scans (nothing in common, a constant image) and what the disk refuses.
 pub fn registration(case: &Case, scans: &Scans, session: &Session) -> Result<(Manifest, RegistrationFacts), Failure> {
-    let settings: RigidSettings = session.settings("register")?;
-    let stage = Stage::new("registration", VERSION, &case.folder, &settings)
-        .input("pre", &scans.pre_bytes)
-        .input("post", &scans.post_bytes)
-        .frame(Mni::NAME);
+    let (stage, settings) = registration_stage(case, &scans.sums, session)?;
     case.run(&stage, "registration", || {
         let bar = session.progress(2, "registration");
         bar.set_message("post to pre");

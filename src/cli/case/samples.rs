@@ -66,6 +66,20 @@ pub enum SampleMode {
     Gather,
 }
 
+/// The stage of one sample.
+pub fn sample_stage(
+    case: &Case,
+    template: &Scenario,
+    tissues: &[Tissue],
+    sample: &Sample,
+    after: &[&Manifest],
+) -> Stage {
+    let name = format!("sim-{}", sample.id);
+    let posed = serde_json::json!({ "scenario": template, "tissues": tissues, "sample": sample });
+    let stage = Stage::new(&name, VERSION, &case.folder, &posed).frame(Mni::NAME);
+    after.iter().fold(stage, |stage, earlier| stage.after(earlier))
+}
+
 /// Runs (or skips) every sample; the records come back in order.
 ///
 /// # Errors
@@ -80,9 +94,7 @@ pub fn samples(
     let bar = session.progress(list.len() as u64, "simulation");
     let mut records = Vec::with_capacity(list.len());
     for sample in list {
-        let settings = (sweep.template, sweep.tissues, sample);
-        let stage = Stage::new(&format!("sim-{}", sample.id), VERSION, &case.folder, &settings).frame(Mni::NAME);
-        let stage = sweep.after.iter().fold(stage, |stage, earlier| stage.after(earlier));
+        let stage = sample_stage(case, sweep.template, sweep.tissues, sample, sweep.after);
         if mode == SampleMode::Gather
             && let Some(reason) = stage.why().first()
         {

@@ -1,6 +1,7 @@
 //! The files a user gives: two scans and masks of their own.
 
 use super::{Failure, Reject, shown};
+use crate::artefact::sha256_hex;
 use crate::cli::Session;
 use crate::cli::session::read_input;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
@@ -24,13 +25,20 @@ pub struct Overrides {
     pub resected_mask: Option<PathBuf>,
 }
 
-/// The two scans as bytes and as volumes.
+/// Checksums of the two files.
+#[derive(Clone, Debug)]
+pub struct ScanSums {
+    /// Of the pre-operative file.
+    pub pre: String,
+    /// Of the post-operative file.
+    pub post: String,
+}
+
+/// The two scans.
 #[derive(Debug)]
 pub struct Scans {
-    /// The pre-operative file's bytes.
-    pub pre_bytes: Vec<u8>,
-    /// The post-operative file's bytes.
-    pub post_bytes: Vec<u8>,
+    /// Checksums of the files.
+    pub sums: ScanSums,
     /// The pre-operative scan.
     pub pre: Volume<f32, Pre>,
     /// The post-operative scan.
@@ -66,7 +74,8 @@ impl Scans {
         let mut warnings: Vec<String> = before.warnings.iter().map(|w| format!("pre: {w}")).collect();
         warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
         let (pre, post) = (before.volume.relabelled(), after.volume.relabelled());
-        Ok(Self { pre_bytes, post_bytes, pre, post, warnings })
+        let sums = ScanSums { pre: sha256_hex(&pre_bytes), post: sha256_hex(&post_bytes) };
+        Ok(Self { sums, pre, post, warnings })
     }
 }
 

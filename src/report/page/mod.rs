@@ -1,5 +1,6 @@
 //! The report as one HTML file that opens from disk and asks nothing of any other place.
 
+mod cohort;
 mod estimate;
 mod methods;
 mod parts;
@@ -86,12 +87,17 @@ struct Section {
     body: String,
 }
 
-impl CasePage {
-    /// The whole page.
-    pub fn to_html(&self) -> String {
-        let sections = self.sections();
+/// What every page has around its sections.
+struct Frame<'a> {
+    title: &'a str,
+    kicker: &'a str,
+    version: &'a str,
+}
+
+impl Frame<'_> {
+    fn html(&self, notice: &str, sections: &[Section], footnote: &str, scripts: &str) -> String {
         let mut page = String::with_capacity(4 << 20);
-        let title = escape(&self.title);
+        let (title, version) = (escape(self.title), escape(self.version));
         let _ = write!(
             page,
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -100,36 +106,54 @@ impl CasePage {
              <meta name=\"color-scheme\" content=\"light dark\">\n<meta name=\"referrer\" content=\"no-referrer\">\n\
              <link rel=\"icon\" href=\"data:,\">\n<title>{title} · hgm</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
              <a class=\"skip\" href=\"#main\">Skip to the report</a>\n\
-             <header><div class=\"wrap\"><p class=\"kicker\">hgm {} · brain deformation report</p><h1>{title}</h1>\
+             <header><div class=\"wrap\"><p class=\"kicker\">hgm {version} · {}</p><h1>{title}</h1>\
              <p class=\"disclaimer\">Research software, not a medical device. \
              Not for diagnosis, not for surgical planning.</p></div></header>\n\
              <nav aria-label=\"Sections\"><div class=\"wrap\">",
-            escape(&self.version)
+            self.kicker
         );
-        for section in &sections {
+        for section in sections {
             let _ = write!(page, "<a href=\"#{}\">{}</a>", section.id, section.heading);
         }
         page.push_str("</div></nav>\n<main id=\"main\" class=\"wrap\">\n");
-        page.push_str(&self.warnings_box());
-        for s in &sections {
+        page.push_str(notice);
+        for s in sections {
             let _ = write!(
                 page,
                 "<section id=\"{0}\" aria-labelledby=\"h-{0}\"><h2 id=\"h-{0}\">{1}</h2>\n{2}</section>\n",
                 s.id, s.heading, s.body
             );
         }
-        page.push_str("</main>\n<footer class=\"wrap\"><p>Research software, not a medical device. Made by hgm ");
         let _ = write!(
             page,
-            "{}. The images are masked to the brain; the page holds no names, dates or places, and makes no request \
-             to any other place.</p></footer>\n<script>\n{RATING_SCRIPT}</script>\n",
-            escape(&self.version)
+            "</main>\n<footer class=\"wrap\"><p>Research software, not a medical device. Made by hgm {version}. \
+             {footnote}</p></footer>\n{scripts}</body>\n</html>\n"
         );
-        if let Some(viewer) = &self.viewer {
-            page.push_str(&viewer.scripts());
-        }
-        page.push_str("</body>\n</html>\n");
         page
+    }
+}
+
+/// A box above the sections.
+fn notice(class: &str, heading: &str, items: &[String]) -> String {
+    let items: Vec<String> = items.iter().map(|text| format!("<li>{}</li>", escape(text))).collect();
+    let items = items.concat();
+    format!(
+        "<div class=\"notice {class}\" id=\"warnings\" role=\"note\"><h2><span aria-hidden=\"true\">▲</span> \
+         {heading}</h2><ul>{items}</ul></div>\n"
+    )
+}
+
+impl CasePage {
+    /// The whole page.
+    pub fn to_html(&self) -> String {
+        let frame = Frame { title: &self.title, kicker: "brain deformation report", version: &self.version };
+        let mut scripts = format!("<script>\n{RATING_SCRIPT}</script>\n");
+        if let Some(viewer) = &self.viewer {
+            scripts.push_str(&viewer.scripts());
+        }
+        let note = "The images are masked to the brain; the page holds no names, dates or places, and makes no request \
+                    to any other place.";
+        frame.html(&self.warnings_box(), &self.sections(), note, &scripts)
     }
 
     fn sections(&self) -> Vec<Section> {
@@ -156,19 +180,14 @@ impl CasePage {
     fn warnings_box(&self) -> String {
         let raised = self.outcome.iter().flat_map(|o| &o.warnings).chain(&self.warnings);
         let absent = self.absent.iter().map(|what| format!("Not shown: {what}."));
-        let items: Vec<String> =
-            raised.cloned().chain(absent).map(|text| format!("<li>{}</li>", escape(&text))).collect();
-        if items.is_empty() {
-            return "<div class=\"notice calm\" id=\"warnings\" role=\"note\"><h2>No warnings</h2><p>Every stage ran \
-                    within its checks. Look at the registration and the masks all the same.</p></div>\n"
-                .to_owned();
+        let items: Vec<String> = raised.cloned().chain(absent).collect();
+        match items.len() {
+            0 => "<div class=\"notice calm\" id=\"warnings\" role=\"note\"><h2>No warnings</h2><p>Every stage ran \
+                  within its checks. Look at the registration and the masks all the same.</p></div>\n"
+                .to_owned(),
+            1 => notice("warn", "1 warning", &items),
+            n => notice("warn", &format!("{n} warnings"), &items),
         }
-        let heading = if items.len() == 1 { "1 warning".to_owned() } else { format!("{} warnings", items.len()) };
-        format!(
-            "<div class=\"notice warn\" id=\"warnings\" role=\"note\"><h2><span aria-hidden=\"true\">▲</span> \
-             {heading}</h2><ul>{}</ul></div>\n",
-            items.concat()
-        )
     }
 
     fn registration_section(&self) -> Option<String> {

@@ -1,0 +1,167 @@
+//! What a BIDS data set holds: subjects, and of each the scan before and the scan after surgery.
+
+use crate::cli::{Failure, Reject};
+use crate::report::derivatives::RawScan;
+use anyhow::{Context, anyhow};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Sessions of the two scans.
+const SESSIONS: [&str; 2] = ["ses-preop", "ses-postop"];
+
+/// A data set on disk.
+#[derive(Debug)]
+pub struct Dataset {
+    /// Where it lies.
+    pub folder: PathBuf,
+    /// `sub-01`, ..., in order.
+    pub subjects: Vec<String>,
+}
+
+/// A subject's two scans.
+#[derive(Clone, Debug)]
+pub struct ScanPair {
+    /// Before surgery.
+    pub pre: RawScan,
+    /// After surgery.
+    pub post: RawScan,
+}
+
+/// Why a subject has no pair; its own fault, not that of the others.
+#[derive(Clone, Debug, Serialize)]
+pub struct NoPair(pub String);
+
+impl Dataset {
+    /// Lists the subjects, all of them or those with these labels (with or without `sub-`).
+    ///
+    /// # Errors
+    /// Rejected when the folder has no subjects or not one of those asked for.
+    pub fn open(folder: &Path, labels: &[String]) -> Result<Self, Failure> {
+        let shown = folder.display();
+        let mut subjects: Vec<String> = names(folder)
+            .with_context(|| format!("{shown}: cannot be listed; name the folder of a BIDS data set"))
+            .reject()?;
+        subjects.retain(|name| name.starts_with("sub-") && folder.join(name).is_dir());
+        if subjects.is_empty() {
+            return Err(Failure::Rejected(anyhow!(
+                "{shown}: no folder sub-*; name the folder of a BIDS data set (the one with dataset_description.json)"
+            )));
+        }
+        let wanted: Vec<String> =
+            labels.iter().map(|label| format!("sub-{}", label.strip_prefix("sub-").unwrap_or(label))).collect();
+        if let Some(absent) = wanted.iter().find(|name| !subjects.contains(name)) {
+            return Err(Failure::Rejected(anyhow!(
+                "--participant-label: {absent} is not in {shown}; it has {}",
+                subjects.join(", ")
+            )));
+        }
+        subjects.retain(|name| wanted.is_empty() || wanted.contains(name));
+        Ok(Self { folder: folder.to_path_buf(), subjects })
+    }
+
+    /// The two scans of a subject; `entities` (such as `run-2`) choose where a session has several.
+    ///
+    /// # Errors
+    /// [`NoPair`] with the remedy.
+    pub fn pair(&self, subject: &str, entities: &[String]) -> Result<ScanPair, NoPair> {
+        let [pre, post] = SESSIONS.map(|session| self.scan(subject, session, entities));
+        Ok(ScanPair { pre: pre?, post: post? })
+    }
+
+    fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, NoPair> {
+        let folder = format!("{subject}/{session}/anat");
+        let mut found = names(&self.folder.join(&folder)).unwrap_or_default();
+        let begin = format!("{subject}_{session}_");
+        found.retain(|name| {
+            let stem = name.strip_suffix(".gz").unwrap_or(name).strip_suffix("_T1w.nii");
+            // `run-2` must not choose `run-21`.
+            let has = |stem: &str, entity: &String| stem.split('_').any(|part| part == entity);
+            name.starts_with(&begin) && stem.is_some_and(|stem| entities.iter().all(|entity| has(stem, entity)))
+        });
+        match &found[..] {
+            [one] => Ok(RawScan(format!("{folder}/{one}"))),
+            [] => Err(NoPair(format!(
+                "{folder}: no {subject}_{session}_T1w.nii.gz{}; add the scan, or leave the subject out with --participant-label",
+                if entities.is_empty() { String::new() } else { format!(" with {}", entities.join(", ")) }
+            ))),
+            several => Err(NoPair(format!(
+                "{folder}: {} scans fit ({}); choose one with --entity, such as --entity {}",
+                several.len(),
+                several.join(", "),
+                distinguishing(several)
+            ))),
+        }
+    }
+}
+
+/// An entity that the first name has and the second has not.
+fn distinguishing(names: &[String]) -> &str {
+    let other: Vec<&str> = names[1].split('_').collect();
+    let mut own = names[0].split('_').skip(2).filter(|part| part.contains('-') && !other.contains(part));
+    own.next().unwrap_or("run-1")
+}
+
+/// Names in a folder, in order.
+fn names(folder: &Path) -> std::io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        names.push(entry?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dataset(files: &[&str]) -> (tempfile::TempDir, Dataset) {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let dataset = Dataset::open(folder.path(), &[]).unwrap();
+        (folder, dataset)
+    }
+
+    #[test]
+    fn a_pair_is_found_packed_or_not_and_among_other_contrasts() {
+        let (_folder, dataset) = dataset(&[
+            "sub-01/ses-preop/anat/sub-01_ses-preop_T1w.nii",
+            "sub-01/ses-preop/anat/sub-01_ses-preop_T1w.json",
+            "sub-01/ses-preop/anat/sub-01_ses-preop_T2w.nii.gz",
+            "sub-01/ses-postop/anat/sub-01_ses-postop_ce-gd_T1w.nii.gz",
+        ]);
+        let pair = dataset.pair("sub-01", &[]).unwrap();
+        assert_eq!(pair.pre.0, "sub-01/ses-preop/anat/sub-01_ses-preop_T1w.nii");
+        assert_eq!(pair.post.0, "sub-01/ses-postop/anat/sub-01_ses-postop_ce-gd_T1w.nii.gz");
+    }
+
+    #[test]
+    fn a_missing_or_doubtful_scan_is_named_with_its_remedy() {
+        let (_folder, dataset) = dataset(&[
+            "sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz",
+            "sub-01/ses-preop/anat/sub-01_ses-preop_run-21_T1w.nii.gz",
+            "sub-01/ses-postop/anat/sub-01_ses-postop_run-2_T1w.nii.gz",
+            "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii.gz",
+        ]);
+        let doubtful = dataset.pair("sub-01", &[]).unwrap_err().0;
+        assert!(doubtful.contains("2 scans fit") && doubtful.contains("--entity run-2"), "{doubtful}");
+        let chosen = dataset.pair("sub-01", &["run-2".to_owned()]).unwrap();
+        assert!(chosen.pre.0.ends_with("run-2_T1w.nii.gz"));
+        let missing = dataset.pair("sub-02", &[]).unwrap_err().0;
+        assert!(missing.contains("sub-02/ses-postop/anat") && missing.contains("--participant-label"), "{missing}");
+    }
+
+    #[test]
+    fn subjects_are_chosen_by_label_and_an_absent_one_is_refused() {
+        let (folder, dataset) = dataset(&["sub-b/x", "sub-a/x", "code/x"]);
+        assert_eq!(dataset.subjects, ["sub-a", "sub-b"]);
+        let labels = |label: &str| Dataset::open(folder.path(), &[label.to_owned()]);
+        assert_eq!(labels("sub-b").unwrap().subjects, ["sub-b"]);
+        assert_eq!(labels("b").unwrap().subjects, ["sub-b"]);
+        assert!(matches!(labels("c"), Err(Failure::Rejected(e)) if e.to_string().contains("sub-c is not in")));
+    }
+}

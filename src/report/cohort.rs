@@ -1,0 +1,287 @@
+//! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
+
+use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::resection::improvement;
+use crate::experiment::rmse::median_and_mad;
+use serde::Serialize;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How a subject of a cohort ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// Every stage ran within its checks.
+    Done,
+    /// Computed, but a boundary set is not to be believed.
+    QualityGate,
+    /// It ended with an error.
+    Failed,
+    /// It has not been run.
+    Missing,
+}
+
+/// A subject as its folder holds it.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// `sub-01`.
+    pub participant_id: String,
+    /// How it ended.
+    pub status: Status,
+    /// Why it did not end well.
+    pub message: Option<String>,
+    /// Its numbers, where there are any.
+    pub outcome: Option<ExperimentOutcome>,
+    /// Checksum of its settings: subjects with different ones are not to be compared.
+    pub settings_sha256: Option<String>,
+}
+
+/// A line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// `sub-01`.
+    pub participant_id: String,
+    /// How it ended.
+    pub status: Status,
+    /// Why it did not end well.
+    pub message: Option<String>,
+    /// The sample that explains it best, or `estimate`.
+    pub best_sample: Option<String>,
+    /// Rest against best sample at the resection margin.
+    pub verdict: Option<&'static str>,
+    /// Warnings on its page.
+    pub warnings: usize,
+    /// Numbers by the name of their column.
+    pub figures: BTreeMap<String, f64>,
+    /// Columns in which it lies apart from the others.
+    pub outlying: Vec<String>,
+    /// Its largest distance from a median, in robust standard deviations; 0 where none can be told.
+    pub distance: f64,
+}
+
+/// The table of a cohort.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cohort {
+    /// `hgm x.y.z`.
+    pub program: String,
+    /// Columns of numbers, in order; units in the names.
+    pub columns: Vec<String>,
+    /// Subjects: those that did not end well first, then by their distance from the others.
+    pub subjects: Vec<Row>,
+    /// Median of every column over the subjects that have it.
+    pub median: BTreeMap<String, f64>,
+    /// Median absolute deviation from it (not scaled).
+    pub mad: BTreeMap<String, f64>,
+    /// What a reader must know before comparing the subjects.
+    pub warnings: Vec<String>,
+}
+
+/// Iglewicz and Hoaglin (How to detect and handle outliers, 1993): apart is what lies more than 3.5 robust standard
+/// deviations from the median; a Gaussian's standard deviation is its median absolute deviation / 0.6745.
+const APART: f64 = 3.5;
+const MAD_OF_GAUSSIAN: f64 = 0.6745;
+
+impl Cohort {
+    /// The table of these subjects.
+    pub fn new(members: &[Member]) -> Self {
+        let mut columns: Vec<String> = Vec::new();
+        let mut subjects: Vec<Row> = members.iter().map(|member| row(member, &mut columns)).collect();
+        let (mut median_of, mut mad_of) = (BTreeMap::new(), BTreeMap::new());
+        for name in &columns {
+            let values: Vec<f64> = subjects.iter().filter_map(|row| row.figures.get(name)).copied().collect();
+            let Some((centre, spread)) = median_and_mad(&values) else { continue };
+            for row in &mut subjects {
+                let Some(value) = row.figures.get(name) else { continue };
+                let distance = MAD_OF_GAUSSIAN * (value - centre).abs() / spread;
+                // Without spread (one subject, equal settings) nobody can be said to lie apart.
+                if spread > 0.0 && distance > row.distance {
+                    row.distance = distance;
+                }
+                if spread > 0.0 && distance > APART {
+                    row.outlying.push(name.clone());
+                }
+            }
+            median_of.insert(name.clone(), centre);
+            mad_of.insert(name.clone(), spread);
+        }
+        subjects.sort_by(|a, b| {
+            let well = |row: &Row| row.status == Status::Done;
+            let order = well(a).cmp(&well(b)).then(b.distance.partial_cmp(&a.distance).unwrap_or(Ordering::Equal));
+            order.then_with(|| a.participant_id.cmp(&b.participant_id))
+        });
+        let settings: BTreeSet<&String> = members.iter().filter_map(|m| m.settings_sha256.as_ref()).collect();
+        let mut warnings = Vec::new();
+        if settings.len() > 1 {
+            warnings.push(format!(
+                "the subjects were run with {} different settings; compare their settings.toml or run them again",
+                settings.len()
+            ));
+        }
+        let program = concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned();
+        Self { program, columns, subjects, median: median_of, mad: mad_of, warnings }
+    }
+
+    /// The table as BIDS writes one: tabs, `n/a` where there is no value, median and spread in the last lines.
+    pub fn to_tsv(&self) -> String {
+        let cell = |value: Option<&f64>| value.map_or_else(|| "n/a".to_owned(), f64::to_string);
+        let numbers = |from: &BTreeMap<String, f64>| -> Vec<String> {
+            self.columns.iter().map(|name| cell(from.get(name))).collect()
+        };
+        let head = ["participant_id", "status", "best_sample", "verdict", "warnings"].map(str::to_owned);
+        let mut lines = vec![[&head[..], &self.columns].concat()];
+        for row in &self.subjects {
+            let text = |text: Option<&str>| text.unwrap_or("n/a").to_owned();
+            let first = [
+                row.participant_id.clone(),
+                row.status.name().to_owned(),
+                text(row.best_sample.as_deref()),
+                text(row.verdict),
+                row.warnings.to_string(),
+            ];
+            lines.push([&first[..], &numbers(&row.figures)].concat());
+        }
+        for (name, values) in [("median", &self.median), ("mad", &self.mad)] {
+            let first = [name, "n/a", "n/a", "n/a", "n/a"].map(str::to_owned);
+            lines.push([&first[..], &numbers(values)].concat());
+        }
+        lines.iter().map(|line| line.join("\t") + "\n").collect()
+    }
+}
+
+impl Status {
+    /// The word of tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::QualityGate => "quality-gate",
+            Self::Failed => "failed",
+            Self::Missing => "missing",
+        }
+    }
+}
+
+/// One subject's line; names of columns that are new are added to the end.
+fn row(member: &Member, columns: &mut Vec<String>) -> Row {
+    let mut figures = BTreeMap::new();
+    let mut add = |name: String, value: Option<f64>| {
+        let Some(value) = value else { return };
+        if !columns.contains(&name) {
+            columns.push(name.clone());
+        }
+        figures.insert(name, value);
+    };
+    let mut verdict = None;
+    if let Some(outcome) = &member.outcome {
+        let best = outcome.best();
+        for tissue in &outcome.tissues {
+            add(format!("{tissue}_sd_level"), best.and_then(|sample| sample.sd_levels.get(tissue).copied()));
+            let modulus = best.and_then(|sample| sample.shear_modulus_pa.get(tissue).copied());
+            add(format!("{tissue}_shear_modulus_pa"), modulus);
+        }
+        for posterior in outcome.estimate.iter().map(|e| &e.posterior) {
+            for (name, [low, high]) in posterior.names.iter().zip(&posterior.interval_95) {
+                let name = name.replace(' ', "_");
+                add(format!("{name}_95_low"), Some(*low));
+                add(format!("{name}_95_high"), Some(*high));
+            }
+        }
+        for set in outcome.rmse_sets() {
+            add(format!("rest_rmse_{set}_mm"), outcome.rest_rmse_mm.get(&set).copied());
+            add(format!("rmse_{set}_mm"), best.and_then(|sample| sample.rmse_mm.get(&set).copied()));
+        }
+        let floor = outcome.noise_floor.unwrap_or_default();
+        add("noise_floor_mm".to_owned(), floor.combined_mm());
+        let volumes = outcome.volumes.unwrap_or_default();
+        add("resected_cc".to_owned(), volumes.resected_cc);
+        add("cavity_cc".to_owned(), volumes.cavity_cc);
+        add("ventricle_before_cc".to_owned(), volumes.ventricle_before_cc);
+        add("ventricle_after_cc".to_owned(), volumes.ventricle_after_cc);
+        add("brain_cc".to_owned(), volumes.brain_cc);
+        add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
+        let margin = (outcome.rest_rmse_mm.get("margin"), best.and_then(|sample| sample.rmse_mm.get("margin")));
+        if let (Some(rest), Some(deformed)) = margin {
+            verdict = Some(improvement(*rest, *deformed, &floor));
+        }
+    }
+    Row {
+        participant_id: member.participant_id.clone(),
+        status: member.status.clone(),
+        message: member.message.clone(),
+        best_sample: member.outcome.as_ref().and_then(|o| o.best_sample.clone()),
+        verdict,
+        warnings: member.outcome.as_ref().map_or(0, |o| o.warnings.len()),
+        figures,
+        outlying: Vec::new(),
+        distance: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::SampleOutcome;
+
+    fn member(name: &str, status: Status, rmse_mm: Option<f64>) -> Member {
+        let outcome = rmse_mm.map(|rmse| ExperimentOutcome {
+            tissues: vec!["brain".to_owned()],
+            samples: vec![SampleOutcome {
+                id: "sample-00".to_owned(),
+                shear_modulus_pa: BTreeMap::from([("brain".to_owned(), 500.0)]),
+                rmse_mm: BTreeMap::from([("margin".to_owned(), rmse)]),
+                ..SampleOutcome::default()
+            }],
+            best_sample: Some("sample-00".to_owned()),
+            rest_rmse_mm: BTreeMap::from([("margin".to_owned(), 3.0)]),
+            ..ExperimentOutcome::default()
+        });
+        let message = (status == Status::Failed).then(|| "no brain".to_owned());
+        Member { participant_id: name.to_owned(), status, message, outcome, settings_sha256: None }
+    }
+
+    fn cohort() -> Cohort {
+        let mut members: Vec<Member> = [1.0, 1.1, 9.0, 1.2, 0.9]
+            .into_iter()
+            .enumerate()
+            .map(|(n, rmse)| member(&format!("sub-{n}"), Status::Done, Some(rmse)))
+            .collect();
+        members.push(member("sub-x", Status::Failed, None));
+        Cohort::new(&members)
+    }
+
+    #[test]
+    fn who_failed_comes_first_then_who_lies_apart() {
+        let cohort = cohort();
+        let order: Vec<&str> = cohort.subjects.iter().map(|row| row.participant_id.as_str()).collect();
+        // sub-3 and sub-0 are as far from 1.1 mm: by name.
+        assert_eq!(order, ["sub-x", "sub-2", "sub-4", "sub-0", "sub-3", "sub-1"]);
+        assert_eq!(cohort.subjects[1].outlying, ["rmse_margin_mm"]);
+        assert!(cohort.subjects[2..].iter().all(|row| row.outlying.is_empty()));
+    }
+
+    #[test]
+    fn median_and_spread_are_of_those_who_have_a_figure() {
+        let cohort = cohort();
+        assert_eq!(cohort.median["rmse_margin_mm"], 1.1);
+        assert!((cohort.mad["rmse_margin_mm"] - 0.1).abs() < 1e-12);
+        // Equal values have no spread, and nobody lies apart in them.
+        assert_eq!((cohort.median["brain_shear_modulus_pa"], cohort.mad["brain_shear_modulus_pa"]), (500.0, 0.0));
+    }
+
+    #[test]
+    fn the_table_has_a_cell_for_every_column_of_every_line() {
+        let text = cohort().to_tsv();
+        let cells: Vec<usize> = text.lines().map(|line| line.split('\t').count()).collect();
+        assert!(cells.len() == 9 && cells.iter().all(|n| *n == cells[0]), "{cells:?}");
+        assert!(text.contains("sub-x\tfailed\tn/a"));
+    }
+
+    #[test]
+    fn different_settings_are_warned_of() {
+        let settings = |name: &str, sum: &str| Member {
+            settings_sha256: Some(sum.to_owned()),
+            ..member(name, Status::Done, Some(1.0))
+        };
+        assert!(Cohort::new(&[settings("sub-1", "a"), settings("sub-2", "a")]).warnings.is_empty());
+        assert!(Cohort::new(&[settings("sub-1", "a"), settings("sub-2", "b")]).warnings[0].contains("2 different"));
+    }
+}

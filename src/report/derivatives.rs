@@ -1,0 +1,206 @@
+//! A patient's case folder under the names of the Brain Imaging Data Structure (BIDS), each image with a sidecar that
+//! says what it shows, in which space, from which scans and by which settings.
+
+use super::hand_off::CaseFile;
+use crate::artefact::Manifest;
+use crate::segment::label;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// BIDS's name of the template's space; it is reached rigidly, so sizes stay the patient's.
+const TEMPLATE: &str = "MNI152NLin2009aSym";
+const BIDS_VERSION: &str = "1.10.0";
+
+/// Why a case cannot be put under BIDS names.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum DerivativesError {
+    #[error("{file}: cannot be read ({source}); run the participant again")]
+    Read { file: String, source: std::io::Error },
+    #[error("{file}: not a manifest ({source}); run the participant again with --force")]
+    Manifest { file: String, source: serde_json::Error },
+}
+
+/// A scan of the input data set by its path there: `sub-01/ses-preop/anat/sub-01_ses-preop_T1w.nii.gz`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RawScan(pub String);
+
+impl RawScan {
+    /// Path up to the suffix: `sub-01/ses-preop/anat/sub-01_ses-preop`.
+    fn stem(&self) -> &str {
+        let end = self.0.rfind("_T1w.nii").unwrap_or(self.0.len());
+        &self.0[..end]
+    }
+
+    /// Its address for other data sets.
+    fn uri(&self) -> String {
+        format!("bids:raw:{}", self.0)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Of {
+    Pre,
+    Post,
+}
+
+/// Images: file of the case, scan it belongs to, BIDS name behind the scan's, description, type of a mask.
+const IMAGES: &[(&str, Of, &str, &str, Option<&str>)] = &[
+    ("pre_space-MNI_T1w", Of::Pre, "space-T_T1w", "The scan on the template's grid, moved rigidly", None),
+    ("post_space-MNI_T1w", Of::Post, "space-T_T1w", "The scan on the template's grid, moved rigidly", None),
+    ("pre_space-MNI_dseg", Of::Pre, "space-T_dseg", "Tissue labels", None),
+    ("pre_space-native_dseg", Of::Pre, "dseg", "Tissue labels", None),
+    ("pre_space-MNI_desc-brain_mask", Of::Pre, "space-T_desc-brain_mask", "Brain", Some("Brain")),
+    ("post_space-MNI_desc-brain_mask", Of::Post, "space-T_desc-brain_mask", "Brain without the cavity", Some("Brain")),
+    ("pre_space-native_desc-brain_mask", Of::Pre, "desc-brain_mask", "Brain", Some("Brain")),
+    ("post_space-native_desc-brain_mask", Of::Post, "desc-brain_mask", "Brain without the cavity", Some("Brain")),
+    ("pre_space-MNI_label-resected_mask", Of::Pre, "space-T_label-resected_mask", "Tissue that was taken", Some("ROI")),
+    ("pre_space-native_label-resected_mask", Of::Pre, "label-resected_mask", "Tissue that was taken", Some("ROI")),
+    ("post_space-MNI_label-cavity_mask", Of::Post, "space-T_label-cavity_mask", "Resection cavity", Some("ROI")),
+    ("post_space-native_label-cavity_mask", Of::Post, "label-cavity_mask", "Resection cavity", Some("ROI")),
+    ("post_space-MNI_label-ventricle_mask", Of::Post, "space-T_label-ventricle_mask", "Ventricles", Some("ROI")),
+];
+
+/// Transforms: file of the case, scan, BIDS name behind the scan's, description.
+const TRANSFORMS: &[(&str, Of, &str, &str)] = &[
+    ("from-pre_to-MNI.tfm", Of::Pre, "from-T1w_to-T_mode-image_xfm.tfm", "ITK: resamples the scan to the template"),
+    ("from-pre_to-MNI.txt", Of::Pre, "from-T1w_to-T_mode-points_xfm.txt", "4x4, RAS, mm: maps points of the scan"),
+    ("from-post_to-pre.tfm", Of::Post, "from-T1w_to-preop_mode-image_xfm.tfm", "ITK: resamples the scan to ses-preop"),
+    (
+        "from-post_to-pre.txt",
+        Of::Post,
+        "from-T1w_to-preop_mode-points_xfm.txt",
+        "4x4, RAS, mm: maps points of the scan",
+    ),
+];
+
+/// What a case's images, transforms and page are called in the derivatives, with their bytes. Meshes and simulations
+/// stay in the case folder: BIDS has no names for them.
+///
+/// # Errors
+/// [`DerivativesError`] when the case is not finished.
+pub fn subject_files(case: &Path, pre: &RawScan, post: &RawScan) -> Result<Vec<CaseFile>, DerivativesError> {
+    let read = |file: String| {
+        std::fs::read(case.join(&file)).map_err(|source| DerivativesError::Read { file: file.clone(), source })
+    };
+    let manifest = |stage: &str| -> Result<Manifest, DerivativesError> {
+        let file = format!(".stages/{stage}.manifest.json");
+        let bytes = read(file.clone())?;
+        serde_json::from_slice(&bytes).map_err(|source| DerivativesError::Manifest { file, source })
+    };
+    let (registration, anat) = (manifest("registration")?, manifest("anat")?);
+    let both = [pre.uri(), post.uri()];
+    let made_by = |extra: Value| {
+        let mut sidecar = json!({
+            "RawSources": both, "GeneratedBy": generated_by(), "Seed": registration.settings["seed"],
+            "Settings": {"register": registration.settings, "anat": anat.settings},
+        });
+        sidecar.as_object_mut().into_iter().zip(extra.as_object()).for_each(|(all, extra)| all.extend(extra.clone()));
+        sidecar
+    };
+    let mut files = Vec::new();
+    let mut add = |scan: &RawScan, name: &str, bytes: Vec<u8>, sidecar: &Value| {
+        let path = format!("{}_{}", scan.stem(), name.replace("-T_", &format!("-{TEMPLATE}_")));
+        let stem = path.trim_end_matches(".nii.gz").trim_end_matches(".tfm").trim_end_matches(".txt");
+        files.push((format!("{stem}.json"), pretty(sidecar)));
+        files.push((path, bytes));
+    };
+    for &(file, of, name, description, mask) in IMAGES {
+        let scan = if of == Of::Pre { pre } else { post };
+        let in_template = name.starts_with("space-");
+        // A T1 comes from one scan; where the knife was takes both.
+        let sources = if name.ends_with("T1w") { vec![scan.uri()] } else { both.to_vec() };
+        let mut own = json!({
+            "Description": description, "Sources": sources,
+            "SpatialReference": if in_template { TEMPLATE.to_owned() } else { scan.uri() },
+        });
+        if name.ends_with("T1w") {
+            own["SkullStripped"] = json!(false);
+        }
+        if let Some(kind) = mask {
+            own["Type"] = json!(kind);
+        }
+        add(scan, &format!("{name}.nii.gz"), read(format!("anat/{file}.nii.gz"))?, &made_by(own));
+    }
+    for &(file, of, name, description) in TRANSFORMS {
+        let scan = if of == Of::Pre { pre } else { post };
+        let own = json!({"Description": description, "Sources": both});
+        add(scan, name, read(format!("xfm/{file}"))?, &made_by(own));
+    }
+    let subject = pre.0.split('/').next().unwrap_or_default();
+    files.push((format!("{subject}.html"), read("report.html".to_owned())?));
+    Ok(files)
+}
+
+fn generated_by() -> Value {
+    json!([{"Name": "hgm", "Version": env!("CARGO_PKG_VERSION")}])
+}
+
+/// What lies once at the top of the derivatives. `raw` is where the input data set is from there, or its DOI.
+pub fn dataset_files(raw: Option<&str>) -> Vec<CaseFile> {
+    let mut description = json!({
+        "Name": "hgm: brain deformation after resection",
+        "BIDSVersion": BIDS_VERSION,
+        "DatasetType": "derivative",
+        "GeneratedBy": generated_by(),
+    });
+    if let Some(raw) = raw {
+        description["DatasetLinks"] = json!({ "raw": raw });
+    }
+    let labels = [label::CSF, label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE];
+    let names = labels.iter().fold("index\tname\n".to_owned(), |table, &l| {
+        table + &format!("{l}\t{}\n", label::name(l).unwrap_or_default())
+    });
+    vec![
+        ("dataset_description.json".to_owned(), pretty(&description)),
+        ("README".to_owned(), README.as_bytes().to_vec()),
+        (".bidsignore".to_owned(), IGNORED.as_bytes().to_vec()),
+        ("dseg.tsv".to_owned(), names.into_bytes()),
+    ]
+}
+
+/// BIDS has no names for meshes, simulations, transforms of this kind and pages.
+const IGNORED: &str = "sub-*/hgm\n*_xfm.*\n*.html\n/group.*\n/logs\n";
+
+const README: &str = "\
+What hgm made of the T1 pairs (ses-preop, ses-postop) of the data set that bids:raw: stands for in the sidecars.
+
+sub-X.html                the subject's page; group.html has all subjects, outliers first
+sub-X/ses-*/anat          images, labels and masks; dseg.tsv names the labels
+sub-X/hgm                 the subject's case folder: meshes, simulations, transforms, settings, checksums
+logs/sub-X.json           why a subject could not be done (absent when it could)
+group.json, group.tsv     a line of figures per subject, with median and median absolute deviation
+
+space-MNI152NLin2009aSym is reached by a rigid motion: sizes stay the patient's. Lengths are mm, RAS+; moduli Pa.
+Research software, not a medical device.
+";
+
+fn pretty(value: &Value) -> Vec<u8> {
+    format!("{value:#}\n").into_bytes()
+}
+
+/// Where the derivatives' folder finds the data set it was made from: the way up where it lies inside of it. `None`
+/// elsewhere: a path of this machine means nothing to a reader.
+pub fn way_up(from: &Path, to: &Path) -> Option<String> {
+    let inside: PathBuf = from.strip_prefix(to).ok()?.to_path_buf();
+    Some(vec![".."; inside.components().count()].join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entities_of_the_scan_stay_in_front_of_those_of_the_derivative() {
+        let scan = RawScan("sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz".to_owned());
+        assert_eq!(scan.stem(), "sub-01/ses-preop/anat/sub-01_ses-preop_run-2");
+        assert_eq!(scan.uri(), "bids:raw:sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz");
+    }
+
+    #[test]
+    fn the_way_to_the_raw_data_names_no_folder() {
+        assert_eq!(way_up(Path::new("/data/b/derivatives/hgm"), Path::new("/data/b")), Some("../..".to_owned()));
+        assert_eq!(way_up(Path::new("/scratch/out"), Path::new("/data/b")), None);
+    }
+}

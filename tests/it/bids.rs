@@ -1,0 +1,108 @@
+//! `hgm bids`: a data set in, valid derivatives and one table out.
+
+use crate::job::{contents, output, sample};
+use crate::python::tool;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Settings that make a subject cheap.
+pub const COARSE: [&str; 4] = ["--mesher", "lattice", "--cells", "3000"];
+
+/// A data set of two patients: the sample pair and a synthetic one.
+pub fn data_set(folder: &Path) -> PathBuf {
+    let raw = folder.join("study");
+    let patient = folder.join("synthetic");
+    let made = output(&["synth", "--seed", "5", "--spacing-mm", "3", "-o", patient.to_str().unwrap()]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    for (subject, [pre, post]) in [
+        ("sub-01", [sample("pre.nii.gz"), sample("post.nii.gz")]),
+        ("sub-02", [patient.join("pre.nii.gz"), patient.join("post.nii.gz")]),
+    ] {
+        for (session, scan) in [("ses-preop", pre), ("ses-postop", post)] {
+            let anat = raw.join(subject).join(session).join("anat");
+            std::fs::create_dir_all(&anat).unwrap();
+            std::fs::copy(scan, anat.join(format!("{subject}_{session}_T1w.nii.gz"))).unwrap();
+        }
+    }
+    std::fs::write(raw.join("dataset_description.json"), r#"{"Name": "two", "BIDSVersion": "1.10.0"}"#).unwrap();
+    raw
+}
+
+fn text(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+#[test]
+fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without_a_scan_stops_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = data_set(folder.path());
+    std::fs::create_dir_all(raw.join("sub-00/ses-preop/anat")).unwrap();
+    let out = raw.join("derivatives/hgm");
+    let bids = |rest: &[&str]| output(&[&["bids", raw.to_str().unwrap(), out.to_str().unwrap()], rest].concat());
+
+    assert_eq!(bids(&["group"]).status.code(), Some(3), "a group of nobody");
+    let planned = bids(&["participant", "--dry-run", "--json"]);
+    let planned: Value = serde_json::from_slice(&planned.stdout).unwrap();
+    assert!(planned["subjects"][0]["message"].as_str().unwrap().contains("sub-00_ses-preop_T1w.nii.gz"));
+    assert!(planned["subjects"][2]["pre"].as_str().unwrap().ends_with("sub-02_ses-preop_T1w.nii.gz"));
+
+    let stopped = bids(&["participant", "--stop-on-first-crash"]);
+    assert_eq!(stopped.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&stopped.stderr).contains("2 not begun"));
+    let run = bids(&[&["participant"], &COARSE[..]].concat());
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(3), "{said}");
+    assert!(said.contains("1 of 3 subjects did not end well: sub-00"), "{said}");
+    let first = contents(&out);
+    let table = bids(&["group"]);
+    assert!(table.status.success(), "{}", String::from_utf8_lossy(&table.stderr));
+
+    // What is there is not computed again, and comes out the same.
+    let again =
+        bids(&["participant", "--participant-label", "sub-01", "02", COARSE[0], COARSE[1], COARSE[2], COARSE[3]]);
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    let second = contents(&out);
+    assert!(first.iter().all(|(name, bytes)| second.get(name) == Some(bytes)));
+
+    let group: Value = serde_json::from_str(&text(&out.join("group.json"))).unwrap();
+    let subjects = group["subjects"].as_array().unwrap();
+    assert_eq!((&subjects[0]["participant_id"], &subjects[0]["status"]), (&"sub-00".into(), &"failed".into()));
+    let modulus = |n: usize| subjects[n]["figures"]["brain_shear_modulus_pa"].as_f64().unwrap();
+    let middle = group["median"]["brain_shear_modulus_pa"].as_f64().unwrap();
+    assert!((middle - f64::midpoint(modulus(1), modulus(2))).abs() < 1e-9);
+    let page = text(&out.join("group.html"));
+    assert!(page.contains("href=\"sub-01.html\"") && out.join("sub-01.html").exists());
+    assert!(!page.contains("href=\"sub-00.html\"") && page.contains("sub-00: failed"));
+
+    let sidecar = out.join("sub-02/ses-postop/anat/sub-02_ses-postop_space-MNI152NLin2009aSym_label-cavity_mask.json");
+    let sidecar: Value = serde_json::from_str(&text(&sidecar)).unwrap();
+    assert_eq!(sidecar["Sources"][1], "bids:raw:sub-02/ses-postop/anat/sub-02_ses-postop_T1w.nii.gz");
+    assert!(sidecar["Seed"].is_u64() && sidecar["Settings"]["anat"]["cavity"].is_object());
+    for (name, bytes) in &second {
+        let here = folder.path().to_str().unwrap().as_bytes();
+        assert!(!bytes.windows(here.len()).any(|part| part == here), "{name} names a folder of this machine");
+    }
+
+    let said = tool(folder.path(), "bids-validator-deno", &["--format", "json", out.to_str().unwrap()]);
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let issues = said["issues"]["issues"].as_array().unwrap();
+    let errors: Vec<&Value> = issues.iter().filter(|issue| issue["severity"] == "error").collect();
+    assert!(errors.is_empty(), "{errors:#?}");
+    assert_eq!(said["summary"]["subjects"].as_array().unwrap().len(), 2, "the validator saw both");
+    // The validator is awake: a mask without its scan's entities is an error.
+    let mask = out.join("sub-01/ses-preop/anat/sub-01_ses-preop_desc-brain_mask.nii.gz");
+    std::fs::rename(&mask, mask.with_file_name("brain.nii.gz")).unwrap();
+    let said = tool(folder.path(), "bids-validator-deno", &["--format", "json", out.to_str().unwrap()]);
+    assert!(said.contains("NOT_INCLUDED"), "{said}");
+}
+
+#[test]
+fn a_folder_without_subjects_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path().to_str().unwrap();
+    let out = folder.path().join("out");
+    let refused = output(&["bids", here, out.to_str().unwrap(), "participant"]);
+    assert_eq!(refused.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no folder sub-*"));
+    assert!(!out.exists());
+}
