@@ -76,6 +76,7 @@ fn of_phantom(
         poisson_ratio: settings.poisson_ratio,
         reference: &Reference::Nodes(displacement),
         after: &made,
+        sag: None,
         noise_mm: options.phantom_noise_mm,
     };
     Ok(case::estimate(case, &input, options, session)?.1)

@@ -13,8 +13,10 @@ use crate::experiment::prior::samples_of_prior;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::shard;
 use crate::experiment::sweep::{Reference, best_sample};
+use crate::geometry::Mni;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use crate::register::deformable::DisplacementField;
 use std::collections::BTreeMap;
 
 /// Settings by room, as `settings.toml` keeps them.
@@ -38,6 +40,8 @@ pub struct Patient {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
+    /// Where the images say the brain has gone.
+    sag: DisplacementField<Mni>,
 }
 
 impl Patient {
@@ -48,9 +52,10 @@ impl Patient {
     pub fn new(case: &Case, prepared: Prepared, settings: ResectionSettings) -> Result<Self, Failure> {
         let mesh_bytes = case.read(REST_MESH)?;
         let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
-        let surfaces = case::observed_surfaces(&Anatomy::read(case)?);
+        let anatomy = Anatomy::read(case)?;
+        let surfaces = case::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces).reject()?);
-        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference })
+        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference, sag: anatomy.sag })
     }
 
     /// A case that `hgm prep` or `hgm run` has made, with the settings it was made with.
@@ -149,6 +154,7 @@ impl Patient {
             poisson_ratio: self.settings.poisson_ratio,
             reference: &self.reference,
             after: &self.prepared.manifests[3],
+            sag: Some(&self.sag),
             noise_mm: self.floor().combined_mm().unwrap_or(options.descent.noise_mm),
         };
         let (manifest, facts) = case::estimate(&self.case, &input, options, session)?;

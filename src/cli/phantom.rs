@@ -56,7 +56,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let template = atlas::template();
     let labels_stage = Stage::new("labels", VERSION, &case.folder, &()).input("atlas", &template.labels.data);
     let (labelled, ()) = case.run(&labels_stage, "labels", || Ok(Produced::default()))?;
-    let (meshed, mesh_facts) = case::mesh(&case, &template.labels, &args.mesh, &labelled, session)?;
+    let (meshed, mesh_facts) = case::mesh(&case, &template.labels, None, &args.mesh, &labelled, session)?;
     let mesh = case::rest_mesh(&case)?;
 
     let scenario = settings.scenario();

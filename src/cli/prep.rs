@@ -66,7 +66,8 @@ pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, 
     let (registered, registration) = case::registration(case, &scans, session)?;
     let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
     let anatomy = Anatomy::read(case)?;
-    let (meshed, mesh) = case::mesh(case, &anatomy.labels, &args.mesh, &segmented, session)?;
+    let landmarks = Some(&anatomy.template_from_patient);
+    let (meshed, mesh) = case::mesh(case, &anatomy.labels, landmarks, &args.mesh, &segmented, session)?;
     let observed = case::reference(case, &anatomy, &segmented)?;
     Ok(Prepared { manifests: vec![registered, segmented, meshed, observed], registration, anat, mesh })
 }

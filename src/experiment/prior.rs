@@ -1,6 +1,6 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
-use super::estimate::LogPrior;
+use super::estimate::{LogPrior, Scale};
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{SampleSettings, SampledMaterial, sample_shear_moduli};
 use crate::material::meta_model::FitError;
@@ -105,6 +105,7 @@ pub fn log_prior(tissue: &Tissue, prior: &PriorSettings) -> Result<LogPrior, Pri
         name: format!("shear_modulus_pa of {}", tissue.name),
         mean: log(1),
         sd: Some(0.5 * (log(2) - log(0))),
+        scale: Scale::Logarithm,
     })
 }
 

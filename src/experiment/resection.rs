@@ -2,7 +2,7 @@
 
 use super::outcome::NoiseFloor;
 use super::sample::Tissue;
-use crate::fem::{Loads, Scenario, SolverSettings};
+use crate::fem::{Loads, PressureLoad, Scenario, SolverSettings};
 use serde::{Deserialize, Serialize};
 
 /// Loads, supports and samples of a patient's sweep.
@@ -18,6 +18,8 @@ pub struct ResectionSettings {
     /// drained). Gravity fixes only modulus / density, so a modulus is only as good as this assumption; 100 is a
     /// brain of which about a fifteenth of the weight is no longer carried.
     pub density_kg_per_m3: f64,
+    /// Pressures on sets (ventricle wall, margin); none by default.
+    pub pressure: Vec<PressureLoad>,
     /// Poisson's ratio of every tissue.
     pub poisson_ratio: f64,
     /// Levels of the prior that are tried, in standard deviations.
@@ -36,6 +38,7 @@ impl Default for ResectionSettings {
             tissues: 1,
             gravity_m_per_s2: [0.0, 0.0, -9.81],
             density_kg_per_m3: 100.0,
+            pressure: Vec::new(),
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
             fixed: vec!["base".to_owned(), "falx".to_owned()],
@@ -58,6 +61,7 @@ impl ResectionSettings {
             loads: Loads {
                 gravity_m_per_s2: self.gravity_m_per_s2,
                 density_kg_per_m3: self.density_kg_per_m3,
+                pressure: self.pressure.clone(),
                 ..Loads::default()
             },
             solver: self.solver.clone(),

@@ -13,7 +13,7 @@ use super::{FemError, State, reduce};
 use crate::material::law::Parameter;
 use serde::{Deserialize, Serialize};
 
-/// What a displacement is differentiated by; always the logarithm of it.
+/// What a displacement is differentiated by: the logarithm of it, but for [`By::Gravity`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum By {
@@ -27,6 +27,8 @@ pub enum By {
     },
     /// One load.
     Load(Load),
+    /// Gravity along an axis (0 to 2 for x to z) of the mesh, per m/s2 instead of per logarithm: the way gravity turns.
+    Gravity(usize),
     /// Everything that moves the body: all loads and all prescribed displacements together.
     AllLoads,
 }
@@ -126,6 +128,17 @@ impl<'a> Linearised<'a> {
                 let found = self.model.load_parts.iter().find(|(part, _)| part == load);
                 let missing = || FemError::NoParameter { what: format!("load {load:?}") };
                 found.map(|(_, forces)| forces.clone()).ok_or_else(missing)
+            }
+            By::Gravity(axis) => {
+                // The weight of a node is its mass times gravity.
+                let g = self.model.scenario.loads.gravity_m_per_s2;
+                let squared: f64 = g.iter().map(|v| v * v).sum();
+                let mut forces = self.driving_force(&By::Load(Load::Weight))?;
+                for force in &mut forces {
+                    let mass_kg = (0..3).map(|i| force[i] * g[i]).sum::<f64>() / squared;
+                    *force = [0, 1, 2].map(|i| if i == *axis { mass_kg } else { 0.0 });
+                }
+                Ok(forces)
             }
             By::AllLoads => {
                 if self.model.prescribed.is_empty() {

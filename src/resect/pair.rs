@@ -1,7 +1,7 @@
 //! A pre- and a post-operative scan taken apart together.
 
 use super::blood::{SaggedPair, with_blood};
-use super::cavity::{both, either};
+use super::cavity::both;
 use super::{
     CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, find_cavity, on_the_scale_of, subtract,
 };
@@ -35,7 +35,14 @@ impl Default for PairSettings {
     fn default() -> Self {
         Self {
             deformable: DeformableSettings::default(),
-            sag: DeformableSettings { affine: false, ..DeformableSettings::default() },
+            // One brain twice: its sag is smoother than what differs between heads, and worth more iterations.
+            sag: DeformableSettings {
+                affine: false,
+                iterations: vec![40, 40, 30],
+                update_sigma_voxels: 4.0,
+                least_gain: 5e-4,
+                ..DeformableSettings::default()
+            },
             segment: SegmentSettings::default(),
             cavity: CavitySettings::default(),
         }
@@ -62,6 +69,8 @@ pub struct OperatedBrain {
     pub post: Segmentation<Post>,
     /// Cavity, resected tissue, side.
     pub finding: CavityFinding,
+    /// The template deformed onto the pre-operative head; both in the MNI frame reached rigidly.
+    pub template: AtlasFit<Mni>,
     /// Where the pre-operative brain lies after the operation, around the cavity; both in the MNI frame reached rigidly.
     pub sag: AtlasFit<Mni>,
     /// Ventricles of the post-operative scan, apart from the cavity.
@@ -178,11 +187,11 @@ pub fn take_pair_apart(
         return Err(PairError::NoVentricle);
     }
     let post_brain = apart_from(&after.brain_mni, &finding.cavity, 0.0);
-    Ok(OperatedBrain { pre: before, post: after, finding, sag, post_ventricle, post_brain })
+    Ok(OperatedBrain { pre: before, post: after, finding, template: pre_fit, sag, post_ventricle, post_brain })
 }
 
 /// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
-const RIM_MM: f64 = 5.0;
+const RIM_MM: f64 = 3.0;
 
 /// The pre-operative brain deformed onto the post-operative one around the cavity. Both lie on one grid.
 fn fitted_sag(
@@ -201,11 +210,10 @@ fn fitted_sag(
     fit_atlas(&post, &pre, Some(&dilate(cavity, 1.5)), settings)
 }
 
-/// The tissue that filled the cavity: what lies where it is now, and what lies there once the sag is undone. Tissue closes
-/// in on a cavity, so that neither alone is all of it.
+/// The tissue that filled the cavity: what lies there once the sag is undone.
 fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
     let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid);
-    both(&either(cavity, &undone.map(|share| share >= 0.5)), &before.brain_mni)
+    both(&undone.map(|share| share >= 0.5), &before.brain_mni)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

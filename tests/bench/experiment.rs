@@ -2,7 +2,7 @@
 
 use crate::bar::{Bar, cpu_seconds, data};
 use hgm::experiment::counter_rng::CounterRng;
-use hgm::experiment::estimate::{Estimate, EstimateSettings, LogPrior, Observation, Problem, Unknown, solve_problem};
+use hgm::experiment::estimate::{Estimate, EstimateSettings, Observation, Problem, Unknown, solve_problem};
 use hgm::experiment::phantom::PhantomSettings;
 use hgm::experiment::prior::{PriorSettings, samples_of_prior};
 use hgm::experiment::sample::Tissue;
@@ -134,7 +134,7 @@ fn estimated(
     let unknown = |tissue: Tissue| {
         let unknown = Unknown::ShearModulus(tissue);
         // Hardly a prior: what is measured here is what the data say.
-        let prior = LogPrior { name: unknown.name(), mean: 1000f64.ln(), sd: Some(3.0) };
+        let prior = unknown.prior(1000f64.ln(), 3.0);
         (unknown, prior)
     };
     let problem = Problem {
@@ -144,6 +144,7 @@ fn estimated(
         poisson_ratio: 0.45,
         observation: Observation::Nodes(observed),
         independent_share: 1.0,
+        model_log_sd: 0.0,
         start,
     };
     solve_problem(problem, &EstimateSettings { noise_mm, ..EstimateSettings::default() }).unwrap()

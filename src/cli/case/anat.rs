@@ -7,9 +7,10 @@ use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::ResectionVolumes;
 use crate::geometry::{Frame, Mni};
-use crate::image::nifti::{self, ReadOptions, encode_i16, encode_mask, encode_u8};
+use crate::image::nifti::{self, ReadOptions, encode_i16, encode_mask, encode_u8, encode_vectors};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
+use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, take_pair_apart};
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
@@ -21,6 +22,10 @@ const VERSION: u32 = 3;
 const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
 const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
 const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";
+/// How far the brain has moved from one scan to the other, mm; read where it was before.
+const SAG: &str = "anat/pre_space-MNI_desc-sag_displacement.nii.gz";
+/// How far a point of the patient lies from its like in the template, mm.
+const TO_TEMPLATE: &str = "anat/pre_space-MNI_desc-template_displacement.nii.gz";
 const POST_VENTRICLE: &str = "anat/post_space-MNI_label-ventricle_mask.nii.gz";
 
 /// What the report says of the masks.
@@ -43,6 +48,10 @@ pub struct Anatomy {
     pub cavity: Mask<Mni>,
     /// Ventricles on the post-operative scan, apart from the cavity.
     pub post_ventricle: Mask<Mni>,
+    /// Where the brain has moved to, around the cavity.
+    pub sag: DisplacementField<Mni>,
+    /// Where a point of the patient lies in the template.
+    pub template_from_patient: DisplacementField<Mni>,
 }
 
 impl Anatomy {
@@ -58,13 +67,17 @@ impl Anatomy {
             Ok(volume.relabelled::<Mni>().map(|l| l > 0))
         };
         let (cavity, resected, post_ventricle) = (mask(CAVITY)?, mask(RESECTED)?, mask(POST_VENTRICLE)?);
+        let field = |name: &str| -> Result<DisplacementField<Mni>, Failure> {
+            let displacement = nifti::decode_vectors(&case.read(name)?, name).reject()?;
+            Ok(DisplacementField::from_displacement(&displacement.relabelled()))
+        };
         let mut labels: LabelMap<Mni> = labels.relabelled();
         for (l, taken) in labels.data.iter_mut().zip(&resected.data) {
             if *taken && *l != label::VENTRICLE {
                 *l = label::RESECTED;
             }
         }
-        Ok(Self { labels, cavity, post_ventricle })
+        Ok(Self { labels, cavity, post_ventricle, sag: field(SAG)?, template_from_patient: field(TO_TEMPLATE)? })
     }
 }
 
@@ -127,7 +140,7 @@ pub fn anat(
             bar.inc(1);
             bar.set_message(what);
         };
-        let OperatedBrain { pre: before, post: after, finding: found, post_ventricle, post_brain, .. } =
+        let OperatedBrain { pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain } =
             take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &settings, step)
                 .reject()?;
 
@@ -145,6 +158,8 @@ pub fn anat(
         write(CAVITY, encode_mask(&found.cavity));
         write(RESECTED, encode_mask(&found.resected));
         write(POST_VENTRICLE, encode_mask(&post_ventricle));
+        write(SAG, encode_vectors(&sag.subject_from_atlas.displacement_mm()));
+        write(TO_TEMPLATE, encode_vectors(&template.atlas_from_subject.displacement_mm()));
         write("anat/pre_space-native_desc-brain_mask.nii.gz", encode_mask(&before.brain));
         write("anat/pre_space-native_dseg.nii.gz", encode_u8(&before.labels));
         write("anat/post_space-native_desc-brain_mask.nii.gz", encode_mask(&after.brain));

@@ -4,21 +4,22 @@ use super::{Case, Failure, REST_MESH, Reject, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::{MeshOutcome, SetOutcome};
-use crate::geometry::{Frame, Mni};
+use crate::geometry::{Frame, Mni, Position};
 use crate::image::LabelMap;
 use crate::mesh::engine::{Engine, EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
+use crate::register::deformable::DisplacementField;
 use crate::segment::{label, with_closed_sulci};
-use crate::tag::{TagError, TagSettings, falx_sheet, tag_boundary_sets};
+use crate::tag::{TagError, TagSettings, falx_sheet, tag_boundary_sets_with};
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Sulci and fissures up to twice this width are closed in the mesh.
@@ -80,12 +81,14 @@ pub fn mesh_stage(
 }
 
 /// Meshes a label map (grey, white, ventricle, resected), tags the sets, leaves only the tissue, writes the rest mesh.
+/// `template_from_labels` carries the landmarks of the template onto a patient; without it they are taken where they are.
 ///
 /// # Errors
 /// Rejected label maps and engines that fail.
 pub fn mesh(
     case: &Case,
     labels: &LabelMap<Mni>,
+    template_from_labels: Option<&DisplacementField<Mni>>,
     options: &MeshOptions,
     after: &Manifest,
     session: &Session,
@@ -94,7 +97,11 @@ pub fn mesh(
     case.run(&stage, "mesh", || {
         let body = with_closed_sulci(labels, SULCUS_MM);
         let (mut whole, record) = mesh_labels(&body, &settings, &programs()).reject()?;
-        let tags = tag_boundary_sets(&mut whole, &tag_settings).map_err(|error| match error {
+        let in_template = |p: [f64; 3]| match template_from_labels {
+            Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
+            None => p,
+        };
+        let tags = tag_boundary_sets_with(&mut whole, &tag_settings, in_template).map_err(|error| match error {
             TagError::Empty { .. } => Failure::QualityGate(error.into()),
             TagError::NoTissue => Failure::Rejected(error.into()),
         })?;

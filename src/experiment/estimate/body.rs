@@ -1,12 +1,13 @@
 //! The solver as a forward model: log-moduli in, distances to what was observed out.
 
 use super::levenberg_marquardt::{Forward, Linearisation};
+use super::{LogPrior, Scale};
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::sample::Tissue;
-use crate::fem::{By, FemError, Load, Materials, Model, Outcome, Scenario, State};
+use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State};
 use crate::material::law::{Material, Parameter};
 use crate::mesh::TetMesh;
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -17,14 +18,51 @@ pub enum Unknown {
     ShearModulus(Tissue),
     /// Effective density of all tissue, kg/m3.
     Density,
+    /// Pressure on the facets of a set, Pa: `loads.pressure` of this index, in the direction given there.
+    Pressure(usize),
+    /// Turn of gravity (an angle, not a logarithm) about one of the two axes across the direction given.
+    GravityTurn(Turn),
+}
+
+/// One of the two axes across gravity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// The axis nearest to left-right.
+    Nodding,
+    /// Across gravity and the other axis.
+    Rolling,
+}
+
+/// The axes of [`Turn`]: across gravity and each other, the first as near to x as can be.
+fn axes_across(gravity: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let down = gravity.try_normalize(0.0).unwrap_or_else(|| -Vector3::z());
+    let nearest = if down.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let nodding = (nearest - down * down.dot(&nearest)).normalize();
+    [nodding, down.cross(&nodding)]
 }
 
 impl Unknown {
+    /// What its number stands for.
+    pub fn scale(&self) -> Scale {
+        match self {
+            Self::GravityTurn(_) => Scale::Angle,
+            _ => Scale::Logarithm,
+        }
+    }
+
+    /// What is known of it beforehand.
+    pub fn prior(&self, mean: f64, sd: f64) -> LogPrior {
+        LogPrior { name: self.name(), mean, sd: Some(sd), scale: self.scale() }
+    }
+
     /// How tables name it.
     pub fn name(&self) -> String {
         match self {
             Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
+            Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
+            Self::GravityTurn(Turn::Nodding) => "turn of gravity about left-right, degrees".to_owned(),
+            Self::GravityTurn(Turn::Rolling) => "turn of gravity across that, degrees".to_owned(),
         }
     }
 }
@@ -47,7 +85,8 @@ pub struct Body<'a> {
     poisson_ratio: f64,
     observation: Observation,
     model: Model,
-    model_density: f64,
+    /// The gravity that turns are counted from, m/s2.
+    gravity: Vector3<f64>,
     start: Option<State>,
     /// Solves for an equilibrium so far.
     pub solves: usize,
@@ -93,9 +132,10 @@ impl<'a> Body<'a> {
         observation: Observation,
     ) -> Result<Self, BodyError> {
         let mut template = template.clone();
+        // Any moduli will do to check the scenario.
         template.materials = materials(&template, &unknowns, &vec![7.0; unknowns.len()], poisson_ratio)?;
         let model = Model::new(mesh, &template)?;
-        let model_density = template.loads.density_kg_per_m3;
+        let gravity = Vector3::from(template.loads.gravity_m_per_s2);
         Ok(Self {
             mesh,
             template,
@@ -103,49 +143,98 @@ impl<'a> Body<'a> {
             poisson_ratio,
             observation,
             model,
-            model_density,
+            gravity,
             start: None,
             solves: 0,
             tangent_solves: 0,
         })
     }
 
-    /// Equilibrium and sensitivities at these log-parameters.
+    /// The scenario's loads with these parameters.
+    fn loads(&self, parameters: &[f64]) -> Loads {
+        let mut loads = self.template.loads.clone();
+        for (unknown, &value) in self.unknowns.iter().zip(parameters) {
+            match unknown {
+                Unknown::ShearModulus(_) | Unknown::GravityTurn(_) => {}
+                Unknown::Density => loads.density_kg_per_m3 = value.exp(),
+                Unknown::Pressure(n) => {
+                    let pressure = &mut loads.pressure[*n].pressure_pa;
+                    *pressure = value.exp().copysign(*pressure);
+                }
+            }
+        }
+        loads.gravity_m_per_s2 = self.turned(parameters).into();
+        loads
+    }
+
+    /// Gravity turned by the parameters that are turns, m/s2.
+    fn turned(&self, parameters: &[f64]) -> Vector3<f64> {
+        let axes = axes_across(self.gravity);
+        let mut turn = Vector3::zeros();
+        for (unknown, &angle) in self.unknowns.iter().zip(parameters) {
+            if let Unknown::GravityTurn(about) = unknown {
+                turn += axes[*about as usize] * angle;
+            }
+        }
+        Rotation3::new(turn) * self.gravity
+    }
+
+    /// d gravity / d parameter, m/s2 per unit, by central differences: exact to 1e-10 of a rotation this smooth.
+    fn turning(&self, parameters: &[f64], number: usize) -> Vector3<f64> {
+        const STEP: f64 = 1e-5;
+        let at = |step: f64| {
+            let mut moved = parameters.to_vec();
+            moved[number] += step;
+            self.turned(&moved)
+        };
+        (at(STEP) - at(-STEP)) / (2.0 * STEP)
+    }
+
+    /// Equilibrium and sensitivities at these parameters (logarithms, or angles).
     ///
     /// # Errors
     /// The solver's.
     pub fn solve(&mut self, log_parameters: &[f64]) -> Result<Solved, BodyError> {
-        let density = self.unknowns.iter().position(|u| *u == Unknown::Density).map(|n| log_parameters[n].exp());
-        if let Some(density) = density.filter(|d| *d != self.model_density) {
-            self.template.loads.density_kg_per_m3 = density;
+        let loads = self.loads(log_parameters);
+        if loads != self.template.loads {
+            self.template.loads = loads;
             self.model = Model::new(self.mesh, &self.template)?;
-            self.model_density = density;
         }
         let materials = materials(&self.template, &self.unknowns, log_parameters, self.poisson_ratio)?;
         let (outcome, state) = self.model.solve(&materials, self.start.as_ref(), &|_| {})?;
         self.solves += 1;
+        // What to differentiate by, with the unknown it belongs to and its weight there.
         let mut by = Vec::new();
-        let mut owner = Vec::new();
         for (n, unknown) in self.unknowns.iter().enumerate() {
             match unknown {
-                Unknown::Density => by.push(By::Load(Load::Weight)),
+                Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
+                Unknown::Pressure(number) => by.push((By::Load(Load::Pressure(*number)), n, 1.0)),
+                Unknown::GravityTurn(_) => {
+                    let turning = self.turning(log_parameters, n);
+                    by.extend((0..3).map(|axis| (By::Gravity(axis), n, turning[axis])));
+                }
                 Unknown::ShearModulus(tissue) => {
                     let names = tissue.labels.iter().filter_map(|&l| self.template.label_name(l));
                     by.extend(
-                        names.map(|name| By::Material { name: name.to_owned(), parameter: Parameter::Stiffness }),
+                        names.map(|name| {
+                            (By::Material { name: name.to_owned(), parameter: Parameter::Stiffness }, n, 1.0)
+                        }),
                     );
                 }
             }
-            owner.resize(by.len(), n);
         }
-        let parts = self.model.sensitivities(&materials, &state, &by)?;
-        self.tangent_solves += by.len();
+        let mut different: Vec<By> = by.iter().map(|(by, ..)| by.clone()).collect();
+        different.sort_unstable();
+        different.dedup();
+        let parts = self.model.sensitivities(&materials, &state, &different)?;
+        self.tangent_solves += different.len();
         self.start = Some(state);
         let mut sensitivities = vec![vec![[0.0; 3]; outcome.displacement_mm.len()]; self.unknowns.len()];
-        for (part, n) in parts.iter().zip(owner) {
+        for (by, n, weight) in by {
+            let part = parts.iter().zip(&different).find(|(_, b)| **b == by).map_or(&[][..], |(part, _)| part);
             for (sum, s) in sensitivities[n].iter_mut().zip(part) {
                 for a in 0..3 {
-                    sum[a] += s[a];
+                    sum[a] += weight * s[a];
                 }
             }
         }

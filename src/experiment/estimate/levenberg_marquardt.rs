@@ -166,6 +166,7 @@ pub fn estimate<M: Forward>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::estimate::Scale;
 
     /// r_i = a_i / mu_1 + b_i / mu_2 - observed: what a linear-elastic body under gravity does.
     struct Compliance {
@@ -193,7 +194,7 @@ mod tests {
     }
 
     fn no_prior() -> Vec<LogPrior> {
-        ["a", "b"].map(|name| LogPrior { name: name.to_owned(), mean: 0.0, sd: None }).to_vec()
+        ["a", "b"].map(|name| LogPrior { name: name.to_owned(), mean: 0.0, sd: None, scale: Scale::Logarithm }).to_vec()
     }
 
     #[test]
@@ -211,7 +212,7 @@ mod tests {
     #[test]
     fn a_tight_prior_holds_the_parameter() {
         let mut model = Compliance { observed: simulate(&[1.3, 0.4]) };
-        let tight = |mean| LogPrior { name: String::new(), mean, sd: Some(1e-6) };
+        let tight = |mean| LogPrior { name: String::new(), mean, sd: Some(1e-6), scale: Scale::Logarithm };
         let descent =
             estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();
         assert!((descent.log_parameters[0] - 2.0).abs() < 1e-4 && descent.log_parameters[1].abs() < 1e-4);

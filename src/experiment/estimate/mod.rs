@@ -5,11 +5,13 @@
 //! Learning Algorithms", chapter 27) and what the data can and cannot tell apart.
 
 mod body;
+mod displacement;
 mod levenberg_marquardt;
 mod outcome;
 mod posterior;
 
-pub use body::{Body, BodyError, Observation, Solved, Unknown};
+pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown};
+pub use displacement::DisplacementSettings;
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
@@ -18,7 +20,7 @@ pub use posterior::{Identifiability, Posterior, Verdict, laplace};
 
 use serde::{Deserialize, Serialize};
 
-/// A Gaussian over one log-parameter: what is known before the patient is seen.
+/// A Gaussian over the logarithm of one parameter (or an angle): what is known before the patient is seen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogPrior {
     /// Name of the parameter: `shear_modulus_pa of grey_matter`.
@@ -28,6 +30,30 @@ pub struct LogPrior {
     /// Standard deviation of ln(parameter); infinite for no prior knowledge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd: Option<f64>,
+    /// What `mean` and `sd` are the logarithm of, or an angle instead.
+    #[serde(default)]
+    pub scale: Scale,
+}
+
+/// What an estimated number stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scale {
+    /// The logarithm of a positive quantity.
+    #[default]
+    Logarithm,
+    /// An angle in radians, shown in degrees.
+    Angle,
+}
+
+impl Scale {
+    /// The quantity behind the number.
+    pub fn value(self, number: f64) -> f64 {
+        match self {
+            Self::Logarithm => number.exp(),
+            Self::Angle => number.to_degrees(),
+        }
+    }
 }
 
 impl LogPrior {

@@ -22,6 +22,8 @@ pub struct Problem<'a> {
     pub observation: Observation,
     /// Share of the observations that are independent.
     pub independent_share: f64,
+    /// Standard deviation of ln(modulus) that mesh, supports and outer surface add; 0 for a body known exactly.
+    pub model_log_sd: f64,
     /// Where to start; the prior's mean when empty.
     pub start: Vec<f64>,
 }
@@ -34,6 +36,9 @@ pub struct EstimateOutcome {
     pub posterior: Posterior,
     /// What was known before.
     pub prior: Vec<LogPrior>,
+    /// Standard deviation of ln(modulus) that the model itself adds to the intervals.
+    #[serde(default)]
+    pub model_log_sd: f64,
     /// Observations (nodes of the observed sets, or components of displacements).
     pub observations: usize,
     /// How many of them count as independent.
@@ -85,6 +90,10 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
     let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
     let density_known = !unknowns.contains(&Unknown::Density);
+    let model_error: Vec<f64> = unknowns
+        .iter()
+        .map(|u| if matches!(u, Unknown::ShearModulus(_)) { problem.model_log_sd } else { 0.0 })
+        .collect();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
     let share = problem.independent_share.clamp(1e-9, 1.0);
     // Neighbours share their error: together they weigh as much as the independent ones alone.
@@ -95,7 +104,9 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let noise_mm = settings.noise_mm.max(residual_rms_mm);
     let posterior = laplace(&descent, &prior, noise_mm, share);
     let Solved { outcome: state, sensitivities } = body.solve(&descent.log_parameters)?;
+    // A model that is too stiff is made up for by a modulus that is too low: its error is not one of the displacement.
     let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
+    let posterior = posterior.with_model_error(&model_error);
     let outcome = EstimateOutcome {
         limits: limits(&posterior, &descent, settings.noise_mm, residual_rms_mm, only_weight && density_known),
         observations: descent.linearisation.residuals_mm.len(),
@@ -105,6 +116,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         convergence: descent.convergence,
         solves: body.solves,
         tangent_solves: body.tangent_solves,
+        model_log_sd: problem.model_log_sd,
         posterior,
         prior,
     };
@@ -172,6 +184,7 @@ fn limits(posterior: &Posterior, descent: &Descent, noise_mm: f64, rms_mm: f64, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::estimate::Turn;
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::sample::Tissue;
     use crate::experiment::sweep::scenario_of;
@@ -180,7 +193,7 @@ mod tests {
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {
             let unknown = Unknown::ShearModulus(tissue);
-            let prior = LogPrior { name: unknown.name(), mean: 7.0, sd: Some(2.0) };
+            let prior = unknown.prior(7.0, 2.0);
             (unknown, prior)
         };
         Problem {
@@ -190,6 +203,7 @@ mod tests {
             poisson_ratio: 0.45,
             observation: Observation::Nodes(observed),
             independent_share: 1.0,
+            model_log_sd: 0.0,
             start: vec![2299f64.ln(), 1195f64.ln()],
         }
     }
@@ -233,5 +247,61 @@ mod tests {
         assert!(rough.displacement_sd_mm[top] > 5.0 * fine.displacement_sd_mm[top]);
         let held = mesh.node_sets["base"][0] as usize;
         assert_eq!((fine.displacement_sd_mm[held], fine.displacement_95_mm[held]), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_turn_of_gravity_comes_back_with_the_modulus() {
+        let mesh = block(3);
+        let mut scenario = settings().scenario();
+        scenario.loads = crate::fem::Loads {
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+            density_kg_per_m3: 300.0,
+            ..crate::fem::Loads::default()
+        };
+        let unknowns: Vec<_> = Tissue::whole_brain()
+            .into_iter()
+            .map(Unknown::ShearModulus)
+            .map(|u| (u.prior(7.0, 2.0), u))
+            .chain([Turn::Nodding, Turn::Rolling].map(Unknown::GravityTurn).map(|u| (u.prior(0.0, 0.5), u)))
+            .map(|(prior, unknown)| (unknown, prior))
+            .collect();
+        let list: Vec<Unknown> = unknowns.iter().map(|(u, _)| u.clone()).collect();
+        let everything = Observation::Nodes(Vec::new());
+        let mut truth = Body::new(&mesh, &scenario, list, 0.45, everything).unwrap();
+        let degrees = [8.0f64, -5.0];
+        let theta = [800f64.ln(), degrees[0].to_radians(), degrees[1].to_radians()];
+        let u = truth.solve(&theta).unwrap().outcome.displacement_mm;
+        let problem = Problem {
+            unknowns,
+            observation: Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()),
+            start: Vec::new(),
+            ..problem(&mesh, &scenario, Vec::new())
+        };
+        let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        let found = solve_problem(problem, &precise).unwrap().outcome.posterior;
+        assert!((found.mode[0] / 800.0 - 1.0).abs() < 1e-3, "{:?}", found.mode);
+        assert!(
+            (found.mode[1] - degrees[0]).abs() < 0.02 && (found.mode[2] - degrees[1]).abs() < 0.02,
+            "{:?}",
+            found.mode
+        );
+        assert!(found.interval_95[2][0] < degrees[1] && degrees[1] < found.interval_95[2][1]);
+    }
+
+    #[test]
+    fn a_models_own_error_widens_the_moduli_and_nothing_else() {
+        let (mesh, settings) = (block(3), settings());
+        let scenario = settings.scenario();
+        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
+        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
+        let observed: Vec<_> = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let noise = EstimateSettings { noise_mm: 0.05, ..EstimateSettings::default() };
+        let exact = solve_problem(problem(&mesh, &scenario, observed.clone()), &noise).unwrap();
+        let rough = Problem { model_log_sd: 0.1, ..problem(&mesh, &scenario, observed) };
+        let rough = solve_problem(rough, &noise).unwrap();
+        let [narrow, wide] = [&exact, &rough].map(|e| e.outcome.posterior.log_sd[0]);
+        assert!((wide - narrow.hypot(0.1)).abs() < 1e-12, "{narrow} {wide}");
+        assert_eq!(exact.outcome.posterior.mode, rough.outcome.posterior.mode);
+        assert_eq!(exact.displacement_sd_mm, rough.displacement_sd_mm);
     }
 }

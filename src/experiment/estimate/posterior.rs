@@ -72,8 +72,7 @@ pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information
     }
 
     let log_sd: Vec<f64> = (0..n).map(|p| covariance[(p, p)].max(0.0).sqrt()).collect();
-    let mode: Vec<f64> = descent.log_parameters.iter().map(|t| t.exp()).collect();
-    let interval = |p: usize| [mode[p] * (-Z_95 * log_sd[p]).exp(), mode[p] * (Z_95 * log_sd[p]).exp()];
+    let at = |p: usize, z: f64| prior[p].scale.value(descent.log_parameters[p] + z * log_sd[p]);
     let verdict = |p: usize| {
         let sd = data_only[(p, p)].max(0.0).sqrt();
         match prior[p].sd {
@@ -91,7 +90,8 @@ pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information
     let rows = |f: &dyn Fn(usize, usize) -> f64| (0..n).map(|r| (0..n).map(|c| f(r, c)).collect()).collect();
     Posterior {
         names: prior.iter().map(|p| p.name.clone()).collect(),
-        interval_95: (0..n).map(interval).collect(),
+        mode: (0..n).map(|p| at(p, 0.0)).collect(),
+        interval_95: (0..n).map(|p| [at(p, -Z_95), at(p, Z_95)]).collect(),
         log_covariance: rows(&|r, c| covariance[(r, c)]),
         identifiability: Identifiability {
             verdicts: (0..n).map(verdict).collect(),
@@ -100,8 +100,21 @@ pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information
             valley,
             valley_log_sd: if lowest > 0.0 { lowest.sqrt().recip() } else { f64::MAX },
         },
-        mode,
         log_sd,
+    }
+}
+
+impl Posterior {
+    /// With the model's own error (mesh, supports, the body's outer surface) added to the uncertainty of the parameters
+    /// whose `error` is given: standard deviations of their logarithms, in the order of the names.
+    #[must_use]
+    pub fn with_model_error(mut self, error: &[f64]) -> Self {
+        for (p, error) in error.iter().enumerate().filter(|(_, e)| **e > 0.0) {
+            self.log_covariance[p][p] += error * error;
+            self.log_sd[p] = self.log_covariance[p][p].sqrt();
+            self.interval_95[p] = [-Z_95, Z_95].map(|z| self.mode[p] * (z * self.log_sd[p]).exp());
+        }
+        self
     }
 }
 
@@ -115,7 +128,7 @@ fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::{Convergence, Linearisation};
+    use crate::experiment::estimate::{Convergence, Linearisation, Scale};
     use nalgebra::DVector;
 
     fn descent(jacobian: DMatrix<f64>) -> Descent {
@@ -130,7 +143,7 @@ mod tests {
     }
 
     fn prior(sd: Option<f64>) -> LogPrior {
-        LogPrior { name: "mu".to_owned(), mean: 7.0, sd }
+        LogPrior { name: "mu".to_owned(), mean: 7.0, sd, scale: Scale::Logarithm }
     }
 
     #[test]

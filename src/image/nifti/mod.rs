@@ -97,6 +97,30 @@ pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(M
     Ok((mask, warnings))
 }
 
+/// Reads a displacement as [`encode_vectors`] writes it: three volumes, the components in mm along R, A, S.
+///
+/// ```
+/// use hgm::geometry::Mni;
+/// use hgm::image::{Grid, Volume, nifti};
+///
+/// let grid = Grid::<Mni>::axis_aligned([4, 3, 2], [2.0; 3], [-4.0, 0.0, 1.0]);
+/// let shift = Volume::filled(grid, [0.5f32, -1.25, 3.0]);
+/// let back = nifti::decode_vectors(&nifti::encode_vectors(&shift), "shift.nii.gz").unwrap();
+/// assert_eq!(back.relabelled::<Mni>(), shift);
+/// ```
+///
+/// # Errors
+/// [`NiftiError`], also for a file with fewer than three volumes.
+pub fn decode_vectors(bytes: &[u8], name: &str) -> Result<Volume<[f32; 3], Native>, NiftiError> {
+    let component = |n: usize| {
+        let options = ReadOptions { volume: Some(n), ..ReadOptions::default() };
+        read(bytes, name, &options).map(|image| image.volume)
+    };
+    let (x, y, z) = (component(0)?, component(1)?, component(2)?);
+    let vectors = x.data.iter().zip(&y.data).zip(&z.data).map(|((&x, &y), &z)| [x, y, z]);
+    Ok(Volume::from_data(x.grid, vectors.collect()))
+}
+
 /// Whether the header says that the coordinates are those of the MNI template (code 4 for the affine that is believed).
 /// False for what is no NIfTI.
 pub fn says_mni(bytes: &[u8]) -> bool {

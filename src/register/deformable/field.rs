@@ -45,6 +45,31 @@ impl<F: Frame> DisplacementField<F> {
         Self { grid: flow.grid.relabelled(), components: flow.components.clone(), before, after: Affine::identity() }
     }
 
+    /// The map that a displacement (mm) sampled on a grid stands for.
+    pub fn from_displacement(displacement_mm: &Volume<[f32; 3], F>) -> Self {
+        let grid = displacement_mm.grid;
+        let voxels_from_mm = grid.voxel_from_mm().fixed_view::<3, 3>(0, 0).into_owned();
+        let mut components = [0, 1, 2].map(|_| Vec::with_capacity(grid.len()));
+        for d in &displacement_mm.data {
+            let voxels = voxels_from_mm * Vector3::from(d.map(f64::from));
+            for (component, v) in components.iter_mut().zip(voxels.iter()) {
+                component.push(*v as f32);
+            }
+        }
+        Self { grid, components, before: Affine::identity(), after: Affine::identity() }
+    }
+
+    /// How far every point of the field's grid moves, mm: what [`Self::from_displacement`] takes. Rounded to a 64th
+    /// of a mm, far below what a registration is worth, so that it packs well.
+    pub fn displacement_mm(&self) -> Volume<[f32; 3], F> {
+        let value = |n: usize| {
+            let p = self.grid.position(Point3::from(self.grid.voxel(n).map(|v| v as f64)));
+            let d = self.apply(p).mm - p.mm;
+            [d.x, d.y, d.z].map(|x| ((x * 64.0).round() / 64.0) as f32)
+        };
+        Volume::from_data(self.grid, (0..self.grid.len()).into_par_iter().map(value).collect())
+    }
+
     /// The grid the deformation is kept on.
     pub fn grid(&self) -> &Grid<F> {
         &self.grid

@@ -13,7 +13,7 @@ pub fn section(estimate: &EstimateOutcome) -> String {
         let [low, high] = posterior.interval_95[n];
         let prior = &estimate.prior[n];
         let before = prior.sd.map_or("none".to_owned(), |sd| {
-            let at = |z: f64| number((prior.mean + z * sd).exp(), 4);
+            let at = |z: f64| number(prior.scale.value(prior.mean + z * sd), 4);
             format!("{} to {}", at(-1.96), at(1.96))
         });
         let verdict = match posterior.identifiability.verdicts[n] {

@@ -45,11 +45,13 @@ fn all() -> Vec<By> {
         By::Load(Load::Weight),
         By::Load(Load::Patch(0)),
         By::Load(Load::Pressure(0)),
+        By::Gravity(0),
+        By::Gravity(2),
         By::AllLoads,
     ]
 }
 
-/// The scenario with one parameter multiplied by a factor.
+/// The scenario with one parameter multiplied by a factor, gravity with the factor's logarithm added.
 fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
     let mut s = scenario.clone();
     match by {
@@ -60,6 +62,7 @@ fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
         By::Load(Load::Weight) => s.loads.gravity_m_per_s2 = s.loads.gravity_m_per_s2.map(|g| g * factor),
         By::Load(Load::Patch(n)) => s.loads.patch[*n].force_n = s.loads.patch[*n].force_n.map(|f| f * factor),
         By::Load(Load::Pressure(n)) => s.loads.pressure[*n].pressure_pa *= factor,
+        By::Gravity(axis) => s.loads.gravity_m_per_s2[*axis] += factor.ln(),
         By::AllLoads => {
             for load in [Load::Weight, Load::Patch(0), Load::Pressure(0)] {
                 s = changed(&s, &By::Load(load), factor);
