@@ -28,7 +28,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     write_whole(&pre, PRE)?;
     write_whole(&post, POST)?;
     // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
-    let mesh = || MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), edge_mm: None };
+    let mesh = || MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), ..MeshOptions::default() };
     run::run(&run::Args::demo(pre, post, args.output.join("pair"), mesh()), session)?;
     phantom::run(&phantom::Args::demo(args.output.join("phantom"), mesh()), session)
 }

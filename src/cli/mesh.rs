@@ -20,7 +20,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];

@@ -164,6 +164,22 @@ impl LabelField {
         &self.largest
     }
 
+    /// Whether voxels in or next to a box between two of its corners differ in their largest field.
+    pub(crate) fn holds_interface(&self, low_mm: [f64; 3], high_mm: [f64; 3]) -> bool {
+        let [nx, ny, _] = self.dims;
+        let voxels = |a: usize| {
+            let clip = |x: f64| x.clamp(0.0, (self.dims[a] - 1) as f64) as usize;
+            clip((low_mm[a] / self.spacing_mm[a]).floor())..=clip((high_mm[a] / self.spacing_mm[a]).ceil())
+        };
+        let first = self.largest[*voxels(0).start() + nx * (*voxels(1).start() + ny * *voxels(2).start())];
+        voxels(2).any(|k| {
+            voxels(1).any(|j| {
+                let row = nx * (j + ny * k);
+                self.largest[row + *voxels(0).start()..=row + *voxels(0).end()].iter().any(|&l| l != first)
+            })
+        })
+    }
+
     /// Box coordinates to the frame of the map.
     pub fn frame_from_box(&self) -> &Matrix4<f64> {
         &self.frame_from_box

@@ -24,3 +24,8 @@ pub fn name(label: u8) -> Option<&'static str> {
         _ => return None,
     })
 }
+
+/// The label with this name, or with this number in digits.
+pub fn number(word: &str) -> Option<u8> {
+    word.parse().ok().or_else(|| (0..=u8::MAX).find(|&l| name(l) == Some(word)))
+}

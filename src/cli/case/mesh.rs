@@ -6,7 +6,7 @@ use crate::cli::Session;
 use crate::experiment::outcome::{MeshOutcome, SetOutcome};
 use crate::geometry::{Frame, Mni, Position};
 use crate::image::LabelMap;
-use crate::mesh::engine::{Engine, EnginePrograms, MeshSettings, MeshSize, mesh_labels};
+use crate::mesh::engine::{Engine, EnginePrograms, LabelEdge, MeshSettings, MeshSize, WallEdge, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
@@ -37,6 +37,29 @@ pub struct MeshOptions {
     /// Target edge length in mm, instead of a number of tetrahedra
     #[arg(long, value_name = "MM", conflicts_with = "cells")]
     pub edge_mm: Option<f64>,
+    /// Edges inside a label, times the target: white_matter=1.5 (again for more labels)
+    #[arg(long, value_name = "LABEL=FACTOR", value_parser = label_edge)]
+    pub edge_in: Vec<LabelEdge>,
+    /// Edges at the wall of a label, times the target, and the distance to which that counts: ventricle=0.5@8
+    #[arg(long, value_name = "LABEL=FACTOR@MM", value_parser = wall_edge)]
+    pub edge_near: Vec<WallEdge>,
+}
+
+fn label_edge(text: &str) -> Result<LabelEdge, String> {
+    let read = || {
+        let (label, factor) = text.split_once('=')?;
+        Some(LabelEdge { label: label::number(label)?, factor: factor.parse().ok()? })
+    };
+    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR, such as white_matter=1.5 or 3=1.5"))
+}
+
+fn wall_edge(text: &str) -> Result<WallEdge, String> {
+    let read = || {
+        let (label, rest) = text.split_once('=')?;
+        let (factor, reach) = rest.split_once('@')?;
+        Some(WallEdge { label: label::number(label)?, factor: factor.parse().ok()?, reach_mm: reach.parse().ok()? })
+    };
+    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
 }
 
 fn engine(name: &str) -> Result<Engine, String> {
@@ -160,6 +183,8 @@ pub fn mesh_settings(
     if let Some(edge_mm) = options.edge_mm {
         settings.size = MeshSize::EdgeMm(edge_mm);
     }
+    settings.sizing.labels.extend(&options.edge_in);
+    settings.sizing.walls.extend(&options.edge_near);
     Ok(settings)
 }
 
@@ -194,5 +219,21 @@ pub fn mesh_outcome<F: Frame>(
         dice: fit.labels.iter().map(|l| (named(l.label), l.dice)).collect(),
         surface_distance_mean_mm: border.map(|d| d.mean_mm),
         surface_distance_95_mm: border.map(|d| d.percentile_95_mm),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_by_name_or_number_of_the_label() {
+        let wall = WallEdge { label: label::VENTRICLE, factor: 0.5, reach_mm: 8.0 };
+        assert_eq!([wall_edge("ventricle=0.5@8"), wall_edge("4=0.5@8")], [Ok(wall), Ok(wall)]);
+        assert_eq!(label_edge("white_matter=1.5"), Ok(LabelEdge { label: label::WHITE_MATTER, factor: 1.5 }));
+        for text in ["ventricle", "ventricle=0.5", "falx=0.5@8", "4=half@8", "300=0.5@8"] {
+            assert!(wall_edge(text).unwrap_err().contains("ventricle=0.5@8"), "{text}");
+        }
+        assert!(label_edge("3=").unwrap_err().contains("white_matter=1.5"));
     }
 }

@@ -1,10 +1,12 @@
-//! Our own engine: a body-centred cubic lattice whose vertices snap to the label interfaces.
+//! Our own engine: a graded body-centred lattice (see [`octree`](super::octree)) whose vertices snap to the label interfaces.
 //!
-//! The lattice's tets all have dihedral angles of 60 and 90 degrees. Wherever an edge joins two fields, its nearer end
+//! The lattice is coarse where no interface is near. Wherever an edge joins two fields, its nearer end
 //! moves to the interface (as in isosurface stuffing, Labelle and Shewchuk 2007, and its multi-material sibling,
 //! lattice cleaving, Bronson et al. 2012, but without cutting: the quality pass does what their stencils do, at a third
 //! of the tets). A tet then takes the label that fills most of it. Conforming by construction.
 
+use super::octree::Octree;
+use super::sizing::EdgeField;
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::{Complex, Point, min_sine};
 use rayon::prelude::*;
@@ -15,58 +17,37 @@ struct Lattice {
     tets: Vec<[u32; 4]>,
 }
 
-/// All tets of the body-centred lattice of cube edge `cube_mm` that touch a labelled part of the box, and those around them.
-fn lattice(field: &LabelField, cube_mm: f64) -> Lattice {
+/// Levels by which leaves without an interface may be coarser than asked.
+const INSIDE: u8 = 1;
+/// Cube edge of the lattice whose tets have the volume that the edge asks for: (12 * TET_SHARE)^(1/3).
+const CUBE_PER_EDGE: f64 = 1.268;
+
+/// The octree over the box, its finest cell's edge and its origin. Leaves have the size asked for to the nearest power of two.
+fn octree(field: &LabelField, edge: &EdgeField) -> (Octree, f64, [f64; 3]) {
+    let cube_mm = CUBE_PER_EDGE * edge.target_mm;
+    let [least, most] = edge.range_mm().map(|e| (e / edge.target_mm).log2());
+    let below = (-least - 0.5).ceil().max(0.0) as u8;
+    let top = below + (most + 0.5).floor().max(0.0) as u8 + INSIDE;
+    let finest_mm = cube_mm / f64::from(1u32 << below);
     let extent = field.extent_mm();
-    let cells: [usize; 3] = std::array::from_fn(|a| (extent[a] / cube_mm).ceil() as usize + 4);
     // The lattice is centred on the box and overhangs it by about two cubes.
-    let origin: [f64; 3] = std::array::from_fn(|a| 0.5 * (extent[a] - cells[a] as f64 * cube_mm));
-    let corners = cells.map(|c| c + 1);
-    let corner = |c: [usize; 3]| (c[0] + corners[0] * (c[1] + corners[1] * c[2])) as u32;
-    let first_centre = corners.iter().product::<usize>() as u32;
-    let centre = |c: [usize; 3]| first_centre + (c[0] + cells[0] * (c[1] + cells[1] * c[2])) as u32;
-    let at = |c: [usize; 3], half: f64| -> Point {
-        Point::from(std::array::from_fn::<f64, 3, _>(|a| origin[a] + (c[a] as f64 + half) * cube_mm))
-    };
-    let mut x = Vec::with_capacity(2 * first_centre as usize);
-    for half in [0.0, 0.5] {
-        let n = if half == 0.0 { corners } else { cells };
-        for k in 0..n[2] {
-            for j in 0..n[1] {
-                for i in 0..n[0] {
-                    x.push(at([i, j, k], half));
-                }
-            }
-        }
-    }
-    let mut tets = Vec::new();
-    for k in 0..cells[2] {
-        for j in 0..cells[1] {
-            for i in 0..cells[0] {
-                for axis in 0..3 {
-                    let c = [i, j, k];
-                    if c[axis] + 1 == cells[axis] {
-                        continue;
-                    }
-                    let mut next = c;
-                    next[axis] += 1;
-                    // The square between two centres, counter-clockwise seen from the second.
-                    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                    let square = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
-                        let mut s = next;
-                        s[u] += du;
-                        s[v] += dv;
-                        corner(s)
-                    });
-                    let (a, b) = (centre(c), centre(next));
-                    for n in 0..4 {
-                        let tet = [a, b, square[n], square[(n + 1) % 4]];
-                        tets.push(tet);
-                    }
-                }
-            }
-        }
-    }
+    let cubes: [usize; 3] = std::array::from_fn(|a| (extent[a] / cube_mm).ceil() as usize + 4);
+    let origin: [f64; 3] = std::array::from_fn(|a| 0.5 * (extent[a] - cubes[a] as f64 * cube_mm));
+    let cells = cubes.map(|n| (n << below).next_multiple_of(1 << top));
+    let tree = Octree::new(cells, top, |low, level| {
+        let low_mm: [f64; 3] = std::array::from_fn(|a| origin[a] + low[a] as f64 * finest_mm);
+        let high_mm = low_mm.map(|x| x + f64::from(1u32 << level) * finest_mm);
+        let asked = (CUBE_PER_EDGE * edge.least_mm(low_mm, high_mm) / finest_mm).log2().round().max(0.0) as u8;
+        level <= asked || (level <= asked + INSIDE && !field.holds_interface(low_mm, high_mm))
+    });
+    (tree, finest_mm, origin)
+}
+
+/// All tets of the lattice that touch a labelled part of the box, and those around them.
+fn lattice(field: &LabelField, edge: &EdgeField) -> Lattice {
+    let (tree, finest_mm, origin) = octree(field, edge);
+    let (x, mut tets) = tree.tets();
+    let x: Vec<Point> = x.iter().map(|p| Point::from(origin) + Point::from(*p) * finest_mm).collect();
     // What touches a labelled vertex, and one layer more: every vertex that may snap then has all its tets.
     let mut near: Vec<bool> = x.par_iter().map(|p| field.field_at(p) != 0).collect();
     for _ in 0..2 {
@@ -130,9 +111,9 @@ pub(crate) fn majority(field: &LabelField, corners: &[Point; 4]) -> u8 {
 /// A snapped vertex may not leave a tet with a smaller dihedral sine than this.
 const SNAP_FLOOR: f64 = 0.15;
 
-/// Meshes every field but the outside; `cube_mm` is the lattice's cube edge (its tets have edges of 1 and 0.87 of it).
-pub(crate) fn mesh(field: &LabelField, cube_mm: f64) -> Complex {
-    let Lattice { mut x, tets } = lattice(field, cube_mm);
+/// Meshes every field but the outside.
+pub(crate) fn mesh(field: &LabelField, edge: &EdgeField) -> Complex {
+    let Lattice { mut x, tets } = lattice(field, edge);
     let label: Vec<u8> = x.par_iter().map(|p| field.field_at(p)).collect();
     let mut edges: Vec<[u32; 2]> = tets
         .iter()

@@ -7,12 +7,14 @@
 mod cgal;
 mod gmsh;
 mod lattice;
+mod octree;
 mod process;
 mod sizing;
 mod surface;
 mod tetgen;
 
 pub use process::{Limits, ProcessError};
+pub use sizing::{LabelEdge, Sizing, WallEdge};
 
 use super::label_field::LabelField;
 use super::optimise::{self, Complex, OptimiseSettings, Point};
@@ -21,7 +23,7 @@ use super::tet_mesh::{MeshError, TetMesh};
 use crate::geometry::Frame;
 use crate::image::LabelMap;
 use serde::{Deserialize, Serialize};
-use sizing::EdgeField;
+use sizing::EdgeFactors;
 use std::path::PathBuf;
 use surface::InterfaceSurface;
 use thiserror::Error;
@@ -116,6 +118,8 @@ pub struct MeshSettings {
     pub engine: Engine,
     /// How fine.
     pub size: MeshSize,
+    /// Where finer and where coarser.
+    pub sizing: Sizing,
     /// Labels that are not meshed (they count as outside).
     pub without: Vec<u8>,
     /// A sheet in the plane x = 0 to which the tets conform.
@@ -136,6 +140,7 @@ impl Default for MeshSettings {
         Self {
             engine: Engine::Lattice,
             size: MeshSize::Cells(60_000),
+            sizing: Sizing::default(),
             without: Vec::new(),
             split: None,
             smoothing_voxels: 0.7,
@@ -154,6 +159,10 @@ pub enum EngineError {
     NoLabels { without: Vec<u8> },
     #[error("{what} must be a positive finite number, got {value}")]
     Setting { what: &'static str, value: f64 },
+    #[error("edges are asked for at label {label}, which is not meshed; name one of {present:?} or drop that size")]
+    NoSuchLabel { label: u8, present: Vec<u8> },
+    #[error("the factor on edges at {place} {label} must be between {least} and {most}, got {factor}")]
+    Factor { place: &'static str, label: u8, factor: f64, least: f64, most: f64 },
     #[error(
         "a target edge of {edge_mm:.2} mm would give about {cells:.1e} tets; the most is {most:.0e}; ask for a larger edge"
     )]
@@ -219,10 +228,12 @@ pub fn mesh_labels<F: Frame>(
     }
     let islands = repair::remove_islands(&mut map, settings.smallest_part, TET_SHARE * edge_mm.powi(3));
     let field = LabelField::new(&map, settings.smoothing_voxels).ok_or_else(no_labels)?;
+    settings.sizing.check(&field.labels()[1..])?;
     let field = match &settings.split {
         Some(split) => field.split_at_midplane(&split.labels, &split.above_yz_mm),
         None => field,
     };
+    let factors = EdgeFactors::new(&field, &settings.sizing);
     let seeds = sizing::interface_seeds(&field, SEEDS);
     let voxel_mm3 = map.grid.voxel_volume_mm3();
     let mut voxels = [0usize; 256];
@@ -236,14 +247,13 @@ pub fn mesh_labels<F: Frame>(
         repair::separate(&mut complex);
         complex
     };
-    let lattice = |edge_mm: f64| lattice::mesh(&field, edge_mm * CUBE_PER_EDGE);
     let missing = |program| EngineError::Missing { engine: name, program };
     let failed = |source| EngineError::Program { engine: name, source };
     let make = |edge_mm: f64| match settings.engine {
-        Engine::Lattice => Ok(lattice(edge_mm)),
+        Engine::Lattice => Ok(lattice::mesh(&field, &factors.edges(edge_mm))),
         Engine::Cgal => {
             let program = programs.cgal.as_ref().ok_or(missing("hgm-cgal-mesher"))?;
-            let edge = EdgeField::uniform(edge_mm);
+            let edge = factors.edges(edge_mm);
             let run = |seeds: &[_]| cgal::mesh(program, &field, &edge, seeds, &settings.limits).map_err(failed);
             let found = run(&seeds)?;
             // A thin shell can lie between a few seeds without any facet of theirs across it: then they must be denser.
@@ -253,7 +263,9 @@ pub fn mesh_labels<F: Frame>(
             let is_gmsh = settings.engine == Engine::Gmsh;
             let program = if is_gmsh { programs.gmsh.as_ref() } else { programs.tetgen.as_ref() };
             let program = program.ok_or(missing(name))?;
-            let surface = InterfaceSurface::of(&polish(lattice(edge_mm)));
+            let edge = factors.edges(edge_mm);
+            let surface = InterfaceSurface::of(&polish(lattice::mesh(&field, &edge)));
+            let [_, edge_mm] = edge.range_mm();
             let inside = if is_gmsh {
                 gmsh::mesh(program, &surface, edge_mm, &settings.limits)
             } else {
@@ -294,8 +306,6 @@ const DENSE_SEEDS: usize = 400;
 
 /// Volume of a tet per cubed edge length in a mesh of this kind (a regular one has 0.118, CGAL's average 0.17).
 const TET_SHARE: f64 = 0.17;
-/// Cube edge of the lattice whose tets have as much volume: (12 * TET_SHARE)^(1/3).
-const CUBE_PER_EDGE: f64 = 1.268;
 
 fn positive(what: &'static str, value: f64) -> Result<f64, EngineError> {
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err(EngineError::Setting { what, value }) }
@@ -411,6 +421,48 @@ mod tests {
         assert!(on(1) == on(2));
     }
 
+    /// Volumes of the tets whose centres have a distance from the balls' centre within `mm`, on average.
+    fn mean_volume_mm3(mesh: &TetMesh, mm: std::ops::Range<f64>) -> f64 {
+        let distance = |t: usize| {
+            mesh.tets()[t].iter().map(|&n| Point::from(mesh.nodes_mm()[n as usize]) / 4.0).sum::<Point>().norm()
+        };
+        let there: Vec<usize> = (0..mesh.tets().len()).filter(|&t| mm.contains(&distance(t))).collect();
+        there.iter().map(|&t| mesh.volume_mm3(t)).sum::<f64>() / there.len() as f64
+    }
+
+    #[test]
+    fn lattice_is_coarse_where_no_interface_is_near() {
+        let settings = MeshSettings { size: MeshSize::EdgeMm(2.0), ..MeshSettings::default() };
+        let (mesh, _) = mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap();
+        let (inside, border) = (mean_volume_mm3(&mesh, 0.0..10.0), mean_volume_mm3(&mesh, 19.0..21.0));
+        assert!(inside > 4.0 * border, "{inside} against {border} mm3");
+    }
+
+    #[test]
+    fn tets_are_small_at_the_wall_or_in_the_label_that_asks_for_it() {
+        let mesh = |size, sizing| {
+            let settings = MeshSettings { size, sizing, ..MeshSettings::default() };
+            let mesh = mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap().0;
+            let shape = shape_quality(&mesh);
+            assert!(shape.dihedral_min_deg > 15.0 && shape.radius_ratio_min > 0.1, "{shape:?}");
+            mesh
+        };
+        let volumes = |sizing| {
+            let mesh = mesh(MeshSize::EdgeMm(3.5), sizing);
+            [0.0..15.0, 19.0..21.0, 28.0..30.0].map(|mm| mean_volume_mm3(&mesh, mm))
+        };
+        let walls = vec![WallEdge { label: 3, factor: 0.5, reach_mm: 4.0 }];
+        let labels = vec![LabelEdge { label: 3, factor: 0.5 }];
+        let even = volumes(Sizing::default());
+        let at_wall = volumes(Sizing { walls: walls.clone(), ..Sizing::default() });
+        let in_label = volumes(Sizing { labels, ..Sizing::default() });
+        // Half the edge: an eighth of the volume; grading and the fit to the interface take their part.
+        assert!(at_wall[1] < 0.4 * even[1] && at_wall[2] > 0.5 * even[2], "{at_wall:?} against {even:?}");
+        assert!(in_label[0] < 0.4 * even[0] && in_label[2] > 0.5 * even[2], "{in_label:?} against {even:?}");
+        let count = mesh(MeshSize::Cells(20_000), Sizing { walls, ..Sizing::default() }).tets().len() as f64;
+        assert!((count / 20e3 - 1.0).abs() < 0.15, "{count} tets");
+    }
+
     #[test]
     fn refusals_name_the_engine_and_the_remedy() {
         let map = ball_in_shell();
@@ -422,5 +474,17 @@ mod tests {
         assert!(refuse(MeshSettings { size: MeshSize::EdgeMm(-1.0), ..default() }).contains("target edge"));
         assert!(refuse(MeshSettings { size: MeshSize::EdgeMm(0.01), ..default() }).contains("larger edge"));
         assert!(refuse(MeshSettings { size: MeshSize::Cells(0), ..default() }).contains("number of cells"));
+        let label = |label, factor| Sizing { labels: vec![LabelEdge { label, factor }], ..Sizing::default() };
+        let wall =
+            |factor, reach_mm| Sizing { walls: vec![WallEdge { label: 3, factor, reach_mm }], ..Sizing::default() };
+        for (sizing, word) in [
+            (label(9, 0.5), "one of [2, 3]"),
+            (label(2, f64::NAN), "between 0.25 and 4, got NaN"),
+            (wall(1.5, 3.0), "the wall of label 3 must be between 0.25 and 1, got 1.5"),
+            (wall(0.5, 0.0), "reach"),
+        ] {
+            let message = refuse(MeshSettings { sizing, ..default() });
+            assert!(message.contains(word), "{message}");
+        }
     }
 }
