@@ -13,6 +13,7 @@ use crate::experiment::prior::samples_of_prior;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::shard;
 use crate::experiment::sweep::{Reference, best_sample};
+use crate::fem::Scenario;
 use crate::geometry::Mni;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
@@ -37,6 +38,8 @@ pub struct Patient {
     case: Case,
     prepared: Prepared,
     settings: ResectionSettings,
+    /// Loads and supports; the materials are the samples'.
+    scenario: Scenario,
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
@@ -55,7 +58,8 @@ impl Patient {
         let anatomy = Anatomy::read(case)?;
         let surfaces = case::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces).reject()?);
-        Ok(Self { case: case.clone(), prepared, settings, mesh, mesh_bytes, reference, sag: anatomy.sag })
+        let scenario = settings.scenario(&case::mni_from_gravity_frame(case, settings.gravity_frame)?);
+        Ok(Self { case: case.clone(), prepared, settings, scenario, mesh, mesh_bytes, reference, sag: anatomy.sag })
     }
 
     /// A case that `hgm prep` or `hgm run` has made, with the settings it was made with.
@@ -116,7 +120,7 @@ impl Patient {
         session: &Session,
     ) -> Result<(Vec<(SampleOutcome, Manifest)>, UsedSettings), Failure> {
         let prior = options.over(self.case.settings_of("prior", session)?);
-        let (scenario, tissues) = (self.settings.scenario(), self.settings.tissue_list());
+        let tissues = self.settings.tissue_list();
         let mut list =
             samples_of_prior(&tissues, &self.settings.sd_levels, self.settings.poisson_ratio, &prior).reject()?;
         if let Some(Shard { number, of }) = part {
@@ -125,7 +129,7 @@ impl Patient {
         let after = [&self.prepared.manifests[2], &self.prepared.manifests[3]];
         let shared = Sweep {
             mesh: &self.mesh,
-            template: &scenario,
+            template: &self.scenario,
             tissues: &tissues,
             reference: &self.reference,
             after: &after,
@@ -149,7 +153,7 @@ impl Patient {
     ) -> Result<(ExperimentOutcome, EstimateFacts, String), Failure> {
         let input = EstimateInput {
             mesh: (&self.mesh, &self.mesh_bytes),
-            scenario: &self.settings.scenario(),
+            scenario: &self.scenario,
             tissues: &self.settings.tissue_list(),
             poisson_ratio: self.settings.poisson_ratio,
             reference: &self.reference,
@@ -171,9 +175,9 @@ impl Patient {
 
     /// What is known before any material is tried.
     fn posed_outcome(&self) -> ExperimentOutcome {
-        let [gx, gy, gz] = self.settings.gravity_m_per_s2;
+        let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
         let loads = format!(
-            "gravity ({gx}, {gy}, {gz}) m/s2 on tissue of {} kg/m3, with {} held",
+            "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {} kg/m3, with {} held",
             self.settings.density_kg_per_m3,
             self.settings.fixed.join(" and ")
         );

@@ -1,7 +1,8 @@
 //! `hgm why`: what made a stage run again, or would.
 
 use super::case::{
-    Case, MeshOptions, ScanSums, anat_stage, mesh_stage, reference_stage, registration_stage, sample_stage,
+    Case, MeshOptions, ScanSums, anat_stage, mesh_stage, mni_from_gravity_frame, reference_stage, registration_stage,
+    sample_stage,
 };
 use super::run::AnalysisOptions;
 use super::session::read_input;
@@ -119,7 +120,8 @@ fn posed(args: &Args, case: &Case, session: &Session) -> Result<Vec<Stage>, Fail
         let mut settings: ResectionSettings = session.settings("resection")?;
         settings.tissues = args.analysis.tissues.map_or(settings.tissues, usize::from);
         let prior = args.analysis.prior.over(session.settings("prior")?);
-        let (scenario, tissues) = (settings.scenario(), settings.tissue_list());
+        let scenario = settings.scenario(&mni_from_gravity_frame(case, settings.gravity_frame)?);
+        let tissues = settings.tissue_list();
         let list = samples_of_prior(&tissues, &settings.sd_levels, settings.poisson_ratio, &prior).reject()?;
         let after = [&meshed, &observed];
         stages.extend(list.iter().map(|sample| sample_stage(case, &scenario, &tissues, sample, &after)));

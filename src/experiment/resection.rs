@@ -3,7 +3,21 @@
 use super::outcome::NoiseFloor;
 use super::sample::Tissue;
 use crate::fem::{Loads, PressureLoad, Scenario, SolverSettings};
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+
+/// The frame that gravity is given in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GravityFrame {
+    /// The MNI frame reached rigidly.
+    #[default]
+    Mni,
+    /// The pre-operative scanner's: a patient on the back has gravity along -y there.
+    Pre,
+    /// The post-operative scanner's, whose scan the sag is seen on.
+    Post,
+}
 
 /// Loads, supports and samples of a patient's sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -11,9 +25,11 @@ use serde::{Deserialize, Serialize};
 pub struct ResectionSettings {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples).
     pub tissues: usize,
-    /// Gravity in the MNI frame. Along -z by default (head upright, as in the paper's scenario); a patient who lies
-    /// supine in the scanner has it along -y.
+    /// Gravity. Along -z of the MNI frame by default (head upright, as in the paper's scenario); a patient who lies on
+    /// the back in the scanner has it along -y of that scanner's frame.
     pub gravity_m_per_s2: [f64; 3],
+    /// The frame of `gravity_m_per_s2`.
+    pub gravity_frame: GravityFrame,
     /// Effective density: tissue less the fluid that carries it, from 33 (all submerged: 1040 - 1007) to 1040 (all
     /// drained). Gravity fixes only modulus / density, so a modulus is only as good as this assumption; 100 is a
     /// brain of which about a fifteenth of the weight is no longer carried.
@@ -37,6 +53,7 @@ impl Default for ResectionSettings {
         Self {
             tissues: 1,
             gravity_m_per_s2: [0.0, 0.0, -9.81],
+            gravity_frame: GravityFrame::default(),
             density_kg_per_m3: 100.0,
             pressure: Vec::new(),
             poisson_ratio: 0.45,
@@ -54,12 +71,12 @@ impl ResectionSettings {
         if self.tissues == 1 { Tissue::whole_brain() } else { Tissue::grey_and_white() }
     }
 
-    /// The scenario without its materials.
-    pub fn scenario(&self) -> Scenario {
+    /// The scenario without its materials; `mni_from_scanner` turns a vector of [`Self::gravity_frame`].
+    pub fn scenario(&self, mni_from_scanner: &UnitQuaternion<f64>) -> Scenario {
         Scenario {
             fixed: self.fixed.clone(),
             loads: Loads {
-                gravity_m_per_s2: self.gravity_m_per_s2,
+                gravity_m_per_s2: (mni_from_scanner * Vector3::from(self.gravity_m_per_s2)).into(),
                 density_kg_per_m3: self.density_kg_per_m3,
                 pressure: self.pressure.clone(),
                 ..Loads::default()

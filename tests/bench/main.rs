@@ -7,6 +7,7 @@ mod imaging;
 mod job;
 mod material;
 mod mesh;
+mod patients;
 
 use bar::Bar;
 
@@ -19,6 +20,7 @@ fn main() {
         ("material", material::bars),
         ("fem", fem::bars),
         ("experiment", experiment::bars),
+        ("patients", patients::bars),
         ("job", job::bars),
     ];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();

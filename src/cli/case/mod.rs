@@ -15,7 +15,7 @@ pub use anat::{AnatFacts, Anatomy, anat, anat_stage};
 pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, estimate};
 pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_stage, programs};
 pub use observed::{observed_surfaces, reference, reference_stage};
-pub use registration::{RegistrationFacts, registration, registration_stage};
+pub use registration::{RegistrationFacts, mni_from_gravity_frame, registration, registration_stage};
 pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, sample_stage, samples};
 pub use scans::{Overrides, ScanSums, Scans};
 

@@ -4,12 +4,13 @@ use super::{Case, Failure, MNI_FROM_PRE, PRE_FROM_POST, Reject, ScanSums, Scans,
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::RegistrationOutcome;
+use crate::experiment::resection::GravityFrame;
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::Grid;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
 use crate::register::{RigidFit, RigidMasks, RigidSettings, register_rigid, register_to_template};
 use crate::segment::atlas;
-use nalgebra::Point3;
+use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
@@ -70,6 +71,19 @@ pub fn transforms(case: &Case) -> Result<(RigidTransform<Post, Pre>, RigidTransf
     let pre_from_post = rigid_from_text(&text(PRE_FROM_POST)?, PRE_FROM_POST).reject()?;
     let mni_from_pre = rigid_from_text(&text(MNI_FROM_PRE)?, MNI_FROM_PRE).reject()?;
     Ok((pre_from_post, mni_from_pre))
+}
+
+/// What turns a vector of the frame that gravity is given in to the MNI frame.
+///
+/// # Errors
+/// As [`transforms`].
+pub fn mni_from_gravity_frame(case: &Case, frame: GravityFrame) -> Result<UnitQuaternion<f64>, Failure> {
+    let (pre_from_post, mni_from_pre) = transforms(case)?;
+    Ok(match frame {
+        GravityFrame::Mni => UnitQuaternion::identity(),
+        GravityFrame::Pre => mni_from_pre.rotation,
+        GravityFrame::Post => pre_from_post.then(&mni_from_pre).rotation,
+    })
 }
 
 fn write_transform<M: Frame, F: Frame>(produced: &mut Produced, name: &str, transform: &RigidTransform<M, F>) {
