@@ -39,7 +39,7 @@ pub fn resample<S: Frame, T: Frame>(
     outside: f32,
 ) -> Resampled<T> {
     let voxel_from_voxel = voxel_from_voxel(&source.grid, target, source_from_target);
-    let at = |v: [usize; 3]| on_centre(affine_point(&voxel_from_voxel, v));
+    let at = |v: [usize; 3]| on_centre(affine_point(&voxel_from_voxel, v.map(|x| x as f64)));
     sampled(source, target, interpolation, outside, at)
 }
 
@@ -54,8 +54,9 @@ pub fn resample_through<S: Frame, T: Frame>(
 ) -> Resampled<T> {
     let nowhere = [f64::NAN; 3];
     let at = |v: [usize; 3]| {
-        let p = target.position(Point3::from(v.map(|x| x as f64)));
-        source_from_target(p).map_or(nowhere, |p| on_centre(source.grid.voxel_at(p).into()))
+        let p = affine_point(&target.mm_from_voxel, v.map(|x| x as f64));
+        let p = source_from_target(Position::from_point(p.into()));
+        p.map_or(nowhere, |p| on_centre(affine_point(source.grid.voxel_from_mm(), p.mm.into())))
     };
     sampled(source, target, interpolation, outside, at)
 }
@@ -82,8 +83,9 @@ pub fn resample_together<const N: usize, S: Frame, T: Frame>(
         (0..nz).map(|_| rest.each_mut().map(|planes| planes.next().unwrap_or_default())).collect();
     planes.into_par_iter().enumerate().for_each(|(k, mut planes)| {
         for n in 0..nx * ny {
-            let p = target.position(Point3::new((n % nx) as f64, (n / nx) as f64, k as f64));
-            let v: [f64; 3] = grid.voxel_at(source_from_target(p)).into();
+            let p = affine_point(&target.mm_from_voxel, [n % nx, n / nx, k].map(|x| x as f64));
+            let p = source_from_target(Position::from_point(p.into()));
+            let v = affine_point(grid.voxel_from_mm(), p.mm.into());
             if (0..3).all(|a| v[a] >= 0.0 && v[a] <= last[a]) {
                 let cell = Cell::at(&grid, v);
                 for (plane, source) in planes.iter_mut().zip(sources) {
@@ -108,7 +110,7 @@ pub fn resample_nearest<V: Copy + Send + Sync, S: Frame, T: Frame>(
     let [nx, ny, _] = target.dims;
     out.data.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, plane)| {
         for (n, value) in plane.iter_mut().enumerate() {
-            let v = on_centre(affine_point(&voxel_from_voxel, [n % nx, n / nx, k])).map(f64::round);
+            let v = on_centre(affine_point(&voxel_from_voxel, [n % nx, n / nx, k].map(|x| x as f64))).map(f64::round);
             // as-casts saturate, and NaN cannot occur behind a finite affine.
             if let Some(found) = source.get(v[0] as isize, v[1] as isize, v[2] as isize) {
                 *value = found;
@@ -146,8 +148,7 @@ fn voxel_from_voxel<S: Frame, T: Frame>(
 }
 
 #[inline]
-fn affine_point(m: &Matrix4<f64>, v: [usize; 3]) -> [f64; 3] {
-    let [i, j, k] = v.map(|x| x as f64);
+fn affine_point(m: &Matrix4<f64>, [i, j, k]: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|r| m[(r, 0)] * i + (m[(r, 1)] * j + (m[(r, 2)] * k + m[(r, 3)])))
 }
 

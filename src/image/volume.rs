@@ -2,6 +2,7 @@
 
 use super::grid::Grid;
 use crate::geometry::{Frame, Position};
+use rayon::prelude::*;
 
 /// Voxel values on a [`Grid`], i fastest in memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,8 +54,19 @@ impl<T: Copy, F: Frame> Volume<T, F> {
     }
 
     /// Every value through a function.
-    pub fn map<U: Copy>(&self, f: impl Fn(T) -> U) -> Volume<U, F> {
-        Volume { grid: self.grid, data: self.data.iter().map(|&x| f(x)).collect() }
+    pub fn map<U: Copy + Send>(&self, f: impl Fn(T) -> U + Sync) -> Volume<U, F>
+    where
+        T: Sync,
+    {
+        Volume { grid: self.grid, data: self.data.par_iter().map(|&x| f(x)).collect() }
+    }
+
+    /// The value of a function of the position in memory at every voxel of a grid.
+    pub fn from_fn(grid: Grid<F>, f: impl Fn(usize) -> T + Sync + Send) -> Self
+    where
+        T: Send,
+    {
+        Self { grid, data: (0..grid.len()).into_par_iter().map(f).collect() }
     }
 
     /// The same voxels in another frame: for a caller that has learnt what a `Native` image is.

@@ -9,7 +9,7 @@ use super::sample::{Draw, draw};
 use super::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -421,12 +421,10 @@ fn refine_all(level: &Level<'_>, poses: &[Pose]) -> Vec<Pose> {
 /// A mask read at the voxels of an image (nearest voxel).
 pub(super) fn on_grid_of(mask: &Mask<Native>, image: &Volume<f32, Native>) -> Mask<Native> {
     let to_mask = mask.grid.voxel_from_mm() * image.grid.mm_from_voxel;
-    let data = (0..image.grid.len()).map(|n| {
-        let v: Vector3<f64> = Vector3::from(image.grid.voxel(n).map(|i| i as f64));
-        let p = to_mask.transform_point(&v.into());
+    Volume::from_fn(image.grid, |n| {
+        let p = to_mask.transform_point(&Point3::from(image.grid.voxel(n).map(|i| i as f64)));
         mask.get(p.x.round() as isize, p.y.round() as isize, p.z.round() as isize).unwrap_or(false)
-    });
-    Volume::from_data(image.grid, data.collect())
+    })
 }
 
 #[cfg(test)]
@@ -435,7 +433,7 @@ mod tests {
     use crate::geometry::{Mni, Position, Post, Pre};
     use crate::image::Grid;
     use crate::register::synthetic_head::head_value;
-    use nalgebra::{Matrix4, Point3};
+    use nalgebra::{Matrix4, Vector3};
 
     /// The head as a scanner with this grid sees it at this pose, with noise.
     fn scan<F: Frame>(

@@ -37,10 +37,8 @@ pub(super) struct SaggedPair<'a> {
 pub(super) fn with_blood(cavity: &Mask<Mni>, pair: &SaggedPair<'_>, settings: &CavitySettings) -> Mask<Mni> {
     let dark = pair.post.map(|x| f64::from(x) < pair.csf_grey_border);
     let edge_of_dark = dilate(&dark, 1.0);
-    let comparable = Mask::from_data(
-        dark.grid,
-        (0..dark.data.len()).map(|n| pair.brain.data[n] && pair.post_known.data[n] && !edge_of_dark.data[n]).collect(),
-    );
+    let comparable =
+        Mask::from_fn(dark.grid, |n| pair.brain.data[n] && pair.post_known.data[n] && !edge_of_dark.data[n]);
     let least = (pair.grey_white_contrast / 6.0).powi(2) as f32;
     let lost = open(&folds_lost(pair.pre, pair.post, &comparable, least, settings.folds_kept as f32), 1.5);
     // Between the dark part and the blood lies a rim of mixed voxels.
@@ -68,9 +66,7 @@ fn folds_lost(
     let window = Window::new(comparable, WINDOW_MM);
     let noise = Window::new(comparable, NOISE_MM);
     let (a, b) = (noise.mean(pre), noise.mean(post));
-    let product = |x: &Volume<f32, Mni>, y: &Volume<f32, Mni>| {
-        Volume::from_data(x.grid, x.data.iter().zip(&y.data).map(|(x, y)| x * y).collect())
-    };
+    let product = |x: &Volume<f32, Mni>, y: &Volume<f32, Mni>| Volume::from_fn(x.grid, |n| x.data[n] * y.data[n]);
     let (mean_a, mean_b) = (window.mean(&a), window.mean(&b));
     let (aa, bb, ab) = (window.mean(&product(&a, &a)), window.mean(&product(&b, &b)), window.mean(&product(&a, &b)));
     let lost = |n: usize| {
@@ -78,7 +74,7 @@ fn folds_lost(
         let (var_a, var_b) = (aa.data[n] - ma * ma, bb.data[n] - mb * mb);
         comparable.data[n] && var_a > least && ab.data[n] - ma * mb < kept * (var_a * var_b.max(0.1 * least)).sqrt()
     };
-    Mask::from_data(pre.grid, (0..pre.data.len()).map(lost).collect())
+    Mask::from_fn(pre.grid, lost)
 }
 
 /// Means over Gaussian windows that do not look over the edge of a mask.
@@ -94,10 +90,9 @@ impl<'a> Window<'a> {
     }
 
     fn mean(&self, image: &Volume<f32, Mni>) -> Volume<f32, Mni> {
-        let masked = image.data.iter().zip(&self.inside.data).map(|(x, i)| if *i { *x } else { 0.0 }).collect();
-        let sum = gaussian(&Volume::from_data(image.grid, masked), self.sigma_mm);
-        let mean = sum.data.iter().zip(&self.weight.data).map(|(s, w)| s / w.max(1e-3)).collect();
-        Volume::from_data(image.grid, mean)
+        let masked = Volume::from_fn(image.grid, |n| if self.inside.data[n] { image.data[n] } else { 0.0 });
+        let sum = gaussian(&masked, self.sigma_mm);
+        Volume::from_fn(image.grid, |n| sum.data[n] / self.weight.data[n].max(1e-3))
     }
 }
 

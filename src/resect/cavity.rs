@@ -120,18 +120,17 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
     let tissue = pair.pre_labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER);
     let post = pair.post;
     let border = pair.csf_grey_border as f32;
-    let dark = Mask::from_data(
-        grid,
-        post.data.iter().zip(&pair.post_known.data).map(|(value, known)| *known && *value < border).collect(),
-    );
+    let dark = Mask::from_fn(grid, |n| pair.post_known.data[n] && post.data[n] < border);
     let inner = erode(pair.pre_brain, settings.rim_mm);
     let lost = open(&both(&both(&dark, &tissue), &inner), settings.opening_mm);
     let depth_mm = distance_mm(&pair.pre_brain.map(|inside| !inside));
     let loss = |n: usize| f64::from((pair.pre.data[n] - post.data[n]).max(0.0)) * f64::from(depth_mm.data[n]);
     let parts = components(&lost, Connectivity::Faces);
-    let score = |part: u32| (0..grid.len()).filter(|&n| parts.labels.data[n] == part).map(loss).sum::<f64>();
-    let best = (1..=parts.voxels.len() as u32).map(|part| (score(part), part)).max_by(|a, b| a.0.total_cmp(&b.0));
-    let best = best.map_or(0, |(_, part)| part);
+    let mut scores = vec![0.0; parts.voxels.len() + 1];
+    for (n, &part) in parts.labels.data.iter().enumerate().filter(|(_, part)| **part > 0) {
+        scores[part as usize] += loss(n);
+    }
+    let best = (1..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(0) as u32;
     let seed = parts.labels.map(|part| best > 0 && part == best);
     if seed.volume_cc() < settings.smallest_cc {
         return Err(ResectError::NoCavity { largest_cc: seed.volume_cc(), smallest_cc: settings.smallest_cc });
@@ -160,7 +159,7 @@ pub(super) fn with_fluid_of(lost: &Mask<Mni>, tissue: &Mask<Mni>, sigma_mm: f64)
     let gone = gaussian(&both(lost, tissue).map(f32::from), sigma_mm);
     let fluid_lost = |n: usize| all.data[n] > 1e-3 && gone.data[n] > 0.5 * all.data[n];
     let belongs = |n: usize| if tissue.data[n] { lost.data[n] } else { fluid_lost(n) };
-    Mask::from_data(lost.grid, (0..lost.data.len()).map(belongs).collect())
+    Mask::from_fn(lost.grid, belongs)
 }
 
 /// The finding of a mask (or two) given by hand; what is missing is the other one within the brain.
@@ -220,7 +219,7 @@ pub(super) fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask
     }
     // What only hangs on by a thread is a sulcus that opened into the cavity.
     let opened = open(&grown, 1.5);
-    Mask::from_data(seed.grid, opened.data.iter().zip(&seed.data).map(|(a, b)| *a || *b).collect())
+    either(&opened, seed)
 }
 
 fn side_of(mask: &Mask<Mni>) -> Side {
@@ -230,15 +229,15 @@ fn side_of(mask: &Mask<Mni>) -> Side {
 }
 
 pub(super) fn both(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && *b).collect())
+    Mask::from_fn(a.grid, |n| a.data[n] && b.data[n])
 }
 
 pub(super) fn either(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a || *b).collect())
+    Mask::from_fn(a.grid, |n| a.data[n] || b.data[n])
 }
 
 pub(super) fn without(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_data(a.grid, a.data.iter().zip(&b.data).map(|(a, b)| *a && !*b).collect())
+    Mask::from_fn(a.grid, |n| a.data[n] && !b.data[n])
 }
 
 /// A mask without what touches another within `margin_mm`: the post-operative ventricle next to the cavity.

@@ -2,7 +2,9 @@
 
 use crate::geometry::Mni;
 use crate::image::gaussian::gaussian;
-use crate::image::{Mask, Volume};
+use crate::image::resample::resample_together;
+use crate::image::{Grid, Mask, Volume};
+use nalgebra::{Matrix4, Vector3};
 
 /// Divides `post` by the smooth ratio post/pre seen over `tissue`, so that what has not changed has the pre-operative
 /// intensity and thresholds learnt on `pre` hold: scanner gain, bias of either coil and contrast in one step.
@@ -15,7 +17,7 @@ pub fn on_the_scale_of(
     tissue: &Mask<Mni>,
     sigma_mm: f64,
 ) -> Volume<f32, Mni> {
-    let log_ratio: Vec<f32> = pre.data.iter().zip(&post.data).map(|(a, b)| (b.max(1e-3) / a.max(1e-3)).ln()).collect();
+    let log_ratio = Volume::from_fn(pre.grid, |n| (post.data[n].max(1e-3) / pre.data[n].max(1e-3)).ln()).data;
     let mut usable: Vec<f32> =
         log_ratio.iter().zip(&tissue.data).filter(|(r, inside)| **inside && r.is_finite()).map(|(r, _)| *r).collect();
     if usable.is_empty() {
@@ -23,19 +25,42 @@ pub fn on_the_scale_of(
     }
     let middle = usable.len() / 2;
     let median = *usable.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let mut expected = vec![median; log_ratio.len()];
+    let factor = (sigma_mm / (BLOCKS_PER_SIGMA * pre.grid.spacing_mm()[0])).max(1.0) as usize;
+    let mut expected = Volume::filled(pre.grid, median);
     // Half and double are wide for a bias of 30 % either way; the second limit is what tissue contrast allows.
     for limit in [std::f32::consts::LN_2, 0.25] {
-        let near = |n: usize| tissue.data[n] && (log_ratio[n] - expected[n]).abs() < limit;
-        let weight: Vec<f32> = (0..log_ratio.len()).map(|n| f32::from(u8::from(near(n)))).collect();
-        let weighted = weight.iter().zip(&log_ratio).map(|(w, r)| if *w > 0.0 { *r - median } else { 0.0 }).collect();
-        let weight = gaussian(&Volume::from_data(pre.grid, weight), sigma_mm);
-        let weighted = gaussian(&Volume::from_data(pre.grid, weighted), sigma_mm);
+        let near = |n: usize| tissue.data[n] && (log_ratio[n] - expected.data[n]).abs() < limit;
+        let weight = Volume::from_fn(pre.grid, |n| f32::from(near(n)));
+        let weighted = Volume::from_fn(pre.grid, |n| if near(n) { log_ratio[n] - median } else { 0.0 });
+        let [weight, weighted] = [weight, weighted].map(|v| gaussian(&block_means(&v, factor), sigma_mm));
         // The small weight draws places without tissue to the median.
-        expected = weight.data.iter().zip(&weighted.data).map(|(w, s)| median + s / (w + 1e-3)).collect();
+        let smooth = Volume::from_fn(weight.grid, |n| median + weighted.data[n] / (weight.data[n] + 1e-3));
+        [expected] = resample_together([&smooth], &pre.grid, |p| p, [median]);
     }
-    let data = post.data.iter().zip(&expected).map(|(p, e)| p / e.exp()).collect();
-    Volume::from_data(post.grid, data)
+    Volume::from_fn(post.grid, |n| post.data[n] / expected.data[n].exp())
+}
+
+/// A Gaussian is smoothed on blocks this much smaller than its standard deviation.
+const BLOCKS_PER_SIGMA: f64 = 6.0;
+
+/// Means over blocks of `factor` voxels along each axis; what of a block lies beyond the grid counts as 0.
+fn block_means(volume: &Volume<f32, Mni>, factor: usize) -> Volume<f32, Mni> {
+    let [nx, ny, nz] = volume.grid.dims;
+    let dims = volume.grid.dims.map(|n| n.div_ceil(factor));
+    let centre = (factor as f64 - 1.0) / 2.0;
+    let fine_from_coarse = Matrix4::new_scaling(factor as f64).append_translation(&Vector3::repeat(centre));
+    let Some(grid) = Grid::new(dims, volume.grid.mm_from_voxel * fine_from_coarse) else { return volume.clone() };
+    Volume::from_fn(grid, |n| {
+        let [i, j, k] = grid.voxel(n).map(|c| c * factor);
+        let mut sum = 0f32;
+        for k in k..(k + factor).min(nz) {
+            for j in j..(j + factor).min(ny) {
+                let row = volume.grid.index(0, j, k);
+                sum += volume.data[row + i..row + (i + factor).min(nx)].iter().sum::<f32>();
+            }
+        }
+        sum / factor.pow(3) as f32
+    })
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::{
 use crate::geometry::{Mni, Post, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::resample::{Interpolation, resample};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::segment::{
     HeadError, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, label, segment_head,
@@ -157,18 +157,20 @@ pub fn take_pair_apart(
     let sag = fitted_sag(&before, &post_t1, &post_on_mni.inside, &finding.cavity, &settings.sag)
         .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
     if computed {
+        let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
+        let cavity = finding.cavity.cropped(&near);
         let carried = [&before.t1_mni, &tissue.map(f32::from), &before.brain_mni.map(f32::from)];
-        let [pre, tissue, brain] = sag.atlas_from_subject.warp(carried, &grid);
+        let [pre, tissue, brain] = sag.atlas_from_subject.warp(carried, &cavity.grid);
         let pair = SaggedPair {
             pre: &pre,
             tissue: &tissue.map(|share| share >= 0.5),
             brain: &brain.map(|share| share >= 0.5),
-            post: &post_t1,
-            post_known: &post_on_mni.inside,
+            post: &post_t1.cropped(&near),
+            post_known: &post_on_mni.inside.cropped(&near),
             csf_grey_border: before.csf_grey_border,
             grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
         };
-        finding.cavity = with_blood(&finding.cavity, &pair, &settings.cavity);
+        finding.cavity.paste(&with_blood(&cavity, &pair, &settings.cavity), &near);
     }
     if given.resected.is_none() {
         finding.resected = refilled(&finding.cavity, &sag, &before);
@@ -188,6 +190,16 @@ pub fn take_pair_apart(
     }
     let post_brain = apart_from(&after.brain_mni, &finding.cavity, 0.0);
     Ok(OperatedBrain { pre: before, post: after, finding, template: pre_fit, sag, post_ventricle, post_brain })
+}
+
+/// What lies further from the cavity than this has no part in it, mm: more than any brain sags, and more than the windows
+/// of all filters.
+const NEAR_MM: f64 = 25.0;
+
+/// The box around a mask with a margin; the whole grid for an empty mask.
+fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {
+    let whole = VoxelBox { first: [0; 3], end: mask.grid.dims };
+    mask.bounding_box().map_or(whole, |found| found.grown(&mask.grid, margin_mm))
 }
 
 /// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
@@ -212,8 +224,11 @@ fn fitted_sag(
 
 /// The tissue that filled the cavity: what lies there once the sag is undone.
 fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
-    let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid);
-    both(&undone.map(|share| share >= 0.5), &before.brain_mni)
+    let near = around(cavity, NEAR_MM);
+    let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid.cropped(&near));
+    let mut undone_whole = Mask::filled(cavity.grid, false);
+    undone_whole.paste(&undone.map(|share| share >= 0.5), &near);
+    both(&undone_whole, &before.brain_mni)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

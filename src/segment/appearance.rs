@@ -66,12 +66,12 @@ impl Appearance {
     }
 
     /// The content of a voxel of intensity `value`; `believed` is the prior of the tissues, `field` what its neighbours add
-    /// to it. Each half of a voxel is drawn from the prior: both alike make a pure voxel.
+    /// to it. Each half of a voxel is drawn from both: halves alike make a pure voxel.
     #[inline]
     pub(super) fn seen(&self, value: f32, believed: &[f32; CLASSES], field: &[f64; CLASSES]) -> Seen {
         let value = f64::from(value);
         let likelihood = self.likelihood(value);
-        let prior: [f64; CLASSES] = std::array::from_fn(|k| f64::from(believed[k]) * field[k].sqrt());
+        let prior: [f64; CLASSES] = std::array::from_fn(|k| f64::from(believed[k]) * field[k]);
         let mut pure: [f64; CLASSES] = std::array::from_fn(|k| prior[k] * prior[k] * likelihood[k] + 1e-12);
         let mixed: [f64; PAIRS.len()] =
             std::array::from_fn(|n| 2.0 * prior[PAIRS[n].0] * prior[PAIRS[n].1] * likelihood[CLASSES + n]);

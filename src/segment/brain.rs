@@ -74,6 +74,6 @@ pub(super) fn brain_mask(
 }
 
 /// A mask on the grid of `like`.
-pub(super) fn at_each(like: &Volume<f32, Mni>, rule: impl Fn(usize) -> bool) -> Mask<Mni> {
-    Volume::from_data(like.grid, (0..like.data.len()).map(rule).collect())
+pub(super) fn at_each(like: &Volume<f32, Mni>, rule: impl Fn(usize) -> bool + Sync + Send) -> Mask<Mni> {
+    Volume::from_fn(like.grid, rule)
 }

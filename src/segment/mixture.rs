@@ -148,7 +148,7 @@ fn start(values: &[f32], believed: &[[f32; CLASSES]]) -> ([f64; CLASSES], [f64; 
     (means, [spread; CLASSES])
 }
 
-/// exp(weight * sum of the neighbours' contents): mean field of a Potts model.
+/// exp(weight * sum of the neighbours' contents) for half a voxel: mean field of a Potts model.
 #[inline]
 fn neighbour_field(slots: &[u32; 6], contents: &[[f32; CLASSES]], weight: f64) -> [f64; CLASSES] {
     let mut sum = [0.0f64; CLASSES];
@@ -157,7 +157,7 @@ fn neighbour_field(slots: &[u32; 6], contents: &[[f32; CLASSES]], weight: f64) -
             sum[k] += f64::from(contents[slot as usize][k]);
         }
     }
-    sum.map(|s| (weight * s).exp())
+    sum.map(|s| (0.5 * weight * s).exp())
 }
 
 fn neighbour_slots(dims: [usize; 3], voxels: &[u32]) -> Vec<[u32; 6]> {

@@ -316,8 +316,7 @@ fn computed_brain(
 
 fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture) -> Volume<f32, Mni> {
     let grid = raw.grid;
-    let value = |n: usize| (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32;
-    Volume::from_data(grid, (0..grid.len()).map(value).collect())
+    Volume::from_fn(grid, |n| (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32)
 }
 
 fn most_probable(like: &Volume<f32, Mni>, model: &Mixture) -> LabelMap<Mni> {

@@ -4,7 +4,7 @@ use super::velocity::{Cell, VectorField};
 use crate::geometry::{Frame, Position};
 use crate::image::resample::resample_together;
 use crate::image::{Grid, Mask, Volume};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 use rayon::prelude::*;
 
 /// A smooth map of the points of a frame: an affine part that holds everywhere and a deformation kept on a grid (beyond
@@ -14,35 +14,54 @@ pub struct DisplacementField<F: Frame> {
     grid: Grid<F>,
     /// Displacement of the deformation in voxels of the grid.
     components: [Vec<f32>; 3],
-    /// The affine part before and after the deformation.
-    before: Affine,
-    after: Affine,
+    /// To voxels of the grid, by way of the affine part before the deformation.
+    to_voxel: Affine,
+    /// From voxels of the grid to mm and through the affine part after the deformation.
+    to_mm: Affine,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Affine {
     linear: Matrix3<f64>,
-    shift_mm: Vector3<f64>,
+    shift: Vector3<f64>,
 }
 
 impl Affine {
-    fn identity() -> Self {
-        Self { linear: Matrix3::identity(), shift_mm: Vector3::zeros() }
+    fn of(matrix: &Matrix4<f64>) -> Self {
+        let (linear, shift) = (matrix.fixed_view::<3, 3>(0, 0).into(), matrix.fixed_view::<3, 1>(0, 3).into());
+        Self { linear, shift }
+    }
+
+    /// First `self`, then `other`.
+    fn then(self, other: Self) -> Self {
+        Self { linear: other.linear * self.linear, shift: other.linear * self.shift + other.shift }
+    }
+
+    #[inline]
+    fn apply(&self, x: Vector3<f64>) -> Vector3<f64> {
+        self.linear * x + self.shift
     }
 }
 
 impl<F: Frame> DisplacementField<F> {
+    /// A deformation without an affine part.
+    fn plain(grid: Grid<F>, components: [Vec<f32>; 3]) -> Self {
+        let (to_voxel, to_mm) = (Affine::of(grid.voxel_from_mm()), Affine::of(&grid.mm_from_voxel));
+        Self { grid, components, to_voxel, to_mm }
+    }
+
     /// First the flow, then the affine map.
     pub(super) fn after_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
-        let after = Affine { linear: *linear, shift_mm: *shift_mm };
-        Self { grid: flow.grid.relabelled(), components: flow.components.clone(), before: Affine::identity(), after }
+        let plain = Self::plain(flow.grid.relabelled(), flow.components.clone());
+        Self { to_mm: plain.to_mm.then(Affine { linear: *linear, shift: *shift_mm }), ..plain }
     }
 
     /// First the inverse of the affine map (the identity when it has none), then the flow.
     pub(super) fn before_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
         let inverse = linear.try_inverse().unwrap_or_else(Matrix3::identity);
-        let before = Affine { linear: inverse, shift_mm: -(inverse * shift_mm) };
-        Self { grid: flow.grid.relabelled(), components: flow.components.clone(), before, after: Affine::identity() }
+        let before = Affine { linear: inverse, shift: -(inverse * shift_mm) };
+        let plain = Self::plain(flow.grid.relabelled(), flow.components.clone());
+        Self { to_voxel: before.then(plain.to_voxel), ..plain }
     }
 
     /// The map that a displacement (mm) sampled on a grid stands for.
@@ -56,7 +75,7 @@ impl<F: Frame> DisplacementField<F> {
                 component.push(*v as f32);
             }
         }
-        Self { grid, components, before: Affine::identity(), after: Affine::identity() }
+        Self::plain(grid, components)
     }
 
     /// How far every point of the field's grid moves, mm: what [`Self::from_displacement`] takes. Rounded to a 64th
@@ -77,12 +96,10 @@ impl<F: Frame> DisplacementField<F> {
 
     /// Where a point goes.
     pub fn apply(&self, p: Position<F>) -> Position<F> {
-        let q = Position::<F>::from_point(Point3::from(self.before.linear * p.mm.coords + self.before.shift_mm));
-        let v = self.grid.voxel_at(q);
+        let v = self.to_voxel.apply(p.mm.coords);
         let cell = Cell::at(self.grid.dims, [v.x as f32, v.y as f32, v.z as f32]);
         let d = Vector3::from([0, 1, 2].map(|a| f64::from(cell.of(&self.components[a]))));
-        let moved = self.grid.mm_from_voxel.transform_point(&(v + d)).coords;
-        Position::from_point(Point3::from(self.after.linear * moved + self.after.shift_mm))
+        Position::from_point(Point3::from(self.to_mm.apply(v + d)))
     }
 
     /// Images seen through the map on a grid: the value at `p` is the image's at `apply(p)`, linearly interpolated; 0 where
@@ -100,7 +117,7 @@ impl<F: Frame> DisplacementField<F> {
     pub(super) fn jacobian_range<G: Frame>(&self, mask: &Mask<G>) -> (f64, f64) {
         let dims = self.grid.dims;
         let stride = [1, dims[0], dims[0] * dims[1]];
-        let affine = self.before.linear.determinant() * self.after.linear.determinant();
+        let affine = self.to_voxel.linear.determinant() * self.to_mm.linear.determinant();
         let determinant = |n: usize| {
             let x = self.grid.voxel(n);
             let mut gradient = Matrix3::<f64>::identity();

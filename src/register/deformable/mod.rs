@@ -136,7 +136,7 @@ pub fn fit_atlas<F: Frame>(
     let subject: Volume<f32, Native> = subject.clone().relabelled();
     let left_out = left_out.map(|m| on_grid_of(&m.clone().relabelled(), &subject));
     let is_known = |n: usize| subject.data[n].is_finite() && left_out.as_ref().is_none_or(|m| !m.data[n]);
-    let known: Mask<Native> = Volume::from_data(subject.grid, (0..subject.data.len()).map(is_known).collect());
+    let known: Mask<Native> = Volume::from_fn(subject.grid, is_known);
     let subject = subject.map(|x| if x.is_finite() { x } else { 0.0 });
 
     let pose = if settings.affine {
