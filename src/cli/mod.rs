@@ -48,7 +48,7 @@ pub struct Hgm {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Prep(prep::Args),
+    Prep(prep::Command),
     Run(run::Args),
     Phantom(phantom::Args),
     Sweep(sweep::Args),
@@ -75,7 +75,7 @@ pub fn main() -> ExitCode {
     let json = hgm.global.json;
     let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
         Command::Demo(args) => demo::run(&args, &session),
-        Command::Prep(args) => prep::run(&args, &session),
+        Command::Prep(command) => prep::run(&command, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
         Command::Sweep(args) => sweep::run(&args, &session),

@@ -14,6 +14,16 @@ use std::path::PathBuf;
 ///
 /// Example: hgm prep pre.nii.gz post.nii.gz -o case
 #[derive(Debug, clap::Args)]
+pub struct Command {
+    #[command(flatten)]
+    args: Args,
+    /// Stop at the registered images and masks
+    #[arg(long, conflicts_with_all = ["mesher", "cells", "edge_mm"])]
+    no_mesh: bool,
+}
+
+/// A pair and where its case goes.
+#[derive(Debug, clap::Args)]
 // Flattened into `run`, whose own group of arguments has this name.
 #[group(skip)]
 pub struct Args {
@@ -30,8 +40,15 @@ pub struct Args {
     pub mesh: MeshOptions,
 }
 
-pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub fn run(command: &Command, session: &Session) -> Result<(), Failure> {
+    let args = &command.args;
     let case = Case::open(&args.output, session);
+    if command.no_mesh {
+        let images = Images::of(&case, args, session)?;
+        let outcome = image_outcome(&images.registration, &images.anat, &images.manifests);
+        let page = case.finish(&outcome, &BTreeMap::new(), &images.manifests)?;
+        return session.emit(&outcome, &page);
+    }
     let prepared = prepare(&case, args, session)?;
     let outcome = prepared.outcome();
     // Sweeps of this case, in however many shards, start from these.
@@ -42,6 +59,35 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let page = case.finish(&outcome, &settings, &prepared.manifests)?;
     session.emit(&outcome, &page)?;
     prepared.quality_gate()
+}
+
+/// The stages of images: registration and masks.
+#[derive(Debug)]
+struct Images {
+    manifests: [Manifest; 2],
+    registration: RegistrationFacts,
+    anat: AnatFacts,
+}
+
+impl Images {
+    /// Runs (or skips) them.
+    fn of(case: &Case, args: &Args, session: &Session) -> Result<Self, Failure> {
+        let scans = Scans::read(&args.pre, &args.post, session)?;
+        let (registered, registration) = case::registration(case, &scans, session)?;
+        let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
+        Ok(Self { manifests: [registered, segmented], registration, anat })
+    }
+}
+
+/// The part of an outcome that images alone give.
+fn image_outcome(registration: &RegistrationFacts, anat: &AnatFacts, manifests: &[Manifest]) -> ExperimentOutcome {
+    ExperimentOutcome {
+        kind: ExperimentKind::Resection,
+        volumes: Some(anat.volumes),
+        registrations: registration.fits.clone(),
+        warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
+        ..ExperimentOutcome::default()
+    }
 }
 
 /// What `prep` leaves for the experiments.
@@ -62,9 +108,7 @@ pub struct Prepared {
 /// # Errors
 /// The first stage that is rejected or fails.
 pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, Failure> {
-    let scans = Scans::read(&args.pre, &args.post, session)?;
-    let (registered, registration) = case::registration(case, &scans, session)?;
-    let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
+    let Images { manifests: [registered, segmented], registration, anat } = Images::of(case, args, session)?;
     let anatomy = Anatomy::read(case)?;
     let landmarks = Some(&anatomy.template_from_patient);
     let (meshed, mesh) = case::mesh(case, &anatomy.labels, landmarks, &args.mesh, &segmented, session)?;
@@ -88,13 +132,9 @@ impl Prepared {
     /// The part of an outcome that is known before any simulation.
     pub fn outcome(&self) -> ExperimentOutcome {
         ExperimentOutcome {
-            kind: ExperimentKind::Resection,
-            volumes: Some(self.anat.volumes),
             sets: self.mesh.sets.clone(),
-            registrations: self.registration.fits.clone(),
             mesh: Some(self.mesh.mesh.clone()),
-            warnings: self.manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
-            ..ExperimentOutcome::default()
+            ..image_outcome(&self.registration, &self.anat, &self.manifests)
         }
     }
 

@@ -66,7 +66,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         register_to_template(&t1, &atlas::template().t1_f32(), &register).with_context(|| name.clone()).reject()?;
     bar.inc(1);
     bar.set_message("labels");
-    let overrides = SegmentOverrides { brain: brain.as_ref() };
+    let overrides = SegmentOverrides { brain: brain.as_ref(), ..SegmentOverrides::default() };
     let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &deformable, &settings)
         .with_context(|| name.clone())
         .reject()?;

@@ -49,11 +49,13 @@ impl Default for PairSettings {
     }
 }
 
-/// Masks the user brings, on the template's grid but for the brain; they win over the computed ones.
+/// Masks the user brings, on the template's grid but for brain and ventricle; they win over the computed ones.
 #[derive(Clone, Debug, Default)]
 pub struct GivenMasks {
     /// The brain on the pre-operative scan.
     pub brain: Option<Mask<Pre>>,
+    /// Lateral and third ventricles on the pre-operative scan.
+    pub ventricle: Option<Mask<Pre>>,
     /// The cavity.
     pub cavity: Option<Mask<Mni>>,
     /// The resected tissue.
@@ -123,8 +125,8 @@ pub fn take_pair_apart(
     let grid = atlas::template().grid();
 
     step("pre-operative tissue");
-    let brain = SegmentOverrides { brain: given.brain.as_ref() };
-    let (before, pre_fit) = segment_head(pre, mni_from_pre, &brain, &settings.deformable, &settings.segment)
+    let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
+    let (before, pre_fit) = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment)
         .map_err(|source| PairError::Head { scan: "pre", source })?;
 
     step("cavity");

@@ -57,11 +57,13 @@ impl Default for SegmentSettings {
 pub struct SegmentOverrides<'a, F: Frame> {
     /// The brain, on any grid of the image's frame.
     pub brain: Option<&'a Mask<F>>,
+    /// Lateral and third ventricles, on any grid of the image's frame.
+    pub ventricle: Option<&'a Mask<F>>,
 }
 
 impl<F: Frame> Default for SegmentOverrides<'_, F> {
     fn default() -> Self {
-        Self { brain: None }
+        Self { brain: None, ventricle: None }
     }
 }
 
@@ -234,7 +236,12 @@ pub fn segment_with_priors<F: Frame>(
     }
     let mut labels_mni = most_probable(&raw, &model);
     let csf = labels_mni.map(|l| l == label::CSF);
-    let ventricle = ventricles(&csf, &brain, priors, &settings.ventricle);
+    let ventricle = if let Some(mask) = overrides.ventricle {
+        let given = mask_on(mask, &grid, &t1_from_mni);
+        at_each(&raw, |n| given.data[n] && brain.data[n])
+    } else {
+        ventricles(&csf, &brain, priors, &settings.ventricle)
+    };
     if ventricle.count() == 0 {
         warnings.push(SegmentWarning::NoVentricle);
     }

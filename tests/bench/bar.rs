@@ -1,5 +1,8 @@
 //! One bar of an issue: what was asked, what was measured.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 /// A named bar with its measured figure.
 #[allow(clippy::struct_field_names, reason = "the word of the issues")]
 pub struct Bar {
@@ -79,4 +82,41 @@ pub fn run_hgm(arguments: &[&str]) -> Finished {
         std::io::Read::read_to_string(&mut stdout, &mut printed).ok();
     }
     Finished { ok: status.success(), wall_s: begin.elapsed().as_secs_f64(), cpu_s, peak_gb, printed }
+}
+
+/// Wall time of a run that must succeed.
+pub fn wall(name: &str, seconds: f64, run: &Finished) -> Bar {
+    Bar::new(
+        &format!("{name}, time"),
+        &format!("<= {seconds:.0} s on 2 cores, exit 0"),
+        format!("{:.1} s wall, {:.1} CPU-s, {}", run.wall_s, run.cpu_s, if run.ok { "exit 0" } else { "failed" }),
+        run.ok && run.wall_s <= seconds,
+    )
+}
+
+/// Peak memory of a run.
+pub fn memory(name: &str, gigabytes: f64, run: &Finished) -> Bar {
+    Bar::new(
+        &format!("{name}, peak memory"),
+        &format!("<= {gigabytes} GB"),
+        format!("{:.2} GB", run.peak_gb),
+        run.peak_gb <= gigabytes,
+    )
+}
+
+/// Every file below a folder, by its path there.
+pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if let (Ok(name), Ok(bytes)) = (path.strip_prefix(folder), std::fs::read(&path)) {
+                found.insert(name.display().to_string(), bytes);
+            }
+        }
+    }
+    found
 }

@@ -1,16 +1,18 @@
 //! Bars of registration, segmentation and resection on the pairs with known truth.
 
-use crate::bar::{Bar, cpu_seconds, data};
-use hgm::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::bar::{Bar, contents, cpu_seconds, data, memory, run_hgm, wall};
+use hgm::experiment::counter_rng::CounterRng;
+use hgm::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use hgm::image::distance::distance_mm;
 use hgm::image::morphology::erode;
 use hgm::image::nifti::{ReadOptions, decode, decode_labels};
-use hgm::image::{LabelMap, Mask, Volume};
+use hgm::image::resample::{Interpolation, resample};
+use hgm::image::{Grid, LabelMap, Mask, Volume};
 use hgm::register::{RigidMasks, RigidSettings, register_rigid, register_to_template};
 use hgm::resect::{GivenMasks, PairSettings, take_pair_apart};
 use hgm::segment::native::mask_on;
 use hgm::segment::{SegmentOverrides, SegmentSettings, atlas, label, segment_t1};
-use nalgebra::{Matrix4, Point3};
+use nalgebra::{Matrix4, Point3, Vector3};
 use std::path::Path;
 
 /// Bars of one case: rigid mean and max (mm), cavity and resected tissue (Dice).
@@ -18,13 +20,32 @@ struct Wanted {
     case: &'static str,
     rigid_mm: [f64; 2],
     cavity: f64,
+    cavity_with_true_masks: f64,
     resected: f64,
 }
 
 const WANTED: [Wanted; 3] = [
-    Wanted { case: "A_colin_L_mild", rigid_mm: [0.08, 0.15], cavity: 0.88, resected: 0.90 },
-    Wanted { case: "B_colin_R_hard", rigid_mm: [0.20, 0.35], cavity: 0.78, resected: 0.80 },
-    Wanted { case: "F_colin_R_vent", rigid_mm: [0.20, 0.40], cavity: 0.80, resected: 0.84 },
+    Wanted {
+        case: "A_colin_L_mild",
+        rigid_mm: [0.08, 0.15],
+        cavity: 0.88,
+        cavity_with_true_masks: 0.90,
+        resected: 0.90,
+    },
+    Wanted {
+        case: "B_colin_R_hard",
+        rigid_mm: [0.20, 0.35],
+        cavity: 0.78,
+        cavity_with_true_masks: 0.82,
+        resected: 0.80,
+    },
+    Wanted {
+        case: "F_colin_R_vent",
+        rigid_mm: [0.20, 0.40],
+        cavity: 0.80,
+        cavity_with_true_masks: 0.84,
+        resected: 0.84,
+    },
 ];
 
 pub fn bars() -> Vec<Bar> {
@@ -37,7 +58,29 @@ pub fn bars() -> Vec<Bar> {
         let folder = data.join("cases").join(wanted.case);
         if folder.exists() { case_bars(wanted, &folder, &mut bars) } else { println!("skipped: {}", wanted.case) }
     }
+    bars.extend(prep_bars(&data.join("cases").join(WANTED[0].case)));
     bars
+}
+
+/// The program's own way from a pair to images and masks.
+fn prep_bars(folder: &Path) -> Vec<Bar> {
+    let cases = tempfile::tempdir().unwrap();
+    let prepared = |threads: &str| {
+        let scan = |name: &str| folder.join(name).display().to_string();
+        let case = cases.path().join(threads).display().to_string();
+        let pair = [scan("pre.nii.gz"), scan("post.nii.gz")];
+        run_hgm(&["prep", "-q", "--no-mesh", &pair[0], &pair[1], "-o", &case, "--threads", threads])
+    };
+    let (one, two) = (prepared("1"), prepared("2"));
+    let name = "imaging prep without meshing";
+    let (a, b) = (contents(&cases.path().join("1")), contents(&cases.path().join("2")));
+    let equal = one.ok && two.ok && a == b;
+    let said = if equal { format!("{} files equal", a.len()) } else { "files differ".to_owned() };
+    vec![
+        wall(name, 30.0, &two),
+        memory(name, 2.0, &two),
+        Bar::new(&format!("{name}, 1 and 2 threads"), "same bytes", said, equal),
+    ]
 }
 
 /// The template against its own maps.
@@ -82,9 +125,15 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
 
     let template = atlas::template().t1_f32();
     let mni_from_pre = register_to_template(&pre, &template, &settings).unwrap().fixed_from_moving;
+    for (seed, what) in [(1, "to MNI from two poses"), (2, "to MNI from two poses, again")] {
+        let (moved, pre_from_moved) = in_another_pose(&pre, seed);
+        let mni_from_moved = register_to_template(&moved, &template, &settings).unwrap().fixed_from_moving;
+        let apart = disagreement_mm(&mni_from_pre, &mni_from_moved, &pre_from_moved, &brain);
+        bar(what, "<= .2 mm".into(), format!("{apart:.3} mm"), apart <= 0.2);
+    }
     let mni_from_post = register_to_template(&post, &template, &settings).unwrap().fixed_from_moving;
     let apart = disagreement_mm(&mni_from_pre, &mni_from_post, &pre_from_post, &brain);
-    bar("to MNI from two poses (operated head)", "<= .2 mm".into(), format!("{apart:.2} mm"), apart <= 0.2);
+    println!("{letter}: to MNI from pre and from the operated head through pre: {apart:.2} mm apart");
 
     let settings = PairSettings::default();
     let before = cpu_seconds();
@@ -95,7 +144,7 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
         Ok(found) => found,
         Err(error) => return bar("masks", "found".into(), error.to_string(), false),
     };
-    bar("masks, time", "prep <= 30 s wall on 2 cores".into(), format!("{masks_cpu:.1} CPU-s"), masks_cpu <= 55.0);
+    println!("{letter}: masks in {masks_cpu:.1} CPU-s");
     let mni_from_post = pre_from_post.then(&mni_from_pre);
     let tissue: LabelMap<Pre> = labels(&truth("tissue_pre"));
     let ventricle: Mask<Pre> = mask(&truth("ventricles_clean_pre"));
@@ -120,6 +169,16 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
     let cavity: Mask<Post> = mask(&truth("cavity_post"));
     let dice = mask_on(&found.finding.cavity, &post.grid, &mni_from_post).dice(&cavity);
     bar("cavity Dice", format!(">= {}", wanted.cavity), format!("{dice:.3}"), dice >= wanted.cavity);
+    let given = GivenMasks { brain: Some(brain), ventricle: Some(ventricle), ..none };
+    let told = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &given, &settings, |_| {});
+    let dice = told.map_or(0.0, |t| mask_on(&t.finding.cavity, &post.grid, &mni_from_post).dice(&cavity));
+    let wanted_told = wanted.cavity_with_true_masks;
+    bar(
+        "cavity Dice, true brain and ventricle",
+        format!(">= {wanted_told}"),
+        format!("{dice:.3}"),
+        dice >= wanted_told,
+    );
     let resected: Mask<Pre> = mask(&truth("resected_pre"));
     let dice = mask_on(&found.finding.resected, &pre.grid, &mni_from_pre).dice(&resected);
     bar("resected Dice", format!(">= {}", wanted.resected), format!("{dice:.3}"), dice >= wanted.resected);
@@ -151,6 +210,23 @@ fn rigid_error_mm(pre_from_post: &RigidTransform<Post, Pre>, brain: &Mask<Pre>, 
         (sum, count, max) = (sum + error, count + 1.0, max.max(error));
     }
     [sum / count, max]
+}
+
+/// The same head lying otherwise: turned by 15 degrees about a random axis and moved by 20 mm in a random direction, seen
+/// on a grid that is neither aligned with the first nor has its voxels.
+fn in_another_pose(pre: &Volume<f32, Pre>, seed: u64) -> (Volume<f32, Post>, RigidTransform<Post, Pre>) {
+    let direction = |stream: u64| {
+        let rng = CounterRng::new(seed, stream);
+        Vector3::from([0, 1, 2].map(|a| 2.0 * rng.uniform(a) - 1.0)).normalize()
+    };
+    let middle = pre.grid.position(Point3::from(pre.grid.dims.map(|n| n as f64 / 2.0))).mm;
+    let pre_from_moved = RigidTransform::about(middle, direction(1) * 15f64.to_radians(), direction(2) * 20.0);
+    let centre = pre_from_moved.inverse().apply(Position::from_point(middle)).mm;
+    let (dims, spacing_mm) = ([250, 270, 260], 0.97);
+    let origin = [0, 1, 2].map(|a| centre[a] - 0.5 * spacing_mm * dims[a] as f64);
+    let grid = Grid::axis_aligned(dims, [spacing_mm; 3], origin);
+    let seen = resample(pre, &grid, &pre_from_moved.to_affine(), Interpolation::CubicBSpline, 0.0);
+    (seen.volume, pre_from_moved)
 }
 
 /// Mean distance over the brain between the way to MNI straight from pre and that through post.

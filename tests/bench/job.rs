@@ -1,8 +1,6 @@
 //! Bars of the whole job, run as a user runs it: the demo, a patient, the phantom.
 
-use crate::bar::{Bar, Finished, data, run_hgm};
-use std::collections::BTreeMap;
-use std::path::Path;
+use crate::bar::{Bar, contents, data, memory, run_hgm, wall};
 
 pub fn bars() -> Vec<Bar> {
     let mut bars = Vec::new();
@@ -35,38 +33,4 @@ pub fn bars() -> Vec<Bar> {
     bars.push(memory("job run A, two-tissue estimate", 3.0, &two_tissues));
     println!("{}", two_tissues.printed.trim_end());
     bars
-}
-
-fn wall(name: &str, seconds: f64, run: &Finished) -> Bar {
-    Bar::new(
-        &format!("{name}, time"),
-        &format!("<= {seconds:.0} s on 2 cores, exit 0"),
-        format!("{:.1} s wall, {:.1} CPU-s, {}", run.wall_s, run.cpu_s, if run.ok { "exit 0" } else { "failed" }),
-        run.ok && run.wall_s <= seconds,
-    )
-}
-
-fn memory(name: &str, gigabytes: f64, run: &Finished) -> Bar {
-    Bar::new(
-        &format!("{name}, peak memory"),
-        &format!("<= {gigabytes} GB"),
-        format!("{:.2} GB", run.peak_gb),
-        run.peak_gb <= gigabytes,
-    )
-}
-
-fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(next).into_iter().flatten().flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if let (Ok(name), Ok(bytes)) = (path.strip_prefix(folder), std::fs::read(&path)) {
-                found.insert(name.display().to_string(), bytes);
-            }
-        }
-    }
-    found
 }

@@ -119,6 +119,7 @@ pub fn anat(
         Ok(Some(mask))
     };
     let brain = given("brain mask", &overrides.brain_mask)?;
+    let ventricle = given("ventricle mask", &overrides.ventricle_mask)?;
     let cavity = given("cavity mask", &overrides.cavity_mask)?;
     let resected = given("resected mask", &overrides.resected_mask)?;
 
@@ -128,11 +129,13 @@ pub fn anat(
         let mni_from_post = pre_from_post.then(&mni_from_pre);
         let grid = atlas::template().grid();
         let on_mni = |mask: &GivenMask| mask.on_mni(&grid, &mni_from_pre, &mni_from_post);
+        let on_pre = |mask: &GivenMask| match mask {
+            GivenMask::Pre(mask) => mask.clone(),
+            GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
+        };
         let given = GivenMasks {
-            brain: brain.as_ref().map(|mask| match mask {
-                GivenMask::Pre(mask) => mask.clone(),
-                GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
-            }),
+            brain: brain.as_ref().map(on_pre),
+            ventricle: ventricle.as_ref().map(on_pre),
             cavity: cavity.as_ref().map(on_mni),
             resected: resected.as_ref().map(on_mni),
         };

@@ -17,6 +17,9 @@ pub struct Overrides {
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
     #[arg(long, value_name = "FILE")]
     pub brain_mask: Option<PathBuf>,
+    /// A mask of the lateral and third ventricles before the operation, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    pub ventricle_mask: Option<PathBuf>,
     /// A mask of the cavity, in the grid of either scan (wins over the computed one)
     #[arg(long, value_name = "FILE")]
     pub cavity_mask: Option<PathBuf>,
