@@ -5,7 +5,7 @@ use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
 use crate::experiment::phantom::{PhantomSettings, nearest_sample};
-use crate::experiment::prior::samples_of_prior;
+use crate::experiment::prior::{samples_of_every_task, samples_of_prior};
 use crate::experiment::sweep::{Reference, best_sample, solve_sample};
 use crate::mesh::format::{Field, vtu};
 use crate::segment::atlas;
@@ -25,6 +25,10 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
+    /// Nine samples of every task of the generative model (elastography, linear, hyperelastic; grey, white, healthy brain)
+    /// instead of one task's; one tissue only
+    #[arg(long, conflicts_with = "study")]
+    every_task: bool,
     #[command(flatten)]
     prior: PriorOptions,
     /// Also try the reference's own moduli
@@ -40,7 +44,14 @@ pub struct Args {
 impl Args {
     /// What the demo runs.
     pub fn demo(output: PathBuf, mesh: MeshOptions) -> Self {
-        Self { tissues: Some(1), prior: PriorOptions::default(), include_reference: false, output, mesh }
+        Self {
+            tissues: Some(1),
+            every_task: false,
+            prior: PriorOptions::default(),
+            include_reference: false,
+            output,
+            mesh,
+        }
     }
 }
 
@@ -50,6 +61,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         settings.tissues = usize::from(tissues);
     }
     settings.include_reference |= args.include_reference;
+    if args.every_task && settings.tissues != 1 {
+        return Err(Failure::Rejected(anyhow!(
+            "--every-task: compares materials of the whole brain; drop it, or --tissues 2"
+        )));
+    }
     let prior = args.prior.over(session.settings("prior")?);
     let case = Case::open(&args.output, session);
 
@@ -77,7 +93,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let displacement = reference.point_field("displacement").and_then(Field::vectors);
     let displacement = displacement.ok_or_else(|| anyhow!("{REFERENCE}: no array `displacement`; run with --force"))?;
 
-    let mut list = samples_of_prior(&tissues, &settings.sd_levels, settings.poisson_ratio, &prior).reject()?;
+    let (levels, poisson_ratio) = (&settings.sd_levels, settings.poisson_ratio);
+    let mut list = if args.every_task {
+        samples_of_every_task(levels, poisson_ratio, &prior).reject()?
+    } else {
+        samples_of_prior(&tissues, levels, poisson_ratio, &prior).reject()?
+    };
     let nearest = nearest_sample(&list, &truth).map(|s| s.id.clone());
     if settings.include_reference {
         list.push(truth.clone());
@@ -122,13 +143,13 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn summary(outcome: &ExperimentOutcome, nearest: Option<&str>, page: &str) -> String {
-    let mut text = String::from("sample        shear modulus (Pa)          RMSE (mm)\n");
+    let mut text = String::from("sample                  shear modulus (Pa)          RMSE (mm)\n");
     for sample in &outcome.samples {
         let moduli: Vec<String> = sample.shear_modulus_pa.values().map(|m| format!("{m:.1}")).collect();
         let rmse = sample.rmse_mm.get("all").map_or("no equilibrium".to_owned(), |r| format!("{r:.6}"));
         let mark = if outcome.best_sample.as_deref() == Some(&sample.id) { "  best" } else { "" };
         let near = if nearest == Some(sample.id.as_str()) { "  nearest to the reference" } else { "" };
-        text += &format!("{:<13} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
+        text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
     }
     text + page
 }

@@ -71,6 +71,9 @@ pub struct ExperimentOutcome {
 pub struct SampleOutcome {
     /// Name of the sample, part of its file's name: `sample-05`.
     pub id: String,
+    /// The task its material comes from, where several are compared: `hyperelastic-grey`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
     /// How many standard deviations of the prior each tissue lies from its mean.
     #[serde(default)]
     pub sd_levels: BTreeMap<String, f64>,
@@ -293,6 +296,7 @@ mod tests {
 
     fn outcome() -> ExperimentOutcome {
         let sample = |n: usize, rmse: f64| SampleOutcome {
+            task: None,
             id: format!("sample-{n:02}"),
             sd_levels: BTreeMap::from([("grey_matter".to_owned(), n as f64 - 1.0)]),
             shear_modulus_pa: BTreeMap::from([("grey_matter".to_owned(), 300.0 + 100.0 * n as f64)]),

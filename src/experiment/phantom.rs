@@ -86,7 +86,7 @@ impl PhantomSettings {
         };
         let tissues = self.tissue_list();
         let material = |t: &Tissue| (t.name.clone(), neo_hookean(0.0, modulus(t), self.poisson_ratio));
-        Sample { id: "reference".to_owned(), tissues: tissues.iter().map(material).collect() }
+        Sample { id: "reference".to_owned(), tissues: tissues.iter().map(material).collect(), task: None }
     }
 }
 

@@ -61,9 +61,18 @@ pub fn task_of(tissue: &Tissue, study: StudyKind) -> Result<Task, PriorError> {
 }
 
 fn materials(tissue: &Tissue, levels: &[f64], prior: &PriorSettings) -> Result<Vec<SampledMaterial>, PriorError> {
+    materials_of_task(tissue, task_of(tissue, prior.study)?, levels, prior)
+}
+
+fn materials_of_task(
+    tissue: &Tissue,
+    task: Task,
+    levels: &[f64],
+    prior: &PriorSettings,
+) -> Result<Vec<SampledMaterial>, PriorError> {
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: prior.law, ..settings };
-    sample_shear_moduli(task_of(tissue, prior.study)?, levels, &settings)
+    sample_shear_moduli(task, levels, &settings)
         .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
 }
 
@@ -83,14 +92,41 @@ pub fn samples_of_prior(
     let mut levels = Vec::new();
     for tissue in tissues {
         let list = materials(tissue, sd_levels, prior)?;
-        let sample = |m: &SampledMaterial| TissueSample {
-            sd_level: m.sd_level,
-            shear_modulus_pa: m.shear_modulus_pa,
-            material: m.fit.material(poisson_ratio),
-        };
+        let sample = |m: &SampledMaterial| tissue_sample(m, poisson_ratio);
         levels.push((tissue.clone(), list.iter().map(sample).collect()));
     }
     Ok(every_combination(&levels))
+}
+
+/// The whole brain as one material of every task that is not of abnormal tissue, at each level: the curves of the paper's
+/// Fig. 4.
+///
+/// # Errors
+/// [`PriorError`].
+pub fn samples_of_every_task(
+    sd_levels: &[f64],
+    poisson_ratio: f64,
+    prior: &PriorSettings,
+) -> Result<Vec<Sample>, PriorError> {
+    if sd_levels.is_empty() {
+        return Err(PriorError::NoLevels);
+    }
+    let brain = Tissue::whole_brain().remove(0);
+    let mut samples = Vec::new();
+    for task in Task::all().filter(|task| task.region != Region::Abnormal) {
+        let list = materials_of_task(&brain, task, sd_levels, prior)?;
+        let levels = list.iter().map(|m| tissue_sample(m, poisson_ratio)).collect();
+        for mut sample in every_combination(&[(brain.clone(), levels)]) {
+            sample.id = sample.id.replace("sample", &task.to_string());
+            sample.task = Some(task);
+            samples.push(sample);
+        }
+    }
+    Ok(samples)
+}
+
+fn tissue_sample(m: &SampledMaterial, poisson_ratio: f64) -> TissueSample {
+    TissueSample { sd_level: m.sd_level, shear_modulus_pa: m.shear_modulus_pa, material: m.fit.material(poisson_ratio) }
 }
 
 /// The prior of ln(shear modulus): the samples at -1, 0 and 1 standard deviations span its mean and spread (the
@@ -128,6 +164,22 @@ mod tests {
         let last = &samples[80].tissues["grey_matter"];
         assert!((last.shear_modulus_pa - 2299.0).abs() < 1.0);
         assert!((samples[4].tissues["white_matter"].shear_modulus_pa - 610.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn every_healthy_task_has_its_nine_samples_under_its_own_name() {
+        let levels = crate::material::generative::nine_levels();
+        let samples = samples_of_every_task(&levels, 0.45, &PriorSettings::default()).unwrap();
+        assert_eq!(samples.len(), 81);
+        let ids: std::collections::BTreeSet<_> = samples.iter().map(|s| s.id.as_str()).collect();
+        assert_eq!(ids.len(), 81);
+        let of = |name: &str| samples.iter().filter(|s| s.id.starts_with(name)).collect::<Vec<_>>();
+        assert_eq!(of("hyperelastic-white-").len(), 9);
+        assert!(of("mre-abnormal").is_empty());
+        // The task with a tissue of its own is the one that the prior of that tissue takes.
+        let healthy = samples_of_prior(&Tissue::whole_brain(), &levels, 0.45, &PriorSettings::default()).unwrap();
+        let moduli = |list: Vec<&Sample>| list.iter().map(|s| s.tissues["brain"].shear_modulus_pa).collect::<Vec<_>>();
+        assert_eq!(moduli(of("hyperelastic-healthy-")), moduli(healthy.iter().collect()));
     }
 
     #[test]

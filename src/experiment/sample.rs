@@ -1,6 +1,7 @@
 //! The materials a sweep tries: one law per tissue, drawn from the prior at stated levels.
 
 use super::outcome::LawOutcome;
+use crate::material::Task;
 use crate::material::law::Material;
 use crate::segment::label;
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,9 @@ pub struct Sample {
     pub id: String,
     /// Material per tissue name.
     pub tissues: BTreeMap<String, TissueSample>,
+    /// The task of the generative model that all of it comes from, where several are compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<Task>,
 }
 
 /// Every combination of the tissues' levels, the first tissue slowest: 9 levels of two tissues give the paper's 81.
@@ -83,7 +87,7 @@ pub fn every_combination(levels: &[(Tissue, Vec<TissueSample>)]) -> Vec<Sample> 
             tissues.insert(tissue.name.clone(), samples[rest % samples.len()].clone());
             rest /= samples.len();
         }
-        Sample { id: format!("sample-{n:0digits$}"), tissues }
+        Sample { id: format!("sample-{n:0digits$}"), tissues, task: None }
     };
     (0..total).map(combination).collect()
 }

@@ -117,6 +117,7 @@ pub fn solve_sample(
     let scenario = scenario_of(template, tissues, sample)?;
     let mut record = SampleOutcome {
         id: sample.id.clone(),
+        task: sample.task.map(|task| task.to_string()),
         sd_levels: sample.tissues.iter().map(|(name, t)| (name.clone(), t.sd_level)).collect(),
         shear_modulus_pa: sample.tissues.iter().map(|(name, t)| (name.clone(), t.shear_modulus_pa)).collect(),
         laws: sample.tissues.iter().map(|(name, t)| (name.clone(), t.law())).collect(),

@@ -179,8 +179,9 @@ impl LineChart {
     /// The chart as an SVG element, 640 x 360 units, scaling with its container.
     pub fn to_svg(&self) -> String {
         let (width, height) = (640.0, 360.0);
-        let legend_rows = f64::from(u8::from(self.series.len() > 1));
-        let top = 14.0 + 22.0 * legend_rows;
+        let legend = self.legend(width);
+        let rows = legend.last().map_or(0.0, |(_, row)| row + 1.0);
+        let top = 14.0 + 22.0 * rows;
         let points = || self.series.iter().flat_map(|s| &s.points).filter(|p| p.y.is_finite());
         let xs = points().map(|p| p.x).chain(self.x_rules.iter().map(|r| r.at));
         let x_axis = Axis::over(xs, self.x_log, false, [74.0, width - 18.0]);
@@ -217,8 +218,10 @@ impl LineChart {
         for (n, series) in self.series.iter().enumerate() {
             self.draw_series(&mut svg, n, series, &x_axis, &y_axis);
         }
-        if self.series.len() > 1 {
-            self.legend(&mut svg);
+        for (n, (x, row)) in legend.into_iter().enumerate() {
+            let (y, name) = (14.0 + 22.0 * row, escape(&self.series[n].name));
+            marker(&mut svg, shape(n), x, y, SERIES_COLOURS[n % SERIES_COLOURS.len()], "");
+            let _ = write!(svg, "<text x=\"{:.1}\" y=\"{}\" fill=\"currentColor\">{name}</text>", x + 11.0, y + 4.0);
         }
         svg + "</svg>"
     }
@@ -249,7 +252,7 @@ impl LineChart {
                      stroke=\"{colour}\" stroke-width=\"1.5\"/>"
                 );
             }
-            marker(svg, MARKERS[n % 3], x, y, colour, &p.note);
+            marker(svg, shape(n), x, y, colour, &p.note);
             if p.chosen {
                 let _ = write!(
                     svg,
@@ -260,15 +263,28 @@ impl LineChart {
         }
     }
 
-    fn legend(&self, svg: &mut String) {
-        let mut x = 80.0;
-        for (n, series) in self.series.iter().enumerate() {
-            marker(svg, MARKERS[n % 3], x, 14.0, SERIES_COLOURS[n % SERIES_COLOURS.len()], "");
-            let name = escape(&series.name);
-            let _ = write!(svg, "<text x=\"{:.1}\" y=\"18\" fill=\"currentColor\">{name}</text>", x + 11.0);
-            x += 34.0 + 6.6 * series.name.chars().count() as f64;
+    /// Place and row of every series' name, in as many rows as the names need; none for a single series.
+    fn legend(&self, width: f64) -> Vec<(f64, f64)> {
+        if self.series.len() < 2 {
+            return Vec::new();
         }
+        let (mut x, mut row) = (80.0, 0.0);
+        let place = |series: &Series| {
+            let needed = 34.0 + 6.6 * series.name.chars().count() as f64;
+            if x > 80.0 && x + needed > width {
+                (x, row) = (80.0, row + 1.0);
+            }
+            let at = (x, row);
+            x += needed;
+            at
+        };
+        self.series.iter().map(place).collect()
     }
+}
+
+/// The marker of series number `n`: where colours come round again the shape is another.
+fn shape(n: usize) -> Marker {
+    MARKERS[(n + n / SERIES_COLOURS.len()) % MARKERS.len()]
 }
 
 /// Axes, ticks, grid lines, labels.
@@ -494,6 +510,18 @@ mod tests {
 
     fn point(x: f64, y: f64) -> DataPoint {
         DataPoint { x, y, y_error: Some(0.1), note: "a <b>".to_owned(), chosen: x == 2.0 }
+    }
+
+    #[test]
+    fn names_that_do_not_fit_a_row_go_to_the_next_and_no_two_series_look_alike() {
+        let series = |n: usize| Series { name: format!("hyperelastic healthy {n}"), points: vec![point(1.0, 1.0)] };
+        let chart = LineChart { series: (0..9).map(series).collect(), ..LineChart::default() };
+        let places = chart.legend(640.0);
+        assert!(places.iter().all(|(x, _)| x + 34.0 + 6.6 * 22.0 <= 640.0), "{places:?}");
+        assert!(places.windows(2).all(|w| w[0].1 < w[1].1 || w[0].0 < w[1].0));
+        let looks: Vec<_> = (0..9).map(|n| (SERIES_COLOURS[n % SERIES_COLOURS.len()], shape(n) as usize)).collect();
+        assert!((0..9).all(|n| !looks[..n].contains(&looks[n])));
+        well_formed(&chart.to_svg());
     }
 
     fn well_formed(svg: &str) {

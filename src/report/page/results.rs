@@ -288,10 +288,16 @@ fn curve(outcome: &ExperimentOutcome) -> String {
     let abscissa =
         |s: &SampleOutcome| if one { s.shear_modulus_pa.get(&tissue) } else { s.sd_levels.get(&tissue) }.copied();
     let mut series = Vec::new();
-    for set in outcome.rmse_sets() {
+    // Where tasks are compared each has a curve of its own.
+    let mut tasks: Vec<Option<&str>> = outcome.samples.iter().map(|s| s.task.as_deref()).collect();
+    tasks.dedup();
+    for (set, task) in
+        outcome.rmse_sets().into_iter().flat_map(|set| tasks.iter().map(move |task| (set.clone(), *task)))
+    {
         let mut points: Vec<DataPoint> = outcome
             .samples
             .iter()
+            .filter(|s| s.task.as_deref() == task)
             .filter_map(|s| {
                 let moduli: Vec<String> = s
                     .shear_modulus_pa
@@ -306,7 +312,7 @@ fn curve(outcome: &ExperimentOutcome) -> String {
             .collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
         if points.iter().any(|p| p.y.is_finite()) {
-            series.push(Series { name: set_name(&set), points });
+            series.push(Series { name: task.map_or_else(|| set_name(&set), |task| task.replace('-', " ")), points });
         }
     }
     let mut y_rules: Vec<Rule> = outcome

@@ -11,6 +11,7 @@ fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
         let level = n as f64 * 0.5 - 2.0;
         let rmse = (0.3 + 0.2 * level.abs()).hypot(0.1);
         SampleOutcome {
+            task: None,
             id: format!("sample-{n:02}"),
             sd_levels: map(vec![("grey_matter", level)]),
             shear_modulus_pa: map(vec![("grey_matter", 900.0 * (0.4 * level).exp())]),
