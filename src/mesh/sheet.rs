@@ -18,6 +18,14 @@ pub(crate) struct Sheet {
     pub above_yz_mm: Vec<[f64; 2]>,
 }
 
+/// The field that has the place among the bits of `other` that `field` has among those of `own`: halves are numbered in the
+/// order of their labels.
+fn same_place(own: u64, field: u8, other: u64) -> u8 {
+    let place = (own & ((1 << field) - 1)).count_ones();
+    let mut fields = (0..64).filter(|k| other >> k & 1 == 1);
+    fields.nth(place as usize).unwrap_or(field)
+}
+
 /// The sheet stays fixed to this depth below the free edge, so that the edge itself lies in the plane, mm.
 const HEM_MM: f64 = 2.0;
 
@@ -32,11 +40,31 @@ impl Sheet {
     /// Whether the facet between fields `a` and `b` around `centre` (box, mm) is a border that counts for nothing.
     #[inline]
     pub fn is_loose(&self, a: u8, b: u8, centre: &Vector3<f64>) -> bool {
-        if self.above_yz_mm.is_empty() || !self.crosses(a, b) {
+        self.crosses(a, b) && self.is_below(centre)
+    }
+
+    /// Whether a point of the box is below the free edge and its hem.
+    pub fn is_below(&self, point: &Vector3<f64>) -> bool {
+        if self.above_yz_mm.is_empty() {
             return false;
         }
-        let p = self.frame_from_box.transform_point(&(*centre).into());
+        let p = self.frame_from_box.transform_point(&(*point).into());
         p.z < line_height(&self.above_yz_mm, p.y) - HEM_MM
+    }
+
+    /// Whether a field is half of a split label.
+    pub fn is_half(&self, field: u8) -> bool {
+        field < 64 && (self.left | self.right) >> field & 1 == 1
+    }
+
+    /// The half of a field's label at this distance from the midplane; a field that is no half itself.
+    pub fn on_side(&self, field: u8, distance_mm: f64) -> u8 {
+        if !self.is_half(field) {
+            return field;
+        }
+        let (own, other) = if self.left >> field & 1 == 1 { (self.left, self.right) } else { (self.right, self.left) };
+        let is_there = (own == self.left) == (distance_mm < 0.0);
+        if is_there { field } else { same_place(own, field, other) }
     }
 
     /// The x coordinate in the frame of a point of the box, mm.
@@ -47,5 +75,21 @@ impl Sheet {
     /// Unit vector of the box along x of the frame.
     pub fn normal(&self) -> Vector3<f64> {
         self.frame_from_box.fixed_view::<1, 3>(0, 0).transpose().normalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_half_finds_the_other_half_of_its_label() {
+        let sheet =
+            Sheet { frame_from_box: Matrix4::identity(), left: 0b110, right: 0b11_0000, above_yz_mm: Vec::new() };
+        for (left, right) in [(1, 4), (2, 5)] {
+            assert_eq!([left, right].map(|k| sheet.on_side(k, -1.0)), [left; 2]);
+            assert_eq!([left, right].map(|k| sheet.on_side(k, 1.0)), [right; 2]);
+        }
+        assert_eq!([0, 3, u8::MAX].map(|k| sheet.on_side(k, 1.0)), [0, 3, u8::MAX]);
     }
 }

@@ -109,6 +109,13 @@ impl Complex {
         self.star[shortest as usize].iter().copied().filter(has_all)
     }
 
+    /// A new vertex, without tets yet.
+    pub fn add(&mut self, place: Point) -> u32 {
+        self.x.push(place);
+        self.star.push(Vec::new());
+        (self.x.len() - 1) as u32
+    }
+
     pub fn take_out(&mut self, t: u32) {
         for v in self.tets[t as usize] {
             self.star[v as usize].retain(|&s| s != t);

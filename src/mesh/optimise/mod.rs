@@ -55,6 +55,8 @@ pub(crate) fn optimise(complex: &mut Complex, field: &LabelField, wanted_mm3: &[
         flatten::flatten(complex, PRESSED);
         raise(complex, target, 3);
     }
+    flatten::cut(complex);
+    flatten::flatten(complex, PRESSED);
     raise(complex, target, 6);
     flatten::flatten(complex, target);
     // The last word: places as near the interface as the target allows.
