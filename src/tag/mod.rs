@@ -164,8 +164,8 @@ pub fn tag_boundary_sets(mesh: &mut TetMesh, settings: &TagSettings) -> Result<T
 /// fit is known; heights at the very top and bottom and normals are taken in the mesh itself.
 ///
 /// Facets point out of the tissue. The falx is a sheet of facets when the mesh has facets in the midsagittal plane
-/// (facet set [`MIDSAGITTAL`], or facets between tissue with all nodes at x = 0) over at least half of the cut of
-/// the plane with the tissue above the free edge; otherwise it is a slab of nodes.
+/// (facet set [`MIDSAGITTAL`], or facets between tissue with all nodes at x = 0, and outer facets there) over at least half
+/// of the cut of the plane with the tissue above the free edge; otherwise it is a slab of nodes.
 ///
 /// # Errors
 /// [`TagError`] when the mesh has no tissue or a set that every brain has comes out empty. An area out of its
@@ -212,6 +212,10 @@ pub fn tag_boundary_sets_with(
         }
     }
     Ok(TagReport { sets, median_edge_mm, warnings })
+}
+
+fn is_midsagittal(mesh: &TetMesh, facet: &[u32; 3]) -> bool {
+    facet.iter().all(|&n| mesh.nodes_mm()[n as usize][0].abs() <= IN_PLANE_MM)
 }
 
 fn is_tissue(label: u8) -> bool {
@@ -262,7 +266,7 @@ impl Surfaces {
                 (own, None) if is_tissue(own) => surfaces.pial.push(facet),
                 (own, Some(other)) => match (is_tissue(own), is_tissue(other)) {
                     (true, true) => {
-                        if facet.iter().all(|&n| nodes[n as usize][0].abs() <= IN_PLANE_MM) {
+                        if is_midsagittal(mesh, &facet) {
                             surfaces.in_plane.push(facet);
                         }
                     }
@@ -361,6 +365,12 @@ impl<T: Fn([f64; 3]) -> [f64; 3]> Tagger<'_, T> {
             }
         }
         let mut sheet = midsagittal.unwrap_or_else(|| self.surfaces.in_plane.clone());
+        // Where a sulcus opens on one side of the falx only, the other hemisphere still lies against it.
+        let bare = self.surfaces.pial.iter().filter(|facet| is_midsagittal(self.mesh, facet));
+        let seen_from_right = |&[a, b, c]: &[u32; 3]| {
+            if self.mesh.area_vector_mm2([a, b, c]).x > 0.0 { [a, b, c] } else { [a, c, b] }
+        };
+        sheet.extend(bare.map(seen_from_right));
         sheet.retain(|&facet| {
             let tissue = facet.iter().all(|&n| self.surfaces.tissue_nodes[n as usize]);
             tissue && above_falx_edge(self.template_mm(self.mesh.facet_centroid_mm(facet)))

@@ -113,6 +113,30 @@ fn a_lattice_with_nodes_in_the_plane_gets_a_sheet_and_any_other_a_slab() {
 }
 
 #[test]
+fn a_hemisphere_lies_against_the_falx_where_a_sulcus_opens_on_the_other_side() {
+    let mut whole = ellipsoid_brain(8.0, 0.0, false);
+    let sulcus = |t: &usize| {
+        let centre =
+            whole.tets()[*t].iter().map(|&n| Vector3::from(whole.nodes_mm()[n as usize])).sum::<Vector3<f64>>() / 4.0;
+        (0.0..16.0).contains(&centre.x) && (centre.yz() - nalgebra::Vector2::new(-10.0, 65.0)).norm() < 12.0
+    };
+    let kept: Vec<usize> = (0..whole.tets().len()).filter(|t| !sulcus(t)).collect();
+    assert!(kept.len() < whole.tets().len());
+    let (tets, labels) = kept.iter().map(|&t| (whole.tets()[t], whole.labels()[t])).unzip();
+    let mut open = TetMesh::new(whole.nodes_mm().to_vec(), tets, labels).unwrap();
+    let area = |mesh: &mut TetMesh| {
+        let area_mm2 = tag_boundary_sets(mesh, &settings()).unwrap().set(FALX).unwrap().area_mm2;
+        let seen = |&facet: &[u32; 3]| mesh.area_vector_mm2(facet).x;
+        assert!(
+            (mesh.facet_sets[FALX].iter().map(seen).sum::<f64>() - area_mm2).abs() < 1e-6,
+            "all are seen from the right"
+        );
+        area_mm2
+    };
+    assert!((area(&mut whole) - area(&mut open)).abs() < 1e-6);
+}
+
+#[test]
 fn facets_left_by_the_engine_make_the_sheet() {
     let mut mesh = ellipsoid_brain(8.0, 3.0, false);
     let left = |f: &[u32; 3]| f.iter().all(|&n| (mesh.nodes_mm()[n as usize][0] - 3.0).abs() < 1e-9);
