@@ -10,4 +10,4 @@ mod write;
 
 pub use manifest::{Manifest, OutputRecord, Provenance};
 pub use stage::{Produced, Stage, StageError, StageOutcome};
-pub use write::{WriteError, sha256_hex, write_whole};
+pub use write::{WriteError, no_more_writes, sha256_hex, write_whole};

@@ -3,6 +3,7 @@
 use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock, RwLockWriteGuard};
 use thiserror::Error;
 
 /// A file could not be written; nothing is left under its name.
@@ -15,6 +16,15 @@ pub struct WriteError {
     pub source: std::io::Error,
 }
 
+/// Held by readers while a file is being written.
+static WRITING: RwLock<()> = RwLock::new(());
+
+/// Waits for the files that are being written and lets no other begin while the answer is kept: a program that ends now
+/// leaves nothing half-written.
+pub fn no_more_writes() -> RwLockWriteGuard<'static, ()> {
+    WRITING.write().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Writes `bytes` so that `path` holds either all of them or what it held before: to `NAME.part`, flushed, renamed.
 /// Folders are made as needed.
 ///
@@ -22,6 +32,7 @@ pub struct WriteError {
 /// [`WriteError`] when the system refuses.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let refuse = |source| WriteError { path: path.to_path_buf(), source };
+    let _writing = WRITING.read().unwrap_or_else(PoisonError::into_inner);
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(refuse)?;
     }
@@ -52,6 +63,23 @@ mod tests {
         write_whole(&path, b"second").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"second");
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn who_holds_the_writes_sees_no_file_half_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bin");
+        let bytes = vec![7u8; 1 << 20];
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(|| (0..20).for_each(|_| write_whole(&path, &bytes).unwrap()));
+            while !writer.is_finished() {
+                let held = no_more_writes();
+                assert!(!folder.path().join("x.bin.part").exists());
+                drop(held);
+                std::thread::yield_now();
+            }
+        });
+        assert_eq!(std::fs::metadata(&path).unwrap().len(), bytes.len() as u64);
     }
 
     #[test]

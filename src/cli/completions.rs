@@ -12,9 +12,9 @@ pub struct Args {
     shell: clap_complete::Shell,
 }
 
-pub fn run(args: &Args, _session: &Session) -> Result<(), Failure> {
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Hgm::command(), "hgm", &mut script);
-    print!("{}", String::from_utf8(script)?);
-    Ok(())
+    let script = String::from_utf8(script)?;
+    session.emit(&serde_json::json!({ "shell": args.shell.to_string(), "script": script }), &script)
 }

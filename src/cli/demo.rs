@@ -29,6 +29,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     write_whole(&post, POST)?;
     // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
     let mesh = || MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), ..MeshOptions::default() };
-    run::run(&run::Args::demo(pre, post, args.output.join("pair"), mesh()), session)?;
-    phantom::run(&phantom::Args::demo(args.output.join("phantom"), mesh()), session)
+    let pair = run::analyse(&run::Args::demo(pre, post, args.output.join("pair"), mesh()), session)?;
+    let (phantom, text) = phantom::analyse(&phantom::Args::demo(args.output.join("phantom"), mesh()), session)?;
+    let both = serde_json::json!({ "pair": pair.outcome, "phantom": phantom });
+    session.emit(&both, &format!("{}\n{text}", pair.text.trim_end()))?;
+    pair.patient.quality_gate()
 }

@@ -27,7 +27,7 @@ pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
         ("gmsh", "mesh engine `gmsh`", "sudo apt-get install gmsh"),
         ("tetgen", "mesh engine `tetgen`", "sudo apt-get install tetgen"),
         ("python3", "renderer, cross-checks and cohorts in pipelines/", "sudo apt-get install python3 python3-venv"),
-        ("snakemake", "cohorts", "pip install snakemake"),
+        ("snakemake", "cohorts", "pip install snakemake snakemake-executor-plugin-slurm"),
         ("chromium", "tests of the page", "sudo apt-get install chromium"),
     ];
     let findings: Vec<Finding> = table

@@ -1,5 +1,6 @@
 //! How a subcommand ends when it does not end well.
 
+use super::session::has_emitted;
 use std::process::ExitCode;
 
 /// The three ways to end without success; usage errors (exit code 2) are clap's.
@@ -37,11 +38,11 @@ impl Failure {
         }
     }
 
-    /// One message on stderr; with `--json` also an object on stdout.
+    /// One message on stderr; with `--json` also an object on stdout, unless the result is there already.
     pub fn report(&self, json: bool) {
         let (kind, error) = self.parts();
         eprintln!("hgm: {kind}: {error:#}");
-        if json {
+        if json && !has_emitted() {
             let message = format!("{error:#}");
             println!("{}", serde_json::json!({"error": {"kind": kind, "message": message, "exit_code": self.code()}}));
         }

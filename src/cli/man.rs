@@ -15,11 +15,14 @@ pub struct Args {
     output: PathBuf,
 }
 
-pub fn run(args: &Args, _session: &Session) -> Result<(), Failure> {
+pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut files = Vec::new();
     for (name, page) in pages(Hgm::command(), "hgm")? {
-        write_whole(&args.output.join(format!("{name}.1")), &page)?;
+        let file = args.output.join(format!("{name}.1"));
+        write_whole(&file, &page)?;
+        files.push(file.display().to_string());
     }
-    Ok(())
+    session.emit(&serde_json::json!({ "files": files }), "")
 }
 
 /// The page of a command, then those of its subcommands: hgm, hgm-gp, hgm-gp-fit.

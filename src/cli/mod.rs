@@ -22,6 +22,7 @@ mod reduce;
 mod register;
 mod report;
 mod run;
+mod schema;
 mod segment;
 mod session;
 mod simulate;
@@ -67,6 +68,7 @@ enum Command {
     Report(report::Args),
     Bids(bids::Args),
     Why(why::Args),
+    Schema(schema::Args),
 }
 
 /// Entry point of the program: parses, runs, turns failures into exit codes.
@@ -94,6 +96,7 @@ pub fn main() -> ExitCode {
         Command::Report(args) => report::run(&args, &session),
         Command::Bids(args) => bids::run(&args, &session),
         Command::Why(args) => why::run(&args, &session),
+        Command::Schema(args) => schema::run(&args, &session),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -56,6 +56,15 @@ impl Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let (outcome, text) = analyse(args, session)?;
+    session.emit(&outcome, &text)
+}
+
+/// Runs (or skips) every stage; the numbers, and those that matter for a terminal.
+///
+/// # Errors
+/// The first stage that is rejected or fails.
+pub fn analyse(args: &Args, session: &Session) -> Result<(ExperimentOutcome, String), Failure> {
     let mut settings: PhantomSettings = session.settings("phantom")?;
     if let Some(tissues) = args.tissues {
         settings.tissues = usize::from(tissues);
@@ -139,7 +148,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let used =
         BTreeMap::from([("phantom", serde_json::to_value(&settings)?), ("prior", serde_json::to_value(&prior)?)]);
     let page = case.finish(&outcome, &used, &manifests)?;
-    session.emit(&outcome, &summary(&outcome, nearest.as_deref(), &page))
+    let text = summary(&outcome, nearest.as_deref(), &page);
+    Ok((outcome, text))
 }
 
 fn summary(outcome: &ExperimentOutcome, nearest: Option<&str>, page: &str) -> String {

@@ -1,12 +1,24 @@
 //! What every subcommand shares: global options, settings from a file, output, progress, input files.
 
 use super::failure::{Failure, Reject};
+use crate::artefact::no_more_writes;
 use anyhow::{Context, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether a result has been printed: then stdout is whole, and a failure is told on stderr and by the exit code alone.
+static EMITTED: AtomicBool = AtomicBool::new(false);
+
+/// See [`EMITTED`].
+pub fn has_emitted() -> bool {
+    EMITTED.load(Ordering::Relaxed)
+}
 
 /// Options of every command.
 #[derive(Clone, Debug, clap::Args)]
@@ -14,7 +26,7 @@ pub struct GlobalOptions {
     /// Settings file (TOML, one table for each part: register, segment, mesh, gp, law ...)
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Machine-readable result on stdout, logs on stderr
+    /// Machine-readable result on stdout (see `hgm schema`), logs on stderr
     #[arg(long, global = true)]
     pub json: bool,
     /// Threads to use (results do not depend on it) [default: all cores]
@@ -62,6 +74,7 @@ impl Session {
             .with_target(false);
         // Fails only when a test has set one up before; the first stays.
         subscriber.try_init().ok();
+        end_between_files().context("the system lets no signal handler be set")?;
         if options.threads == Some(0) {
             return Err(Failure::Rejected(anyhow!("--threads 0: give 1 or more, or leave it out for all cores")));
         }
@@ -110,6 +123,7 @@ impl Session {
     /// # Errors
     /// A value that cannot be serialised.
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
+        EMITTED.store(true, Ordering::Relaxed);
         if self.options.json {
             println!("{}", serde_json::to_string_pretty(value)?);
         } else if !text.is_empty() {
@@ -131,6 +145,19 @@ impl Session {
             .progress_chars("=> ");
         ProgressBar::new(steps).with_style(style).with_prefix(what)
     }
+}
+
+/// On Ctrl-C, a closed terminal or a scheduler's SIGTERM: lets the file that is being written become whole, then ends.
+fn end_between_files() -> std::io::Result<()> {
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    std::thread::spawn(move || {
+        if let Some(signal) = signals.forever().next() {
+            let _whole = no_more_writes();
+            // As shells tell it.
+            std::process::exit(128 + signal);
+        }
+    });
+    Ok(())
 }
 
 /// A file the user named, whole.

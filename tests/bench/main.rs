@@ -1,6 +1,9 @@
 //! `./run bench [ROOM ...]`: measures the bars of the issues and prints them side by side. Never part of a timed test.
 
 mod bar;
+#[path = "../it/cluster.rs"]
+mod cluster;
+mod cohort;
 mod experiment;
 mod fem;
 mod imaging;
@@ -8,6 +11,9 @@ mod job;
 mod material;
 mod mesh;
 mod patients;
+#[path = "../it/python.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod python;
 
 use bar::Bar;
 
@@ -22,6 +28,7 @@ fn main() {
         ("experiment", experiment::bars),
         ("patients", patients::bars),
         ("job", job::bars),
+        ("cohort", cohort::bars),
     ];
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     if bar::data().is_none() {

@@ -1,6 +1,9 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
 mod bids;
+mod cluster;
+mod cohort;
+mod command_line;
 mod damaged_files;
 mod fem;
 mod job;

@@ -18,7 +18,12 @@ pub fn python(folder: &Path, script: &str) -> String {
 
 /// Runs a program of `pipelines/` in `folder`: its exit code, what it printed, what it said on standard error.
 pub fn pipeline(folder: &Path, program: &str, arguments: &[&str]) -> (i32, String, String) {
-    let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines").join(program);
+    python_file(folder, &format!("pipelines/{program}"), arguments)
+}
+
+/// The same for any Python file of the project.
+pub fn python_file(folder: &Path, file: &str, arguments: &[&str]) -> (i32, String, String) {
+    let program = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let output = run(folder, &[&[program.to_str().unwrap()], arguments].concat());
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))

@@ -1,0 +1,70 @@
+//! A cohort by one command, by Snakemake on this machine, and by Snakemake on a Slurm cluster of one node: the same files.
+
+use crate::bids::data_set;
+use crate::cluster::{OneNodeSlurm, printed, snakemake};
+use crate::job::{contents, output, program};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Child;
+use std::time::{Duration, Instant};
+
+/// Every file of the derivatives; the workflow's own marks are none.
+fn products(out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = contents(out);
+    found.retain(|name, _| !name.starts_with(".cohort/"));
+    found
+}
+
+fn assert_same(expected: &BTreeMap<String, Vec<u8>>, out: &Path) {
+    let found = products(out);
+    assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
+    let differ: Vec<&String> = expected.keys().filter(|name| expected[*name] != found[*name]).collect();
+    assert!(differ.is_empty(), "{differ:?} differ");
+}
+
+#[test]
+fn slow_a_cohort_has_the_same_files_by_one_command_by_snakemake_and_on_slurm_with_a_job_killed() {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = data_set(folder.path());
+    // A subject whose second scan is missing holds nobody up.
+    std::fs::create_dir_all(raw.join("sub-00/ses-preop/anat")).unwrap();
+    let settings = folder.path().join("settings.toml");
+    std::fs::write(&settings, "[mesh]\nengine = \"lattice\"\nsize = { cells = 3000 }\n").unwrap();
+    let outs: [PathBuf; 3] = ["command", "local", "slurm"].map(|name| folder.path().join(name).join("out"));
+    let bids = |level: &str| {
+        let [config, raw, out] = [&settings, &raw, &outs[0]].map(|path| path.to_str().unwrap());
+        output(&["--config", config, "bids", raw, out, level])
+    };
+    assert_eq!(bids("participant").status.code(), Some(3));
+    assert!(bids("group").status.success());
+    let expected = products(&outs[0]);
+    assert!(expected.contains_key("group.json") && expected.contains_key("sub-02/hgm/sim/sample-08.vtu"));
+
+    let said = |name: &str| std::fs::read_to_string(folder.path().join(name).join("snakemake.log")).unwrap();
+    let start = |profile: &str, out: &Path| -> Child {
+        snakemake(&program(), &folder.path().join(profile), profile, &raw, out, &settings)
+    };
+    assert!(start("local", &outs[1]).wait().unwrap().success(), "{}", said("local"));
+    assert_same(&expected, &outs[1]);
+
+    let _slurm = OneNodeSlurm::start(&folder.path().join("cluster"));
+    let mut cluster = start("slurm", &outs[2]);
+    let begin = Instant::now();
+    // Half-way: the scans are registered, the masks are not made.
+    while !outs[2].join("sub-02/hgm/.stages/registration.manifest.json").exists() {
+        assert!(
+            begin.elapsed() < Duration::from_secs(600) && cluster.try_wait().unwrap().is_none(),
+            "{}",
+            said("slurm")
+        );
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let jobs = printed("squeue", &["-h", "-t", "running", "-o", "%i %k"]);
+    let job = jobs.lines().find(|line| line.contains("prep") && line.contains("sub-02"));
+    let job = job.unwrap_or_else(|| panic!("no job prepares sub-02: {jobs}")).split(' ').next().unwrap();
+    printed("scancel", &[job]);
+    assert!(!outs[2].join("sub-02/hgm/.stages/anat.manifest.json").exists(), "it was killed too late to show anything");
+    assert!(cluster.wait().unwrap().success(), "{}", said("slurm"));
+    assert!(said("slurm").contains("Trying to restart job"), "{}", said("slurm"));
+    assert_same(&expected, &outs[2]);
+}
