@@ -3,7 +3,7 @@
 use super::bfgs::Stopping;
 use super::head;
 use super::mutual_information::{Bins, Interpolated, Pose};
-use super::pyramid::reduced_to;
+use super::pyramid::{on_grid_of, reduced_to};
 use super::sample::{Draw, draw};
 use super::search::{Freedom, Level, optimise};
 use crate::geometry::Native;
@@ -25,7 +25,7 @@ pub(super) fn head_from_template(
     let mut pose = Pose { linear: Matrix3::identity(), centre, target: centre };
     for (spacing_mm, most) in [(4.0, 40_000), (2.0, 100_000)] {
         let (coarse_template, coarse_head) = (reduced_to(template, spacing_mm), reduced_to(head_image, spacing_mm));
-        let known = known.map(|k| super::rigid::on_grid_of(k, &coarse_head));
+        let known = known.map(|k| on_grid_of(k, &coarse_head));
         let spacing = coarse_head.grid.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
         let request = Draw {
             most,

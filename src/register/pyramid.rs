@@ -1,8 +1,9 @@
 //! Coarser copies of an image: Gaussian smoothing and subsampling in one step, each axis by its own whole factor.
+//! Masks on their grids.
 
 use crate::geometry::Native;
-use crate::image::{Grid, Volume};
-use nalgebra::Matrix4;
+use crate::image::{Grid, Mask, Volume};
+use nalgebra::{Matrix4, Point3};
 use rayon::prelude::*;
 
 /// The image with every axis reduced by the whole factor that brings its spacing nearest to `spacing_mm`; axes that
@@ -71,10 +72,18 @@ fn reduced_along(image: &Volume<f32, Native>, axis: usize, factor: usize) -> Vol
     Volume::from_data(grid, data)
 }
 
+/// A mask read at the voxels of an image (nearest voxel).
+pub(super) fn on_grid_of(mask: &Mask<Native>, image: &Volume<f32, Native>) -> Mask<Native> {
+    let to_mask = mask.grid.voxel_from_mm() * image.grid.mm_from_voxel;
+    Volume::from_fn(image.grid, |n| {
+        let p = to_mask.transform_point(&Point3::from(image.grid.voxel(n).map(|i| i as f64)));
+        mask.get(p.x.round() as isize, p.y.round() as isize, p.z.round() as isize).unwrap_or(false)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
 
     #[test]
     fn a_linear_ramp_stays_at_its_place_when_reduced() {

@@ -45,14 +45,14 @@ impl Affine {
 
 impl<F: Frame> DisplacementField<F> {
     /// A deformation without an affine part.
-    fn plain(grid: Grid<F>, components: [Vec<f32>; 3]) -> Self {
+    fn plain(grid: &Grid<F>, components: [Vec<f32>; 3]) -> Self {
         let (to_voxel, to_mm) = (Affine::of(grid.voxel_from_mm()), Affine::of(&grid.mm_from_voxel));
-        Self { grid, components, to_voxel, to_mm }
+        Self { grid: *grid, components, to_voxel, to_mm }
     }
 
     /// First the flow, then the affine map.
     pub(super) fn after_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
-        let plain = Self::plain(flow.grid.relabelled(), flow.components.clone());
+        let plain = Self::plain(&flow.grid.relabelled(), flow.components.clone());
         Self { to_mm: plain.to_mm.then(Affine { linear: *linear, shift: *shift_mm }), ..plain }
     }
 
@@ -60,7 +60,7 @@ impl<F: Frame> DisplacementField<F> {
     pub(super) fn before_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
         let inverse = linear.try_inverse().unwrap_or_else(Matrix3::identity);
         let before = Affine { linear: inverse, shift: -(inverse * shift_mm) };
-        let plain = Self::plain(flow.grid.relabelled(), flow.components.clone());
+        let plain = Self::plain(&flow.grid.relabelled(), flow.components.clone());
         Self { to_voxel: before.then(plain.to_voxel), ..plain }
     }
 
@@ -75,7 +75,7 @@ impl<F: Frame> DisplacementField<F> {
                 component.push(*v as f32);
             }
         }
-        Self::plain(grid, components)
+        Self::plain(&grid, components)
     }
 
     /// How far every point of the field's grid moves, mm: what [`Self::from_displacement`] takes. Rounded to a 64th

@@ -8,8 +8,7 @@ pub use field::DisplacementField;
 
 use super::affine;
 use super::mutual_information::Pose;
-use super::pyramid::reduced_to;
-use super::rigid::on_grid_of;
+use super::pyramid::{on_grid_of, reduced_to};
 use crate::geometry::{Frame, Native, Position};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Vector3};

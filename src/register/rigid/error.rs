@@ -1,0 +1,53 @@
+//! Why two images could not be registered.
+
+use thiserror::Error;
+
+/// Why two images could not be registered.
+#[derive(Debug, Error, PartialEq)]
+pub enum RegisterError {
+    /// A voxel is NaN or infinite.
+    #[error("the {which} image has {count} voxels that are not finite: replace them (for example by 0) first")]
+    NotFinite {
+        /// "moving" or "fixed".
+        which: &'static str,
+        /// How many voxels.
+        count: usize,
+    },
+    /// All voxels are alike.
+    #[error("the {which} image is constant ({value}): there is nothing to register; give the T1 image itself")]
+    Constant {
+        /// "moving" or "fixed".
+        which: &'static str,
+        /// The value.
+        value: f32,
+    },
+    /// Too small to hold a head.
+    #[error(
+        "the {which} image has {} x {} x {} voxels: registration needs at least 8 along each axis", dims[0], dims[1], dims[2]
+    )]
+    TooSmall {
+        /// "moving" or "fixed".
+        which: &'static str,
+        /// Voxels along each axis.
+        dims: [usize; 3],
+    },
+    /// A mask has no voxel inside.
+    #[error("the mask of the {which} image is empty: leave it out or give one with voxels inside")]
+    EmptyMask {
+        /// "moving" or "fixed".
+        which: &'static str,
+    },
+    /// A setting has no meaning.
+    #[error("the registration setting `{name}` is {value}: it must be {rule}")]
+    Setting {
+        /// The setting's name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+    /// The images do not overlap at any pose tried.
+    #[error("no pose was found at which the images share information: are both T1 images of a head?")]
+    NoOverlap,
+}

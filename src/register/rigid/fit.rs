@@ -1,0 +1,154 @@
+//! From two images to the pose between them, coarse to fine.
+
+use super::side::Side;
+use super::{FitQuality, RegisterError, RigidSettings};
+use crate::geometry::Native;
+use crate::image::{Mask, Volume};
+use crate::register::bfgs::Stopping;
+use crate::register::bspline::prefilter;
+use crate::register::head;
+use crate::register::mutual_information::{Bins, Interpolated, Pose};
+use crate::register::pyramid::{on_grid_of, reduced_to};
+use crate::register::sample::{Draw, draw};
+use crate::register::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank};
+use nalgebra::Matrix3;
+
+/// An image and its foreground at one resolution.
+struct Reduced {
+    image: Volume<f32, Native>,
+    coefficients: Volume<f32, Native>,
+    spacing_mm: f64,
+}
+
+/// The image at each resolution, coarse to fine; coarser ones are made from finer ones.
+fn pyramid(image: &Volume<f32, Native>, levels_mm: &[f64]) -> Vec<Reduced> {
+    let mut finer = image.clone();
+    let mut out: Vec<Reduced> = levels_mm
+        .iter()
+        .rev()
+        .map(|&spacing_mm| {
+            finer = reduced_to(&finer, spacing_mm);
+            let mut coefficients = finer.clone();
+            let spacing = finer.grid.spacing_mm();
+            let thinnest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+            for axis in (0..3).filter(|&a| spacing[a] > 1.5 * thinnest) {
+                prefilter(&mut coefficients, axis);
+            }
+            Reduced { image: finer.clone(), coefficients, spacing_mm }
+        })
+        .collect();
+    out.reverse();
+    out
+}
+
+/// The pose that takes the sampled image onto the other one, and how far it can be trusted.
+pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, FitQuality), RegisterError> {
+    let mut levels_mm = vec![settings.start_level_mm];
+    levels_mm.extend(&settings.levels_mm);
+    let (sampled_levels, other_levels) = (pyramid(&sampled.image, &levels_mm), pyramid(&other.image, &levels_mm));
+    let head_of = |side: &Side, levels: &[Reduced]| {
+        side.mask.clone().unwrap_or_else(|| head::foreground(&levels[levels.len().min(2) - 1].image))
+    };
+    let (sampled_head, other_head) = (head_of(sampled, &sampled_levels), head_of(other, &other_levels));
+    let centre = head::centre_mm(&sampled_head);
+    let target = head::centre_mm(&other_head);
+
+    // A mask of the other image is asked at each of its resolutions.
+    let other_masks: Vec<Option<Mask<Native>>> =
+        other_levels.iter().map(|l| other.mask.as_ref().map(|m| on_grid_of(m, &l.image))).collect();
+    let level = |n: usize, most: usize, bins: usize| {
+        let (s, o) = (&sampled_levels[n], &other_levels[n]);
+        let spacing = o.image.grid.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
+        let request = Draw {
+            most,
+            other_spacing_mm: spacing,
+            bins,
+            range: head::range_inside(&s.image, &sampled_head),
+            centre_mm: centre,
+            seed: settings.seed + n as u64,
+        };
+        Level {
+            samples: draw(&s.image, &sampled_head, &request),
+            other: Interpolated {
+                image: &o.coefficients,
+                mask: other_masks[n].as_ref(),
+                range: head::range_inside(&o.image, &other_head),
+            },
+            bins: Bins { sampled: bins, interpolated: bins + 4 },
+            spacing_mm: s.spacing_mm,
+        }
+    };
+
+    let bins = settings.histogram_bins;
+    let start_level = level(0, 3000, bins.min(24));
+    if start_level.samples.len() < 64 {
+        return Err(RegisterError::NoOverlap);
+    }
+    let aligned = Pose { linear: Matrix3::identity(), centre, target };
+    let as_they_lie = Pose { target: centre, ..aligned };
+    let turn = 20f64.to_radians();
+    let reach = Reach {
+        turns_rad: vec![-turn, 0.0, turn],
+        shifts_mm: [vec![-20.0, 0.0, 20.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
+    };
+    let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], &reach, 4);
+    if starts.is_empty() || ordinary <= 0.0 {
+        return Err(RegisterError::NoOverlap);
+    }
+    let distinctness = rank(&start_level, vec![starts[0]])[0].0 / ordinary;
+
+    let first = level(1, 20_000, bins.min(32));
+    let refined = refine_all(&first, &starts);
+    let mut pose = rank(&first, refined)[0].1;
+
+    let mirrored_ratio = settings.try_mirror.then(|| {
+        // The same search for the mirror image: the sampled head reflected in its own left-right axis.
+        let mut mirror = Matrix3::identity();
+        mirror[(0, 0)] = -1.0;
+        let mirrored = Pose { linear: pose.linear * mirror, ..pose };
+        let shifts_mm = [vec![-10.0, 0.0, 10.0], vec![0.0], vec![0.0]];
+        let narrow = Reach { turns_rad: reach.turns_rad.clone(), shifts_mm };
+        let (starts, _) = coarse(&start_level, &[mirrored], &narrow, 2);
+        let best = rank(&first, refine_all(&first, &starts)).first().map_or(0.0, |r| r.0);
+        best / rank(&first, vec![pose])[0].0.max(1e-12)
+    });
+
+    let mut inverse_hessian = None;
+    let mut evaluations = 0;
+    let mut last = None;
+    for n in 1..levels_mm.len() {
+        let finest = n + 1 == levels_mm.len();
+        // Half the points per halving of the spacing: coarse levels need to come close, no more.
+        let most = (settings.samples >> (levels_mm.len() - 1 - n)).max(20_000);
+        let level = level(n, most, bins);
+        let stopping = Stopping {
+            longest_step_mm: 0.5 * level.spacing_mm,
+            shortest_step_mm: if finest { settings.tolerance_mm } else { 0.01 * level.spacing_mm },
+            evaluations: 60,
+        };
+        let Optimum { pose: found, inverse_hessian: h, evaluations: used } =
+            optimise(&level, &pose, Freedom::Rigid, inverse_hessian.take(), stopping);
+        pose = found;
+        inverse_hessian = Some(h);
+        evaluations += used;
+        if finest {
+            last = Some(level.at(&pose));
+        }
+    }
+    let last = last.ok_or(RegisterError::NoOverlap)?;
+    let quality = FitQuality {
+        mutual_information: last.mutual_information,
+        normalised_information: last.mutual_information / last.entropy.max(1e-12),
+        overlap: last.overlap,
+        distinctness,
+        mirrored_ratio,
+        evaluations,
+    };
+    Ok((pose, quality))
+}
+
+fn refine_all(level: &Level<'_>, poses: &[Pose]) -> Vec<Pose> {
+    let stopping =
+        Stopping { longest_step_mm: level.spacing_mm, shortest_step_mm: 0.02 * level.spacing_mm, evaluations: 40 };
+    poses.iter().map(|p| optimise(level, p, Freedom::Rigid, None, stopping).pose).collect()
+}

@@ -1,0 +1,60 @@
+//! What steers a rigid registration.
+
+use super::RegisterError;
+use serde::{Deserialize, Serialize};
+
+/// How a rigid registration is done.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigidSettings {
+    /// Resolutions in mm, coarse to fine.
+    pub levels_mm: Vec<f64>,
+    /// Resolution of the search over starting poses, in mm.
+    pub start_level_mm: f64,
+    /// Bins of the joint histogram on each axis.
+    pub histogram_bins: usize,
+    /// About how many points are sampled at the finest level; coarser levels take what they have, up to this.
+    pub samples: usize,
+    /// A step shorter than this ends the search at the finest level, in mm.
+    pub tolerance_mm: f64,
+    /// Whether the mirror image is tried too, to warn of exchanged sides; useless against a symmetric template.
+    pub try_mirror: bool,
+    /// Seed of the sampling pattern.
+    pub seed: u64,
+}
+
+impl Default for RigidSettings {
+    fn default() -> Self {
+        Self {
+            levels_mm: vec![4.0, 2.0, 1.0],
+            start_level_mm: 8.0,
+            histogram_bins: 48,
+            samples: 250_000,
+            tolerance_mm: 1e-3,
+            try_mirror: true,
+            seed: 1,
+        }
+    }
+}
+
+/// Refuses settings out of range, by name.
+pub(super) fn check_settings(settings: &RigidSettings) -> Result<(), RegisterError> {
+    let refuse = |name, value, rule| Err(RegisterError::Setting { name, value, rule });
+    let first = settings.levels_mm.first().copied().unwrap_or(0.0);
+    if !settings.levels_mm.iter().all(|&l| l > 0.0 && l <= 16.0) || first == 0.0 {
+        return refuse("levels_mm", first, "one or more resolutions between 0 and 16 mm");
+    }
+    if !(settings.start_level_mm > 0.0 && settings.start_level_mm <= 16.0) {
+        return refuse("start_level_mm", settings.start_level_mm, "between 0 and 16 mm");
+    }
+    if !(8..=255).contains(&settings.histogram_bins) {
+        return refuse("histogram_bins", settings.histogram_bins as f64, "between 8 and 255");
+    }
+    if settings.samples < 1000 {
+        return refuse("samples", settings.samples as f64, "at least 1000");
+    }
+    if !(settings.tolerance_mm > 0.0 && settings.tolerance_mm <= 1.0) {
+        return refuse("tolerance_mm", settings.tolerance_mm, "above 0 and at most 1 mm");
+    }
+    Ok(())
+}
