@@ -137,7 +137,7 @@ fn generated_by() -> Value {
     json!([{"Name": "hgm", "Version": env!("CARGO_PKG_VERSION")}])
 }
 
-/// What lies once at the top of the derivatives. `raw` is where the input data set is from there, or its DOI.
+/// What lies once at the top of the derivatives. `raw` is where the input data set is from there (see [`way_up`]).
 pub fn dataset_files(raw: Option<&str>) -> Vec<CaseFile> {
     let mut description = json!({
         "Name": "hgm: brain deformation after resection",

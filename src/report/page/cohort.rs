@@ -1,7 +1,7 @@
 //! The page of a cohort.
 
 use super::super::cohort::{Cohort, Row, Status};
-use super::super::html::{escape, number};
+use super::super::html::{escape, fixed, number};
 use super::results::table;
 use super::{Frame, Section, notice};
 use std::collections::BTreeMap;
@@ -39,7 +39,8 @@ impl Cohort {
         head.extend(self.columns.iter().map(|name| escape(&words(name))));
         head.extend(["at the margin", "warnings"].map(str::to_owned));
         let numbers = |from: &BTreeMap<String, f64>| -> Vec<String> {
-            self.columns.iter().map(|name| from.get(name).map_or("–".to_owned(), |v| number(*v, 4))).collect()
+            let shown = |name: &String, v: f64| if name.ends_with("_sd_level") { fixed(v, 2) } else { number(v, 4) };
+            self.columns.iter().map(|name| from.get(name).map_or("–".to_owned(), |v| shown(name, *v))).collect()
         };
         let line = |row: &Row| {
             let name = escape(&row.participant_id);
