@@ -1,7 +1,7 @@
 //! The cavity that surgery left, and the tissue that filled it.
 
 use crate::geometry::Mni;
-use crate::image::components::{Connectivity, components, fill_holes};
+use crate::image::components::{Connectivity, components, fill_holes, largest_component};
 use crate::image::distance::distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode, open};
@@ -102,6 +102,17 @@ pub enum ResectError {
         /// What would have counted.
         smallest_cc: f64,
     },
+    /// What pre lacks, post has.
+    #[error(
+        "the pre-operative scan has {before_cc:.1} cc of fluid where the post-operative one has tissue, which lacks only \
+         {after_cc:.1} cc: the two files look swapped; give the pre-operative scan first, or give --cavity-mask"
+    )]
+    Swapped {
+        /// Largest part that is fluid on pre and tissue on post.
+        before_cc: f64,
+        /// Largest part that is tissue on pre and fluid on post.
+        after_cc: f64,
+    },
     /// A given cavity lies elsewhere.
     #[error("the cavity lies outside the brain: only {percent:.0} % of it was tissue before; check the masks' grids")]
     OutsideBrain {
@@ -114,7 +125,7 @@ pub enum ResectError {
 /// by volume x depth x loss; grown through dark voxels, closed, smoothed, without the ventricles.
 ///
 /// # Errors
-/// [`ResectError::NoCavity`] when no part is large enough.
+/// [`ResectError::Swapped`] when more has appeared than was lost, [`ResectError::NoCavity`] when no part is large enough.
 pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<CavityFinding, ResectError> {
     let grid = pair.pre.grid;
     let tissue = pair.pre_labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER);
@@ -132,6 +143,12 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
     }
     let best = (1..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(0) as u32;
     let seed = parts.labels.map(|part| best > 0 && part == best);
+    let fluid = pair.pre_labels.map(|l| l == label::CSF);
+    let appeared = Mask::from_fn(grid, |n| fluid.data[n] && inner.data[n] && pair.post_known.data[n] && !dark.data[n]);
+    let before_cc = largest_component(&open(&appeared, settings.opening_mm), Connectivity::Faces).volume_cc();
+    if before_cc >= settings.smallest_cc.max(seed.volume_cc()) {
+        return Err(ResectError::Swapped { before_cc, after_cc: seed.volume_cc() });
+    }
     if seed.volume_cc() < settings.smallest_cc {
         return Err(ResectError::NoCavity { largest_cc: seed.volume_cc(), smallest_cc: settings.smallest_cc });
     }
@@ -303,6 +320,20 @@ mod tests {
         let known = h.brain.map(|_| true);
         let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
         assert!(error.to_string().contains("--cavity-mask"));
+    }
+
+    #[test]
+    fn a_hole_on_the_first_scan_only_says_that_the_files_are_swapped() {
+        let h = head(12.0);
+        let known = h.brain.map(|_| true);
+        let mut labels = h.labels.clone();
+        for (l, _) in labels.data.iter_mut().zip(&h.hole.data).filter(|(_, hole)| **hole) {
+            *l = label::CSF;
+        }
+        let swapped = CavityPair { pre: &h.post, post: &h.pre, pre_labels: &labels, ..pair(&h, &known) };
+        let error = find_cavity(&swapped, &CavitySettings::default()).unwrap_err();
+        assert!(matches!(error, ResectError::Swapped { before_cc, .. } if before_cc > 5.0), "{error}");
+        assert!(error.to_string().contains("swapped"));
     }
 
     #[test]
