@@ -23,7 +23,7 @@ pub struct Command {
 }
 
 /// A pair and where its case goes.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 // Flattened into `run`, whose own group of arguments has this name.
 #[group(skip)]
 pub struct Args {

@@ -114,7 +114,7 @@ fn posed(args: &Args, case: &Case, session: &Session) -> Result<Vec<Stage>, Fail
     for (role, sum) in segmented.inputs.iter().filter(|(role, _)| role.ends_with(" mask")) {
         anat = anat.input_sha256(role, sum);
     }
-    let (mesh, ..) = mesh_stage(case, &args.mesh, &segmented, session)?;
+    let (mesh, ..) = mesh_stage(case, &args.analysis.mesh(&args.mesh, session), &segmented, session)?;
     let mut stages = vec![registration, anat, mesh, reference_stage(case, &segmented)];
     if let (Some(meshed), Some(observed), false) = (of_stage("mesh"), of_stage("reference"), args.analysis.estimate) {
         let mut settings: ResectionSettings = session.settings("resection")?;
