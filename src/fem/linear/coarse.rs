@@ -3,19 +3,20 @@
 //! A diagonal preconditioner passes on news from node to node, so the iterations grow with the nodes along the body.
 //! Here the rows are cut into pieces of equal size (medians along the longest axis), Z holds the six rigid motions of
 //! every piece, and Z (Z^T K Z)^-1 Z^T is added to the preconditioner (Nicolaides, "Deflation of conjugate gradients",
-//! SIAM J. Numer. Anal. 24, 1987; rigid motions as in smoothed aggregation, Vanek, Mandel and Brezina, 1996). K changes
-//! little from one Newton iteration to the next: the matrix of the first is kept.
+//! SIAM J. Numer. Anal. 24, 1987; rigid motions as in smoothed aggregation, Vanek, Mandel and Brezina, 1996). Z^T K Z is as
+//! sparse as K and factored as sparsely, so that the pieces can grow in number with the rows. K changes little from one Newton
+//! iteration to the next: the factor of the first is kept.
 
+use super::super::sparse::{BlockMatrix, BlockPattern};
 use super::Tangent;
+use super::factor::{Factor, Symbolic};
 use super::operator::{Lanes, Real, by_rows};
-use faer::linalg::solvers::DenseSolveCore;
-use faer::{Mat, Side};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Least rows of a piece, and most pieces for every row along the body: the dense inverse of six numbers a piece then
-/// stays cheaper than a product with K.
-const PIECE: usize = 110;
-const PIECES_ALONG: f64 = 4.3;
+/// Rows of a piece: smaller ones save iterations, larger ones make each cheaper. Measured on 224,000 nodes (one thread, CPU-s and
+/// iterations under gravity): 18.0 and 284 with 110, 16.7 and 327 with 220, 17.3 and 374 with 440.
+const PIECE: usize = 220;
 
 /// What the correction needs to know of the rows.
 pub(in super::super) struct Rows {
@@ -25,8 +26,8 @@ pub(in super::super) struct Rows {
     pub held: Option<Arc<Vec<[bool; 3]>>>,
 }
 
-/// The correction, ready to be applied.
-pub(super) struct Coarse {
+/// The rows by pieces.
+struct Pieces {
     /// Rows of every piece.
     start: Vec<usize>,
     rows: Vec<u32>,
@@ -35,9 +36,22 @@ pub(super) struct Coarse {
     place: Vec<[f32; 3]>,
     /// Components held on rows that are otherwise free: no motion of a piece moves them.
     held: Option<Arc<Vec<[bool; 3]>>>,
-    /// (Z^T K Z)^-1, row after row.
-    inverse: Vec<f32>,
+    /// Centres of the pieces, m.
+    centre: Vec<[f64; 3]>,
 }
+
+/// The correction, ready to be applied.
+pub(super) struct Coarse {
+    pieces: Pieces,
+    /// Of Z^T K Z, two block rows a piece: translations and rotations.
+    factor: Factor,
+    /// Force and moment on every piece, and its motion.
+    loads: Vec<[f64; 3]>,
+    motion: Vec<[f64; 3]>,
+}
+
+/// Blocks of Z^T K Z by the pieces of row and column, column-major.
+type Coupling = BTreeMap<(u32, u32), [[f64; 6]; 6]>;
 
 /// Rows cut into `parts` of equal size.
 fn cut(rows: &mut [u32], parts: usize, positions: &[[f64; 3]], start: &mut Vec<usize>) {
@@ -74,37 +88,67 @@ fn wrench(d: [f64; 3], f: [f64; 3]) -> [f64; 6] {
     [f[0], f[1], f[2], d[1] * f[2] - d[2] * f[1], d[2] * f[0] - d[0] * f[2], d[0] * f[1] - d[1] * f[0]]
 }
 
+/// The blocks as a matrix, two block rows a piece.
+fn matrix(coupling: &Coupling, pieces: usize) -> BlockMatrix {
+    let mut pattern = BlockPattern { row_start: vec![0], columns: Vec::new(), diagonal: Vec::new() };
+    let mut blocks = Vec::new();
+    for own in 0..pieces as u32 {
+        for half in 0..2 {
+            for (&(_, of), block) in coupling.range((own, 0)..=(own, u32::MAX)) {
+                for other in 0..2 {
+                    if (own, half) == (of, other) {
+                        pattern.diagonal.push(pattern.columns.len() as u32);
+                    }
+                    pattern.columns.push(2 * of + other as u32);
+                    blocks.push(std::array::from_fn(|n| block[3 * other + n / 3][3 * half as usize + n % 3]));
+                }
+            }
+            pattern.row_start.push(pattern.columns.len());
+        }
+    }
+    BlockMatrix { pattern: Arc::new(pattern), blocks }
+}
+
 impl Coarse {
     /// `None` for a small system, which needs none, and for a tangent that is not positive definite.
     pub(super) fn new(tangent: &Tangent, at: &Rows) -> Option<Self> {
-        let positions = &at.positions;
-        let pieces = (positions.len() / PIECE).min((PIECES_ALONG * (positions.len() as f64).cbrt()) as usize);
-        if pieces < 8 {
+        let count = at.positions.len() / PIECE;
+        if count < 8 {
             return None;
         }
+        let pieces = Pieces::new(at, count);
+        let matrix = matrix(&pieces.coupling(tangent), count);
+        let centres: Vec<[f64; 3]> = pieces.centre.iter().flat_map(|&c| [c, c]).collect();
+        let symbolic = Arc::new(Symbolic::new(&matrix.pattern, None, &centres)?);
+        let factor = Factor::new(&symbolic, &Tangent { matrix, nodal: None })?;
+        let zero = vec![[0.0; 3]; 2 * count];
+        Some(Self { pieces, factor, loads: zero.clone(), motion: zero })
+    }
+}
+
+impl Pieces {
+    fn new(at: &Rows, count: usize) -> Self {
+        let positions = &at.positions;
         let mut rows: Vec<u32> = (0..positions.len() as u32).collect();
         let mut start = vec![0];
-        cut(&mut rows, pieces, positions, &mut start);
+        cut(&mut rows, count, positions, &mut start);
         let (mut piece, mut place) = (vec![0u32; rows.len()], vec![[0.0f32; 3]; rows.len()]);
-        for p in 0..pieces {
+        let mut centre = Vec::with_capacity(count);
+        for p in 0..count {
             let own = &mut rows[start[p]..start[p + 1]];
             own.sort_unstable();
             let n = own.len() as f64;
-            let centre = [0, 1, 2].map(|i| own.iter().map(|&r| positions[r as usize][i]).sum::<f64>() / n);
-            let offset = |r: u32| [0, 1, 2].map(|i| positions[r as usize][i] - centre[i]);
+            let middle = [0, 1, 2].map(|i| own.iter().map(|&r| positions[r as usize][i]).sum::<f64>() / n);
+            let offset = |r: u32| [0, 1, 2].map(|i| positions[r as usize][i] - middle[i]);
             let square: f64 = own.iter().map(|&r| offset(r).iter().map(|x| x * x).sum::<f64>()).sum();
             let size = (square / n).sqrt().max(f64::MIN_POSITIVE);
             for &r in own.iter() {
                 piece[r as usize] = p as u32;
                 place[r as usize] = offset(r).map(|x| (x / size) as f32);
             }
+            centre.push(middle);
         }
-        let mut coarse = Self { start, rows, piece, place, held: at.held.clone(), inverse: Vec::new() };
-        let matrix = coarse.matrix(tangent);
-        let inverse = matrix.llt(Side::Lower).ok()?.inverse();
-        let n = 6 * pieces;
-        coarse.inverse = (0..n * n).map(|at| inverse[(at / n, at % n)] as f32).collect();
-        coarse.inverse.iter().all(|v| v.is_finite()).then_some(coarse)
+        Self { start, rows, piece, place, held: at.held.clone(), centre }
     }
 
     fn is_held(&self, row: usize) -> [bool; 3] {
@@ -112,9 +156,8 @@ impl Coarse {
     }
 
     /// Z^T K Z.
-    fn matrix(&self, tangent: &Tangent) -> Mat<f64> {
-        let pieces = self.start.len() - 1;
-        let mut matrix = Mat::<f64>::zeros(6 * pieces, 6 * pieces);
+    fn coupling(&self, tangent: &Tangent) -> Coupling {
+        let mut coupling = Coupling::new();
         let place = |row: usize| self.place[row].map(f64::from);
         let pattern = &tangent.matrix.pattern;
         // K Z of the row under way, by piece of the column.
@@ -130,13 +173,13 @@ impl Coarse {
                 });
                 times_rigid(&tangent.matrix.blocks[at], place(column), &mut sums[found].1);
             }
-            let own = 6 * self.piece[row] as usize;
             for (of, sum) in &sums {
+                let block = coupling.entry((self.piece[row], *of)).or_default();
                 for (c, column) in sum.iter().enumerate() {
                     let mut force = *column;
                     (0..3).filter(|&i| self.is_held(row)[i]).for_each(|i| force[i] = 0.0);
                     for (r, w) in wrench(place(row), force).into_iter().enumerate() {
-                        matrix[(own + r, 6 * *of as usize + c)] += w;
+                        block[c][r] += w;
                     }
                 }
             }
@@ -170,59 +213,46 @@ impl Coarse {
                             (0..9).for_each(|i| stress[i] += column[i] * s);
                         }
                         for (other, rows) in &strains {
+                            let block = coupling.entry((*other, *of)).or_default();
                             for (r, row) in rows.iter().enumerate() {
-                                let work: f64 = row.iter().zip(&stress).map(|(a, b)| a * b).sum();
-                                matrix[(6 * *other as usize + r, 6 * *of as usize + c)] += work;
+                                block[c][r] += row.iter().zip(&stress).map(|(a, b)| a * b).sum::<f64>();
                             }
                         }
                     }
                 }
             }
         }
-        matrix
+        coupling
     }
+}
 
+impl Coarse {
     /// z += Z (Z^T K Z)^-1 Z^T r.
-    pub(super) fn add<T: Real>(&self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
-        let pieces = self.start.len() - 1;
-        let mut loads = vec![[0.0f32; 6]; pieces];
-        by_rows(&mut loads, |first, loads| {
+    pub(super) fn add<T: Real>(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
+        let Self { pieces, factor, loads, motion } = self;
+        by_rows(loads.as_chunks_mut::<2>().0, |first, loads| {
             for (p, load) in (first..).zip(loads) {
-                for &row in &self.rows[self.start[p]..self.start[p + 1]] {
-                    let (f, d) = (r[row as usize], self.place[row as usize]);
-                    let f = [f[0].wide() as f32, f[1].wide() as f32, f[2].wide() as f32];
-                    let moment = [d[1] * f[2] - d[2] * f[1], d[2] * f[0] - d[0] * f[2], d[0] * f[1] - d[1] * f[0]];
+                *load = [[0.0; 3]; 2];
+                for &row in &pieces.rows[pieces.start[p]..pieces.start[p + 1]] {
+                    let f = &r[row as usize];
+                    let w = wrench(pieces.place[row as usize].map(f64::from), [f[0].wide(), f[1].wide(), f[2].wide()]);
                     for i in 0..3 {
-                        load[i] += f[i];
-                        load[i + 3] += moment[i];
+                        load[0][i] += w[i];
+                        load[1][i] += w[i + 3];
                     }
                 }
             }
         });
-        let n = 6 * pieces;
-        let loads = loads.as_flattened();
-        let mut motion = vec![0.0f32; n];
-        by_rows(&mut motion, |first, motion| {
-            for (row, out) in (first..).zip(motion) {
-                // Eight partial sums, so that the loop runs in vector registers.
-                let mut sums = [0.0f32; 8];
-                let line = &self.inverse[row * n..(row + 1) * n];
-                let (wide, rest) = line.as_chunks::<8>();
-                let (wide_loads, rest_loads) = loads.as_chunks::<8>();
-                for (a, b) in wide.iter().zip(wide_loads) {
-                    (0..8).for_each(|i| sums[i] += a[i] * b[i]);
-                }
-                *out = sums.iter().sum::<f32>() + rest.iter().zip(rest_loads).map(|(a, b)| a * b).sum::<f32>();
-            }
-        });
-        let motion = motion.as_chunks::<6>().0;
+        factor.solve(loads, motion);
+        let motion = motion.as_chunks::<2>().0;
         by_rows(z, |first, rows| {
             for (row, out) in (first..).zip(rows) {
-                let (m, d) = (&motion[self.piece[row] as usize], self.place[row]);
-                let turned = [m[4] * d[2] - m[5] * d[1], m[5] * d[0] - m[3] * d[2], m[3] * d[1] - m[4] * d[0]];
-                let held = self.is_held(row);
+                let ([shift, turn], d) = (&motion[pieces.piece[row] as usize], pieces.place[row].map(f64::from));
+                let turned =
+                    [turn[1] * d[2] - turn[2] * d[1], turn[2] * d[0] - turn[0] * d[2], turn[0] * d[1] - turn[1] * d[0]];
+                let held = pieces.is_held(row);
                 for i in (0..3).filter(|&i| !held[i]) {
-                    out[i] += T::of(f64::from(m[i] + turned[i]));
+                    out[i] += T::of(shift[i] + turned[i]);
                 }
             }
         });

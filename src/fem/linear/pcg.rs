@@ -35,13 +35,13 @@ struct Packed<T> {
 /// Jacobi, and the coarse correction on top.
 struct Preconditioner<'a, T> {
     jacobi: &'a BlockJacobi<T>,
-    coarse: Option<&'a Coarse>,
+    coarse: Option<&'a mut Coarse>,
 }
 
 impl<T: Real> Preconditioner<'_, T> {
-    fn apply(&self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
+    fn apply(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
         self.jacobi.apply(r, z);
-        if let Some(coarse) = self.coarse {
+        if let Some(coarse) = &mut self.coarse {
             coarse.add(r, z);
         }
     }
@@ -79,7 +79,7 @@ fn add<T: Real>(a: &mut [Lanes<T>], factor: T, b: &[Lanes<T>]) {
 
 fn conjugate_gradients<T: Real>(
     operator: &mut Operator<T>,
-    preconditioner: &Preconditioner<T>,
+    preconditioner: &mut Preconditioner<T>,
     b: &[Lanes<T>],
     x: &mut [Lanes<T>],
     tolerance: f64,
@@ -143,7 +143,7 @@ impl<T: Real> Packed<T> {
 
     fn refine(
         &mut self,
-        coarse: Option<&Coarse>,
+        coarse: Option<&mut Coarse>,
         most_iterations: usize,
         tangent: &Tangent,
         rhs: &[[f64; 3]],
@@ -152,7 +152,7 @@ impl<T: Real> Packed<T> {
     ) -> LinearReport {
         let finest = self.finest;
         let Self { operator, preconditioner, .. } = self;
-        let preconditioner = &Preconditioner { jacobi: preconditioner, coarse };
+        let preconditioner = &mut Preconditioner { jacobi: preconditioner, coarse };
         let mut report = LinearReport::default();
         let whole = reduce::norm(rhs);
         let mut residual = rhs.to_vec();
@@ -219,13 +219,13 @@ impl LinearSolver for Pcg {
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
         let (blocks, most) = (self.blocks, self.most_iterations);
         let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));
-        let single = single.refine(self.coarse.as_ref(), most, tangent, rhs, x, tolerance);
+        let single = single.refine(self.coarse.as_mut(), most, tangent, rhs, x, tolerance);
         if single.reached {
             return single;
         }
         // Too ill-conditioned for single precision, or truly indefinite: double precision decides.
         let double = self.double.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-13));
-        let mut double = double.refine(self.coarse.as_ref(), most, tangent, rhs, x, tolerance);
+        let mut double = double.refine(self.coarse.as_mut(), most, tangent, rhs, x, tolerance);
         double.iterations += single.iterations;
         double
     }
