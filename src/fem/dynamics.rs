@@ -7,10 +7,12 @@
 //! one. Free fall and linear modes come out exactly as the formula says. Prescribed displacements are in place from the
 //! start.
 
+use super::body::Laws;
 use super::equilibrium::largest_ratio;
 use super::linear::{self, Tangent};
 use super::mass::Mass;
-use super::model::{Laws, Materials, Model, worst};
+use super::model::{Materials, Model};
+use super::outcome::worst;
 use super::units::METRES_PER_MM;
 use super::{ConvergenceRecord, FemError, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
 

@@ -6,8 +6,10 @@
 //! elements are projected, so that the step still goes down. A load step that fails is halved; one that succeeds lets
 //! the next be longer.
 
+use super::body::Laws;
 use super::linear::{LinearReport, LinearSolver};
-use super::model::{Laws, Materials, Model, worst};
+use super::model::{Materials, Model};
+use super::outcome::worst;
 use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, linear, reduce};
 use crate::material::law::Material;
 

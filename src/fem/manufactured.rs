@@ -1,6 +1,6 @@
 //! A manufactured solution: the load is computed from a chosen displacement, and the answer must come back.
 
-use super::model::Body;
+use super::body::Body;
 use super::{Model, Scenario};
 use crate::material::law::{Hyperelastic, NeoHookean};
 use crate::mesh::TetMesh;

@@ -1,7 +1,8 @@
 //! Mass of the free nodes: lumped, or the Galerkin matrix on the pattern of the stiffness.
 
+use super::body::Body;
 use super::linear::Tangent;
-use super::model::{Body, Model};
+use super::model::Model;
 use super::scenario::MassKind;
 use super::sparse::{BlockPattern, HELD};
 use std::sync::Arc;

@@ -1,18 +1,18 @@
 //! A mesh made ready for many solves: numbering, pattern, held nodes and loads are found once, materials come with
 //! every solve.
 
+use super::body::{Body, Laws};
+use super::check::{check_held_together, check_materials, check_settings, materials_of_cells, node_set};
 use super::element::{
-    At, ElementKind, Elements, Kernel, NODAL_SHARE, NodalGradient, NodalTangent, Partition, tet4, tet10,
-    with_mid_edge_nodes,
+    ElementKind, Elements, Kernel, NODAL_SHARE, NodalGradient, Partition, tet4, tet10, with_mid_edge_nodes,
 };
 use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
-use super::order::{Graph, reverse_cuthill_mckee};
+use super::order::{Graph, renumbered, reverse_cuthill_mckee, sorted};
 use super::scenario::{MassKind, Method, Scenario};
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
-use super::{FemError, Outcome, State};
-use crate::material::Hyperelastic;
+use super::{FemError, State};
 use crate::material::law::{Material, Parameter};
 use crate::mesh::TetMesh;
 use std::collections::BTreeMap;
@@ -42,175 +42,15 @@ pub struct Model {
     /// Undeformed nodes in solver numbering, m.
     pub(super) nodes_m: Vec<[f64; 3]>,
     /// Material names in the order the elements count them.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     /// Solver number of every node of the mesh (mid-edge nodes behind them).
-    number: Vec<u32>,
-    corners: usize,
+    pub(super) number: Vec<u32>,
+    pub(super) corners: usize,
     /// Ends of the mid-edge nodes, in mesh numbering.
     edges: Vec<[u32; 2]>,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
     /// Elimination order of the direct solver, found when first needed.
     symbolic: OnceLock<Option<Arc<Symbolic>>>,
-}
-
-/// Elements of one kind.
-pub(super) enum Body {
-    Tet4(Elements<4, 1>),
-    Tet4Nodal(Elements<4, 1>, Box<NodalGradient>),
-    Tet10(Elements<10, 4>),
-}
-
-/// Materials made ready for the elements of a model.
-pub(super) struct Laws {
-    kernels: Vec<Kernel>,
-    /// What the nodes evaluate, for elements with averaged deformation.
-    nodal: Vec<Box<dyn Hyperelastic>>,
-}
-
-impl Body {
-    pub(super) fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {
-        match self {
-            Self::Tet4(elements) => elements.energy(u, &laws.kernels),
-            Self::Tet10(elements) => elements.energy(u, &laws.kernels),
-            Self::Tet4Nodal(elements, nodal) => elements.energy(u, &laws.kernels) + nodal.energy(u, &laws.nodal),
-        }
-    }
-
-    /// Internal forces of all nodes and, when a matrix is given, the stiffness of the free ones.
-    pub(super) fn assemble(
-        &self,
-        u: &[[f64; 3]],
-        laws: &Laws,
-        partition: &Partition,
-        forces: &mut [[f64; 3]],
-        matrix: Option<&mut BlockMatrix>,
-        project: bool,
-    ) {
-        let at = At { u, kernels: &laws.kernels, more_stress_pa: None, project };
-        match self {
-            Self::Tet4(elements) => elements.assemble(at, partition, forces, matrix),
-            Self::Tet10(elements) => elements.assemble(at, partition, forces, matrix),
-            Self::Tet4Nodal(elements, nodal) => {
-                let stresses = nodal.stresses(u, &laws.nodal);
-                elements.assemble(At { more_stress_pa: Some(&stresses), ..at }, partition, forces, matrix);
-            }
-        }
-    }
-
-    /// The part of the tangent that is not in the matrix.
-    fn nodal_tangent(
-        &self,
-        u: &[[f64; 3]],
-        laws: &Laws,
-        held: Option<Arc<Vec<[bool; 3]>>>,
-        project: bool,
-    ) -> Option<NodalTangent> {
-        match self {
-            Self::Tet4Nodal(_, nodal) => Some(nodal.tangent(u, &laws.nodal, held, project)),
-            _ => None,
-        }
-    }
-
-    /// Per cell of the mesh: mean and least volume ratio, mean energy density.
-    pub(super) fn state(&self, u: &[[f64; 3]], laws: &Laws) -> Vec<[f64; 3]> {
-        let (cells, state) = match self {
-            Self::Tet4(elements) | Self::Tet4Nodal(elements, _) => (&elements.cell, elements.state(u, &laws.kernels)),
-            Self::Tet10(elements) => (&elements.cell, elements.state(u, &laws.kernels)),
-        };
-        let mut by_cell = vec![[0.0; 3]; state.len()];
-        for (cell, state) in cells.iter().zip(state) {
-            by_cell[*cell as usize] = state;
-        }
-        by_cell
-    }
-}
-
-/// The node set of a name.
-fn node_set<'a>(mesh: &'a TetMesh, set: &str) -> Result<&'a [u32], FemError> {
-    let nodes = mesh.node_sets.get(set).ok_or_else(|| FemError::unknown_set(mesh, set))?;
-    if nodes.is_empty() { Err(FemError::EmptySet { set: set.to_owned() }) } else { Ok(nodes) }
-}
-
-/// Which material every tetrahedron has; checks names both ways.
-fn materials_of_cells(mesh: &TetMesh, scenario: &Scenario) -> Result<(Vec<u16>, Vec<String>), FemError> {
-    for (first, number) in &scenario.labels {
-        let same = scenario.labels.iter().find(|(other, n)| *other > first && *n == number);
-        if let Some((second, _)) = same {
-            let (first, second) = (first.clone(), second.clone());
-            return Err(FemError::SameLabel { first, second, number: *number });
-        }
-    }
-    let names: Vec<String> = scenario.materials.keys().cloned().collect();
-    for name in &names {
-        if scenario.label_number(name).is_none() {
-            return Err(FemError::UnknownLabel { name: name.clone() });
-        }
-    }
-    let mut index_of_label = [None; 256];
-    let mut materials = Vec::with_capacity(mesh.tets().len());
-    for (cell, &label) in mesh.labels().iter().enumerate() {
-        let index = if let Some(index) = index_of_label[usize::from(label)] {
-            index
-        } else {
-            let name = scenario.label_name(label).ok_or(FemError::UnnamedLabel { cell, label })?;
-            let index = names.iter().position(|n| n == name);
-            let index = index.ok_or_else(|| FemError::NoMaterial { cell, label, name: name.to_owned() })? as u16;
-            index_of_label[usize::from(label)] = Some(index);
-            index
-        };
-        materials.push(index);
-    }
-    Ok((materials, names))
-}
-
-fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
-    let refuse = |key: &str, value: f64, rule| Err(FemError::Setting { key: key.to_owned(), value, rule });
-    let loads = &scenario.loads;
-    let mut numbers: Vec<(String, f64)> = vec![("loads.density_kg_per_m3".into(), loads.density_kg_per_m3)];
-    numbers.extend(loads.gravity_m_per_s2.iter().map(|&v| ("loads.gravity_m_per_s2".into(), v)));
-    for patch in &loads.patch {
-        numbers.extend(patch.force_n.iter().map(|&v| (format!("force_n of patch `{}`", patch.set), v)));
-    }
-    for p in &loads.pressure {
-        numbers.push((format!("pressure_pa of set `{}`", p.set), p.pressure_pa));
-    }
-    for p in &scenario.prescribed {
-        numbers.extend(p.displacement_mm.iter().map(|&v| (format!("displacement_mm of set `{}`", p.set), v)));
-    }
-    if let Some(csf) = loads.csf {
-        numbers.push(("loads.csf.density_kg_per_m3".into(), csf.density_kg_per_m3));
-        numbers.push(("loads.csf.level_mm".into(), csf.level_mm));
-    }
-    if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
-        return refuse(&key, value, "a finite number");
-    }
-    if loads.density_kg_per_m3 <= 0.0 {
-        return refuse("loads.density_kg_per_m3", loads.density_kg_per_m3, "positive");
-    }
-    let solver = &scenario.solver;
-    if !(1e-13..1.0).contains(&solver.relative_residual) {
-        return refuse("solver.relative_residual", solver.relative_residual, "at least 1e-13 and below 1");
-    }
-    if !(solver.smallest_load_step > 0.0 && solver.smallest_load_step <= 1.0) {
-        return refuse("solver.smallest_load_step", solver.smallest_load_step, "above 0 and at most 1");
-    }
-    if solver.newton_iterations == 0 {
-        return refuse("solver.newton_iterations", 0.0, "at least 1");
-    }
-    let dynamics = &scenario.dynamics;
-    if !(dynamics.time_step_s > 0.0 && dynamics.time_step_s.is_finite()) {
-        return refuse("dynamics.time_step_s", dynamics.time_step_s, "positive");
-    }
-    for (key, value) in [
-        ("dynamics.mass_damping_per_s", dynamics.mass_damping_per_s),
-        ("dynamics.stiffness_damping_s", dynamics.stiffness_damping_s),
-        ("dynamics.rest_speed_mm_per_s", dynamics.rest_speed_mm_per_s),
-    ] {
-        if !(value >= 0.0 && value.is_finite()) {
-            return refuse(key, value, "0 or more");
-        }
-    }
-    Ok(())
 }
 
 impl Model {
@@ -477,110 +317,4 @@ impl Model {
         of_nodes.iter().zip(&self.number).for_each(|(v, &new)| all[new as usize] = *v);
         all
     }
-
-    /// The answer at a state: u in m, internal forces in N.
-    pub(super) fn outcome(
-        &self,
-        u: &[[f64; 3]],
-        forces: &[[f64; 3]],
-        laws: &Laws,
-        convergence: super::ConvergenceRecord,
-    ) -> Outcome {
-        let state = self.body.state(u, laws);
-        let reaction = |n: usize| {
-            let new = self.number[n] as usize;
-            let row = self.row_of[new];
-            let held = if row == HELD {
-                [true; 3]
-            } else {
-                self.held_components.as_ref().map_or([false; 3], |h| h[row as usize])
-            };
-            [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
-        };
-        let mut density: Vec<f64> = state.iter().map(|s| s[2]).collect();
-        if let Body::Tet4Nodal(elements, nodal) = &self.body {
-            let averaged = nodal.energy_density(u, &laws.nodal);
-            elements.cell.iter().zip(averaged).for_each(|(&cell, extra)| density[cell as usize] += extra);
-        }
-
-        let worst_cell = worst(&state);
-        let convergence =
-            super::ConvergenceRecord { worst_cell, worst_volume_ratio: state[worst_cell][1], ..convergence };
-        let mut warnings = self.warnings.clone();
-        let inverted = state.iter().filter(|s| s[1] <= 0.0).count();
-        if inverted > 0 {
-            warnings.push(format!(
-                "{inverted} cells are inside out, among them cell {worst_cell}: lower the load or raise the modulus"
-            ));
-        }
-        let crushed = state.iter().filter(|s| (0.0..0.1).contains(&s[1])).count();
-        if crushed > 0 {
-            warnings
-                .push(format!("{crushed} cells are squeezed below a tenth of their volume: treat stresses with care"));
-        }
-        Outcome {
-            displacement_mm: self.to_mesh_mm(u),
-            reaction_n: (0..self.corners).map(reaction).collect(),
-            jacobian: state.iter().map(|s| s[0]).collect(),
-            strain_energy_density_pa: density,
-            convergence,
-            motion: None,
-            warnings,
-        }
-    }
-}
-
-/// The cell with the smallest volume ratio.
-pub(super) fn worst(state: &[[f64; 3]]) -> usize {
-    (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0)
-}
-
-/// Every material obeys its rules.
-fn check_materials(materials: &Materials) -> Result<(), FemError> {
-    for (name, material) in materials {
-        material.check().map_err(|source| FemError::Material { name: name.clone(), source })?;
-    }
-    Ok(())
-}
-
-/// A graph in new numbers.
-fn renumbered(graph: &Graph, order: &[u32], number: &[u32]) -> Graph {
-    let (mut start, mut neighbours) = (vec![0], Vec::with_capacity(graph.neighbours.len()));
-    for &old in order {
-        neighbours.extend(graph.of(old as usize).iter().map(|&m| number[m as usize]));
-        start.push(neighbours.len());
-    }
-    Graph { start, neighbours }
-}
-
-/// Every piece of the body needs a held node, or it would drift.
-fn check_held_together(graph: &Graph, held: &[[bool; 3]]) -> Result<(), FemError> {
-    let mut reached: Vec<bool> = held.iter().map(|h| *h != [false; 3]).collect();
-    let mut front: Vec<u32> = (0..reached.len() as u32).filter(|&n| reached[n as usize]).collect();
-    while let Some(n) = front.pop() {
-        for &m in graph.of(n as usize) {
-            if !std::mem::replace(&mut reached[m as usize], true) {
-                front.push(m);
-            }
-        }
-    }
-    let loose = |n: &usize| !reached[*n] && !graph.of(*n).is_empty();
-    match (0..reached.len()).find(loose) {
-        Some(node) => Err(FemError::Loose { nodes: (0..reached.len()).filter(loose).count(), node }),
-        None => Ok(()),
-    }
-}
-
-/// Elements in solver numbers, ordered by their first node so that neighbours in the list share memory.
-fn sorted<const K: usize>(
-    tets: &[[u32; K]],
-    number: &[u32],
-    material_of_cell: &[u16],
-) -> (Vec<[u32; K]>, Vec<u16>, Vec<u32>) {
-    let renumbered = |cell: u32| tets[cell as usize].map(|n| number[n as usize]);
-    let mut cells: Vec<u32> = (0..tets.len() as u32).collect();
-    cells.sort_by_cached_key(|&cell| (renumbered(cell).iter().copied().min(), cell));
-    let nodes = cells.iter().map(|&cell| renumbered(cell)).collect();
-    let materials = cells.iter().map(|&cell| material_of_cell[cell as usize]).collect();
-    (nodes, materials, cells)
 }

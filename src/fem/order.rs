@@ -119,6 +119,30 @@ pub(super) fn reverse_cuthill_mckee(graph: &Graph) -> Vec<u32> {
     order
 }
 
+/// A graph in new numbers.
+pub(super) fn renumbered(graph: &Graph, order: &[u32], number: &[u32]) -> Graph {
+    let (mut start, mut neighbours) = (vec![0], Vec::with_capacity(graph.neighbours.len()));
+    for &old in order {
+        neighbours.extend(graph.of(old as usize).iter().map(|&m| number[m as usize]));
+        start.push(neighbours.len());
+    }
+    Graph { start, neighbours }
+}
+
+/// Elements in solver numbers, ordered by their first node so that neighbours in the list share memory.
+pub(super) fn sorted<const K: usize>(
+    tets: &[[u32; K]],
+    number: &[u32],
+    material_of_cell: &[u16],
+) -> (Vec<[u32; K]>, Vec<u16>, Vec<u32>) {
+    let renumbered = |cell: u32| tets[cell as usize].map(|n| number[n as usize]);
+    let mut cells: Vec<u32> = (0..tets.len() as u32).collect();
+    cells.sort_by_cached_key(|&cell| (renumbered(cell).iter().copied().min(), cell));
+    let nodes = cells.iter().map(|&cell| renumbered(cell)).collect();
+    let materials = cells.iter().map(|&cell| material_of_cell[cell as usize]).collect();
+    (nodes, materials, cells)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

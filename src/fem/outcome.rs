@@ -1,5 +1,8 @@
 //! What a simulation answers.
 
+use super::body::{Body, Laws};
+use super::model::Model;
+use super::sparse::HELD;
 use serde::{Deserialize, Serialize};
 
 /// A deformed state; nodes and cells numbered as in the mesh.
@@ -96,4 +99,61 @@ pub struct Progress {
     pub relative_residual: f64,
     /// What is asked for.
     pub goal: f64,
+}
+
+impl Model {
+    /// The answer at a state: u in m, internal forces in N.
+    pub(super) fn outcome(
+        &self,
+        u: &[[f64; 3]],
+        forces: &[[f64; 3]],
+        laws: &Laws,
+        convergence: ConvergenceRecord,
+    ) -> Outcome {
+        let state = self.body.state(u, laws);
+        let reaction = |n: usize| {
+            let new = self.number[n] as usize;
+            let row = self.row_of[new];
+            let held = if row == HELD {
+                [true; 3]
+            } else {
+                self.held_components.as_ref().map_or([false; 3], |h| h[row as usize])
+            };
+            [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
+        };
+        let mut density: Vec<f64> = state.iter().map(|s| s[2]).collect();
+        if let Body::Tet4Nodal(elements, nodal) = &self.body {
+            let averaged = nodal.energy_density(u, &laws.nodal);
+            elements.cell.iter().zip(averaged).for_each(|(&cell, extra)| density[cell as usize] += extra);
+        }
+
+        let worst_cell = worst(&state);
+        let convergence = ConvergenceRecord { worst_cell, worst_volume_ratio: state[worst_cell][1], ..convergence };
+        let mut warnings = self.warnings.clone();
+        let inverted = state.iter().filter(|s| s[1] <= 0.0).count();
+        if inverted > 0 {
+            warnings.push(format!(
+                "{inverted} cells are inside out, among them cell {worst_cell}: lower the load or raise the modulus"
+            ));
+        }
+        let crushed = state.iter().filter(|s| (0.0..0.1).contains(&s[1])).count();
+        if crushed > 0 {
+            warnings
+                .push(format!("{crushed} cells are squeezed below a tenth of their volume: treat stresses with care"));
+        }
+        Outcome {
+            displacement_mm: self.to_mesh_mm(u),
+            reaction_n: (0..self.corners).map(reaction).collect(),
+            jacobian: state.iter().map(|s| s[0]).collect(),
+            strain_energy_density_pa: density,
+            convergence,
+            motion: None,
+            warnings,
+        }
+    }
+}
+
+/// The cell with the smallest volume ratio.
+pub(super) fn worst(state: &[[f64; 3]]) -> usize {
+    (0..state.len()).min_by(|&a, &b| state[a][1].total_cmp(&state[b][1])).unwrap_or(0)
 }

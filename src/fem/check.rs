@@ -1,0 +1,121 @@
+//! What must hold of mesh and scenario before anything is solved.
+
+use super::FemError;
+use super::model::Materials;
+use super::order::Graph;
+use super::scenario::Scenario;
+use crate::mesh::TetMesh;
+
+/// The node set of a name.
+pub(super) fn node_set<'a>(mesh: &'a TetMesh, set: &str) -> Result<&'a [u32], FemError> {
+    let nodes = mesh.node_sets.get(set).ok_or_else(|| FemError::unknown_set(mesh, set))?;
+    if nodes.is_empty() { Err(FemError::EmptySet { set: set.to_owned() }) } else { Ok(nodes) }
+}
+
+/// Which material every tetrahedron has; checks names both ways.
+pub(super) fn materials_of_cells(mesh: &TetMesh, scenario: &Scenario) -> Result<(Vec<u16>, Vec<String>), FemError> {
+    for (first, number) in &scenario.labels {
+        let same = scenario.labels.iter().find(|(other, n)| *other > first && *n == number);
+        if let Some((second, _)) = same {
+            let (first, second) = (first.clone(), second.clone());
+            return Err(FemError::SameLabel { first, second, number: *number });
+        }
+    }
+    let names: Vec<String> = scenario.materials.keys().cloned().collect();
+    for name in &names {
+        if scenario.label_number(name).is_none() {
+            return Err(FemError::UnknownLabel { name: name.clone() });
+        }
+    }
+    let mut index_of_label = [None; 256];
+    let mut materials = Vec::with_capacity(mesh.tets().len());
+    for (cell, &label) in mesh.labels().iter().enumerate() {
+        let index = if let Some(index) = index_of_label[usize::from(label)] {
+            index
+        } else {
+            let name = scenario.label_name(label).ok_or(FemError::UnnamedLabel { cell, label })?;
+            let index = names.iter().position(|n| n == name);
+            let index = index.ok_or_else(|| FemError::NoMaterial { cell, label, name: name.to_owned() })? as u16;
+            index_of_label[usize::from(label)] = Some(index);
+            index
+        };
+        materials.push(index);
+    }
+    Ok((materials, names))
+}
+
+pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
+    let refuse = |key: &str, value: f64, rule| Err(FemError::Setting { key: key.to_owned(), value, rule });
+    let loads = &scenario.loads;
+    let mut numbers: Vec<(String, f64)> = vec![("loads.density_kg_per_m3".into(), loads.density_kg_per_m3)];
+    numbers.extend(loads.gravity_m_per_s2.iter().map(|&v| ("loads.gravity_m_per_s2".into(), v)));
+    for patch in &loads.patch {
+        numbers.extend(patch.force_n.iter().map(|&v| (format!("force_n of patch `{}`", patch.set), v)));
+    }
+    for p in &loads.pressure {
+        numbers.push((format!("pressure_pa of set `{}`", p.set), p.pressure_pa));
+    }
+    for p in &scenario.prescribed {
+        numbers.extend(p.displacement_mm.iter().map(|&v| (format!("displacement_mm of set `{}`", p.set), v)));
+    }
+    if let Some(csf) = loads.csf {
+        numbers.push(("loads.csf.density_kg_per_m3".into(), csf.density_kg_per_m3));
+        numbers.push(("loads.csf.level_mm".into(), csf.level_mm));
+    }
+    if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
+        return refuse(&key, value, "a finite number");
+    }
+    if loads.density_kg_per_m3 <= 0.0 {
+        return refuse("loads.density_kg_per_m3", loads.density_kg_per_m3, "positive");
+    }
+    let solver = &scenario.solver;
+    if !(1e-13..1.0).contains(&solver.relative_residual) {
+        return refuse("solver.relative_residual", solver.relative_residual, "at least 1e-13 and below 1");
+    }
+    if !(solver.smallest_load_step > 0.0 && solver.smallest_load_step <= 1.0) {
+        return refuse("solver.smallest_load_step", solver.smallest_load_step, "above 0 and at most 1");
+    }
+    if solver.newton_iterations == 0 {
+        return refuse("solver.newton_iterations", 0.0, "at least 1");
+    }
+    let dynamics = &scenario.dynamics;
+    if !(dynamics.time_step_s > 0.0 && dynamics.time_step_s.is_finite()) {
+        return refuse("dynamics.time_step_s", dynamics.time_step_s, "positive");
+    }
+    for (key, value) in [
+        ("dynamics.mass_damping_per_s", dynamics.mass_damping_per_s),
+        ("dynamics.stiffness_damping_s", dynamics.stiffness_damping_s),
+        ("dynamics.rest_speed_mm_per_s", dynamics.rest_speed_mm_per_s),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return refuse(key, value, "0 or more");
+        }
+    }
+    Ok(())
+}
+
+/// Every material obeys its rules.
+pub(super) fn check_materials(materials: &Materials) -> Result<(), FemError> {
+    for (name, material) in materials {
+        material.check().map_err(|source| FemError::Material { name: name.clone(), source })?;
+    }
+    Ok(())
+}
+
+/// Every piece of the body needs a held node, or it would drift.
+pub(super) fn check_held_together(graph: &Graph, held: &[[bool; 3]]) -> Result<(), FemError> {
+    let mut reached: Vec<bool> = held.iter().map(|h| *h != [false; 3]).collect();
+    let mut front: Vec<u32> = (0..reached.len() as u32).filter(|&n| reached[n as usize]).collect();
+    while let Some(n) = front.pop() {
+        for &m in graph.of(n as usize) {
+            if !std::mem::replace(&mut reached[m as usize], true) {
+                front.push(m);
+            }
+        }
+    }
+    let loose = |n: &usize| !reached[*n] && !graph.of(*n).is_empty();
+    match (0..reached.len()).find(loose) {
+        Some(node) => Err(FemError::Loose { nodes: (0..reached.len()).filter(loose).count(), node }),
+        None => Ok(()),
+    }
+}
