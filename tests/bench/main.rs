@@ -8,6 +8,7 @@ mod experiment;
 mod fem;
 mod imaging;
 mod job;
+mod kills;
 mod material;
 mod mesh;
 mod patients;
@@ -27,6 +28,7 @@ fn main() {
         ("fem", fem::bars),
         ("experiment", experiment::bars),
         ("patients", patients::bars),
+        ("kills", kills::bars),
         ("job", job::bars),
         ("cohort", cohort::bars),
     ];
