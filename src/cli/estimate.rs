@@ -39,9 +39,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return session.emit(&facts.estimate, &(table(&facts) + &page));
     }
     let patient = Patient::open(&case, args.tissues, session)?;
-    let earlier = match case.path(OUTCOME).exists() {
-        true => Some(ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?),
-        false => None,
+    let earlier = if case.path(OUTCOME).exists() {
+        Some(ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?)
+    } else {
+        None
     };
     let (outcome, facts, page) = patient.estimate(&options, earlier, session)?;
     session.emit(&facts.estimate, &(table(&facts) + &comparison(&outcome, &facts) + &page))?;

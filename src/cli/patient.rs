@@ -119,7 +119,7 @@ impl Patient {
         options: &PriorOptions,
         session: &Session,
     ) -> Result<(Vec<(SampleOutcome, Manifest)>, UsedSettings), Failure> {
-        let prior = options.over(self.case.settings_of("prior", session)?);
+        let prior = options.over(&self.case.settings_of("prior", session)?);
         let tissues = self.settings.tissue_list();
         let mut list =
             samples_of_prior(&tissues, &self.settings.sd_levels, self.settings.poisson_ratio, &prior).reject()?;

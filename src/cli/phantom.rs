@@ -75,7 +75,7 @@ pub fn analyse(args: &Args, session: &Session) -> Result<(ExperimentOutcome, Str
             "--every-task: compares materials of the whole brain; drop it, or --tissues 2"
         )));
     }
-    let prior = args.prior.over(session.settings("prior")?);
+    let prior = args.prior.over(&session.settings("prior")?);
     let case = Case::open(&args.output, session);
 
     let template = atlas::template();

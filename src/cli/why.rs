@@ -119,7 +119,7 @@ fn posed(args: &Args, case: &Case, session: &Session) -> Result<Vec<Stage>, Fail
     if let (Some(meshed), Some(observed), false) = (of_stage("mesh"), of_stage("reference"), args.analysis.estimate) {
         let mut settings: ResectionSettings = session.settings("resection")?;
         settings.tissues = args.analysis.tissues.map_or(settings.tissues, usize::from);
-        let prior = args.analysis.prior.over(session.settings("prior")?);
+        let prior = args.analysis.prior.over(&session.settings("prior")?);
         let scenario = settings.scenario(&mni_from_gravity_frame(case, settings.gravity_frame)?);
         let tissues = settings.tissue_list();
         let list = samples_of_prior(&tissues, &settings.sd_levels, settings.poisson_ratio, &prior).reject()?;

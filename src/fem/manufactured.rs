@@ -23,8 +23,9 @@ fn cube(n: usize) -> TetMesh {
         let split = [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
         tets.extend(split.map(|t| t.map(|v| c[v])));
     }
-    let outer: Vec<u32> =
-        (0..nodes.len() as u32).filter(|&p| nodes[p as usize].iter().any(|&x| x < 1e-9 || x > 1e3 - 1e-9)).collect();
+    let outer: Vec<u32> = (0..nodes.len() as u32)
+        .filter(|&p| nodes[p as usize].iter().any(|&x| !(1e-9..=1e3 - 1e-9).contains(&x)))
+        .collect();
     let labels = vec![2; tets.len()];
     let mut mesh = TetMesh::new(nodes, tets, labels).unwrap();
     mesh.set_nodes("faces", outer).unwrap();

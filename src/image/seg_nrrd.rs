@@ -28,6 +28,9 @@ pub struct Segment {
 /// let bytes = encode(&labels, &[Segment { label: 2, name: "grey matter".into(), colour: [0.5; 3] }]);
 /// assert!(bytes.starts_with(b"NRRD0004\n"));
 /// ```
+///
+/// # Panics
+/// Never: it writes to memory.
 pub fn encode<F: Frame>(labels: &Volume<u8, F>, segments: &[Segment]) -> Vec<u8> {
     let [nx, ny, nz] = labels.grid.dims;
     let m = &labels.grid.mm_from_voxel;

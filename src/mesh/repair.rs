@@ -122,7 +122,9 @@ pub(crate) fn drop_ears(complex: &mut Complex) {
         if ears.is_empty() {
             return;
         }
-        ears.into_iter().for_each(|t| complex.vent(t));
+        for t in ears {
+            complex.vent(t);
+        }
     }
 }
 

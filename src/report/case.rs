@@ -53,6 +53,9 @@ struct Case<'a> {
     folder: &'a Path,
 }
 
+/// An image and where it is shown.
+type MaskedImage = (Volume<f32, Mni>, Mask<Mni>);
+
 impl Case<'_> {
     /// The bytes of a file, or `None` when it is not there.
     fn bytes(&self, file: &str) -> Result<Option<Vec<u8>>, ReportError> {
@@ -150,13 +153,13 @@ pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
     }
     if let Some(outcome) = &page.outcome {
         files.extend(hand_off::series(outcome));
-        if let Some((file, sample)) = best_sample(&case, outcome)? {
-            if let Some(errors) = sample.point_field("rmse_mm") {
-                let deformed = displaced(&file, &sample)?;
-                let sets = outcome.rmse_sets();
-                let surfaces = hand_off::error_surfaces(&sample.mesh, &deformed, &errors.values, &sets);
-                files.extend(surfaces.map_err(ReportError::HandOff)?);
-            }
+        if let Some((file, sample)) = best_sample(&case, outcome)?
+            && let Some(errors) = sample.point_field("rmse_mm")
+        {
+            let deformed = displaced(&file, &sample)?;
+            let sets = outcome.rmse_sets();
+            let surfaces = hand_off::error_surfaces(&sample.mesh, &deformed, &errors.values, &sets);
+            files.extend(surfaces.map_err(ReportError::HandOff)?);
         }
     }
     Ok(files)
@@ -297,7 +300,7 @@ impl Case<'_> {
     }
 
     /// An image and its brain mask, which must share a grid; `None` when either is absent.
-    fn masked_image(&self, image: &str, mask: &str) -> Result<Option<(Volume<f32, Mni>, Mask<Mni>)>, ReportError> {
+    fn masked_image(&self, image: &str, mask: &str) -> Result<Option<MaskedImage>, ReportError> {
         let (Some(volume), Some(brain)) = (self.intensities(image)?, self.mask(mask)?) else { return Ok(None) };
         if !volume.grid.coincides(&brain.grid, 1e-3) {
             return Err(ReportError::Grid { file: mask.to_owned(), other: image.to_owned() });

@@ -342,7 +342,7 @@ mod tests {
     fn a_cube_seen_from_the_front_fills_the_picture_but_its_margin() {
         let surface = surface(&cube());
         let mut scene = Scene::default();
-        scene.add_surface(&surface, &vec![[200, 100, 50]; 8], None, false);
+        scene.add_surface(&surface, &[[200, 100, 50]; 8], None, false);
         let (picture, mm_per_pixel) = scene.render(&Camera::named("anterior").unwrap(), 60, 60);
         assert!((mm_per_pixel - 1.0 / 52.0).abs() < 1e-12);
         assert_eq!(covered(&picture), 52 * 52);

@@ -78,10 +78,10 @@ impl Viewer {
             );
         }
         let licence = escape(NIIVUE_LICENCE);
-        let _ = write!(
+        let _ = writeln!(
             html,
             "<details><summary>The viewer is niivue 0.69.0 (BSD 2-Clause)</summary><pre tabindex=\"0\" \
-             aria-label=\"Licence of niivue\">{licence}</pre></details>\n"
+             aria-label=\"Licence of niivue\">{licence}</pre></details>"
         );
         html
     }

@@ -25,7 +25,7 @@ pub struct LogBias {
 /// One observation of the gain: voxel, logarithm of (intensity / expected intensity), weight.
 pub(super) struct LogRatio {
     pub voxel: [usize; 3],
-    pub log_ratio: f64,
+    pub log_gain: f64,
     pub weight: f64,
 }
 
@@ -61,7 +61,7 @@ impl LogBias {
                 let terms = monomials(dims, o.voxel);
                 let row = |a: usize| match a {
                     0 => 1.0,
-                    _ if a == size => o.log_ratio,
+                    _ if a == size => o.log_gain,
                     _ => terms[used[a - 1]],
                 };
                 for a in 0..=size {
@@ -142,7 +142,7 @@ mod tests {
         let region: Vec<[usize; 3]> =
             (0..21 * 31 * 41).map(|n| [n % 21, n / 21 % 31, n / (21 * 31)]).filter(|v| v[0] > 2 && v[2] < 35).collect();
         let observations: Vec<LogRatio> =
-            region.iter().map(|&voxel| LogRatio { voxel, log_ratio: 0.7 + truth.at(voxel), weight: 2.0 }).collect();
+            region.iter().map(|&voxel| LogRatio { voxel, log_gain: 0.7 + truth.at(voxel), weight: 2.0 }).collect();
         let found = LogBias::fit(dims, 3, &observations, &region);
         let mean = region.iter().map(|&v| found.at(v)).sum::<f64>() / region.len() as f64;
         assert!(mean.abs() < 1e-12);

@@ -250,7 +250,7 @@ fn log_ratios(
                 weight += w;
                 sum += w * (value / means[k]).ln();
             }
-            (weight > 1e-6).then(|| LogRatio { voxel: places[n], log_ratio: sum / weight, weight })
+            (weight > 1e-6).then(|| LogRatio { voxel: places[n], log_gain: sum / weight, weight })
         })
         .collect()
 }

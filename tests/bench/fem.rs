@@ -174,7 +174,7 @@ fn statics(small: &TetMesh, large: &TetMesh, bars: &mut Vec<Bar>) -> Vec<(f64, f
 fn locking(small: &TetMesh, bars: &mut Vec<Bar>) {
     let run = |element: &str| {
         let scenario = two_tissues(0.49, GRAVITY, &format!("element = '{element}'"));
-        timed(|| single(|| solve(small, &scenario).map(|o| rms_mm(&o)).unwrap_or(f64::NAN)))
+        timed(|| single(|| solve(small, &scenario).map_or(f64::NAN, |o| rms_mm(&o))))
     };
     let ((plain_s, plain), (nodal_s, nodal)) = (run("tet4"), run("tet4-nodal"));
     let off = 100.0 * (nodal / 4.22 - 1.0);
@@ -221,7 +221,7 @@ fn random_scenario(n: u64) -> Scenario {
     let rng = CounterRng::new(4, n);
     let between = |counter, low, high| rng.between(counter, low, high);
     let push = format!("patch = [{{ set = 'superior', force_n = [0.0, 0.0, {}] }}]", -between(0, 0.0, 10.0));
-    let mut scenario = two_tissues(0.45, if n % 2 == 0 { &push } else { "" }, "");
+    let mut scenario = two_tissues(0.45, if n.is_multiple_of(2) { &push } else { "" }, "");
     let down = rng.direction(100);
     let strength = between(1, 0.0, 9.81);
     scenario.loads.gravity_m_per_s2 = down.map(|d| strength * d);

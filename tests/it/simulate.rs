@@ -23,7 +23,7 @@ fn simulate(folder: &Path, arguments: &[&str]) -> Output {
 /// A bar of 3 x 3 x 6 cells of 10 mm with the set `base`.
 fn bar() -> TetMesh {
     let node = |i: usize, j: usize, k: usize| (i + 4 * (j + 4 * k)) as u32;
-    let nodes = (0..112).map(|n| [n % 4, n / 4 % 4, n / 16].map(|x| 10.0 * x as f64)).collect();
+    let nodes = (0..112).map(|n| [n % 4, n / 4 % 4, n / 16].map(|x| 10.0 * f64::from(x))).collect();
     let mut tets = Vec::new();
     for cell in 0..54 {
         let (i, j, k) = (cell % 3, cell / 3 % 3, cell / 9);

@@ -62,11 +62,14 @@ pub fn registration(case: &Case, scans: &Scans, session: &Session) -> Result<(Ma
     })
 }
 
+/// Post to pre, and pre to MNI.
+type Poses = (RigidTransform<Post, Pre>, RigidTransform<Pre, Mni>);
+
 /// The two transforms of a case, as the files hold them.
 ///
 /// # Errors
 /// Rejected when a file is missing or not a rigid matrix.
-pub fn transforms(case: &Case) -> Result<(RigidTransform<Post, Pre>, RigidTransform<Pre, Mni>), Failure> {
+pub fn transforms(case: &Case) -> Result<Poses, Failure> {
     let text = |name: &str| case.read_text(&format!("{name}.txt"));
     let pre_from_post = rigid_from_text(&text(PRE_FROM_POST)?, PRE_FROM_POST).reject()?;
     let mni_from_pre = rigid_from_text(&text(MNI_FROM_PRE)?, MNI_FROM_PRE).reject()?;

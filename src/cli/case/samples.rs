@@ -32,9 +32,12 @@ pub struct PriorOptions {
 
 impl PriorOptions {
     /// These options over the settings file's.
-    pub fn over(&self, settings: PriorSettings) -> PriorSettings {
-        let PriorSettings { study, law, .. } = settings;
-        PriorSettings { study: self.study.unwrap_or(study), law: self.law.unwrap_or(law), ..settings }
+    pub fn over(&self, settings: &PriorSettings) -> PriorSettings {
+        PriorSettings {
+            study: self.study.unwrap_or(settings.study),
+            law: self.law.unwrap_or(settings.law),
+            ..settings.clone()
+        }
     }
 }
 

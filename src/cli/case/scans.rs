@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Masks that win over the computed ones. Each may be in the grid of either scan.
 #[derive(Clone, Debug, Default, clap::Args)]
+#[allow(clippy::struct_field_names, reason = "the options' names")]
 pub struct Overrides {
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
     #[arg(long, value_name = "FILE")]

@@ -159,7 +159,7 @@ fn limits(posterior: &Posterior, descent: &Descent, noise_mm: f64, rms_mm: f64, 
         match verdict {
             Verdict::Identified => {}
             Verdict::PriorDominated => {
-                limits.push(format!("{name}: the interval comes from the prior, the data add little"))
+                limits.push(format!("{name}: the interval comes from the prior, the data add little"));
             }
             Verdict::NotIdentifiable => limits.push(format!("{name}: not identifiable from these data")),
         }

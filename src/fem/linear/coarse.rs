@@ -100,7 +100,7 @@ fn matrix(coupling: &Coupling, pieces: usize) -> BlockMatrix {
                         pattern.diagonal.push(pattern.columns.len() as u32);
                     }
                     pattern.columns.push(2 * of + other as u32);
-                    blocks.push(std::array::from_fn(|n| block[3 * other + n / 3][3 * half as usize + n % 3]));
+                    blocks.push(std::array::from_fn(|n| block[3 * other + n / 3][3 * half + n % 3]));
                 }
             }
             pattern.row_start.push(pattern.columns.len());

@@ -178,7 +178,7 @@ mod tests {
     fn a_cube_a_millimetre_larger_all_around_is_a_millimetre_away() {
         let grid = Grid::<Mni>::axis_aligned([26; 3], [1.0; 3], [-12.5; 3]);
         let inside = |n: usize| grid.voxel(n).iter().all(|&c| (3..23).contains(&c));
-        let map = LabelMap::from_data(grid.clone(), (0..grid.len()).map(|n| 2 * u8::from(inside(n))).collect());
+        let map = LabelMap::from_data(grid, (0..grid.len()).map(|n| 2 * u8::from(inside(n))).collect());
         let same = surface_distance(&cube_of_side(20.0), &map, &[]).unwrap();
         assert!(same.mean_mm < 0.03, "{same:?}");
         let larger = surface_distance(&cube_of_side(22.0), &map, &[]).unwrap();
@@ -190,7 +190,7 @@ mod tests {
     fn the_border_found_cell_by_cell_is_the_isosurface() {
         let grid = Grid::<Mni>::axis_aligned([14, 12, 10], [1.0, 0.8, 2.0], [3.0, -4.0, 1.0]);
         let inside = |n: usize| grid.voxel(n).iter().map(|c| c * c).sum::<usize>() % 7 < 4;
-        let labelled = Mask::from_data(grid.clone(), (0..grid.len()).map(inside).collect());
+        let labelled = Mask::from_data(grid, (0..grid.len()).map(inside).collect());
         let whole = ClosestPoint::new(&isosurface(&labelled.map(|l| 2.0 * f32::from(l)), 1.0)).unwrap();
         let border = Border { labelled };
         for n in 0..200 {

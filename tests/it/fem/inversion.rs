@@ -3,6 +3,9 @@
 use super::meshes::cube;
 use hgm::fem::{Model, Scenario};
 
+/// Where a node starts, by its number and place.
+type Start<'a> = Box<dyn Fn(usize, [f64; 3]) -> [f64; 3] + 'a>;
+
 #[test]
 fn flattened_collapsed_mirrored_and_tangled_bodies_return_to_rest() {
     let mesh = cube(4, 40.0);
@@ -13,7 +16,7 @@ fn flattened_collapsed_mirrored_and_tangled_bodies_return_to_rest() {
         let model = Model::new(&mesh, &scenario).unwrap();
         // Noise of an eighth of a cell, the same every time.
         let noise = |n: usize, i: usize| 1.25 * ((12.9898 * (3 * n + i) as f64).sin() * 43758.5453).fract();
-        let starts: [(&str, Box<dyn Fn(usize, [f64; 3]) -> [f64; 3]>); 4] = [
+        let starts: [(&str, Start); 4] = [
             ("flattened", Box::new(|_, x| [0.0, 0.0, -x[2]])),
             ("collapsed", Box::new(|_, x| [20.0 - x[0], 20.0 - x[1], 20.0 - x[2]])),
             ("mirrored", Box::new(|_, x| [-2.0 * x[0], 0.0, 0.0])),

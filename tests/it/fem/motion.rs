@@ -87,7 +87,9 @@ fn momentum_grows_by_the_force_times_time() {
     assert_eq!(motion.frames.len(), n);
     let mut mass = vec![0.0; mesh.nodes_mm().len()];
     for (t, tet) in mesh.tets().iter().enumerate() {
-        tet.iter().for_each(|&n| mass[n as usize] += 250.0 * mesh.volume_mm3(t) * 1e-9);
+        for &n in tet {
+            mass[n as usize] += 250.0 * mesh.volume_mm3(t) * 1e-9;
+        }
     }
     let centre = |frame: usize, i: usize| -> f64 {
         let u = &motion.frames[frame].displacement_mm;
