@@ -1,6 +1,5 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
-pub mod counter_rng;
 pub mod estimate;
 pub mod observed;
 pub mod outcome;
@@ -9,5 +8,6 @@ pub mod prior;
 pub mod resection;
 pub mod rmse;
 pub mod sample;
+pub mod smooth_noise;
 pub mod sweep;
 pub mod synth;

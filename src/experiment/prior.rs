@@ -70,6 +70,9 @@ fn materials_of_task(
     levels: &[f64],
     prior: &PriorSettings,
 ) -> Result<Vec<SampledMaterial>, PriorError> {
+    if levels.is_empty() {
+        return Err(PriorError::NoLevels);
+    }
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: prior.law, ..settings };
     sample_shear_moduli(task, levels, &settings)
@@ -86,9 +89,6 @@ pub fn samples_of_prior(
     poisson_ratio: f64,
     prior: &PriorSettings,
 ) -> Result<Vec<Sample>, PriorError> {
-    if sd_levels.is_empty() {
-        return Err(PriorError::NoLevels);
-    }
     let mut levels = Vec::new();
     for tissue in tissues {
         let list = materials(tissue, sd_levels, prior)?;
@@ -108,9 +108,6 @@ pub fn samples_of_every_task(
     poisson_ratio: f64,
     prior: &PriorSettings,
 ) -> Result<Vec<Sample>, PriorError> {
-    if sd_levels.is_empty() {
-        return Err(PriorError::NoLevels);
-    }
     let brain = Tissue::whole_brain().remove(0);
     let mut samples = Vec::new();
     for task in Task::all().filter(|task| task.region != Region::Abnormal) {

@@ -1,13 +1,13 @@
 //! Bars of the phantom and of estimation.
 
 use crate::bar::{Bar, cpu_seconds, data};
-use hgm::experiment::counter_rng::CounterRng;
 use hgm::experiment::estimate::{Estimate, EstimateSettings, Observation, Problem, Unknown, solve_problem};
 use hgm::experiment::phantom::PhantomSettings;
 use hgm::experiment::prior::{PriorSettings, samples_of_prior};
 use hgm::experiment::sample::Tissue;
 use hgm::experiment::sweep::{Reference, best_sample, scenario_of, solve_sample};
 use hgm::fem::{Scenario, simulate};
+use hgm::material::random::CounterRng;
 use hgm::mesh::TetMesh;
 use hgm::mesh::format::vtu;
 

@@ -2,9 +2,9 @@
 //! reference brain5k_gravity_two_tissue_nu045.csv come from `HGM_BENCH_DATA`; bars without them are skipped by name.
 
 use super::bar::{Bar, data};
-use hgm::experiment::counter_rng::CounterRng;
 use hgm::fem::{FemError, Model, Outcome, Scenario, simulate};
 use hgm::material::law::Material;
+use hgm::material::random::CounterRng;
 use hgm::mesh::TetMesh;
 use hgm::mesh::format::vtu;
 use std::path::Path;

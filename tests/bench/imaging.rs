@@ -1,13 +1,13 @@
 //! Bars of registration, segmentation and resection on the pairs with known truth.
 
 use crate::bar::{Bar, contents, cpu_seconds, data, memory, run_hgm, wall};
-use hgm::experiment::counter_rng::CounterRng;
 use hgm::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use hgm::image::distance::distance_mm;
 use hgm::image::morphology::erode;
 use hgm::image::nifti::{ReadOptions, decode, decode_labels};
 use hgm::image::resample::{Interpolation, resample};
 use hgm::image::{Grid, LabelMap, Mask, Volume};
+use hgm::material::random::CounterRng;
 use hgm::register::{RigidMasks, RigidSettings, register_rigid, register_to_template};
 use hgm::resect::{GivenMasks, PairSettings, take_pair_apart};
 use hgm::segment::native::mask_on;

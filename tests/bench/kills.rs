@@ -1,7 +1,7 @@
 //! Bar of a patient's run that is killed: at twenty random moments, and the rerun ends with the bytes of a quiet one.
 
 use crate::bar::{Bar, contents, run_hgm};
-use hgm::experiment::counter_rng::CounterRng;
+use hgm::material::random::CounterRng;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 

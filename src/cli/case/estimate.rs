@@ -53,7 +53,7 @@ pub struct EstimateOptions {
     /// The element of a patient's body. Plain linear tetrahedra lock: with them grey matter came out a quarter softer.
     pub element: ElementKind,
     /// Standard deviation of ln(modulus) that a patient's model adds. Measured on a synthetic patient: from 60,000 to
-    /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +13 and -14 %; another engine's mesh of
+    /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
     /// 60,000 lay within 7 % of the finer one.
     pub model_log_sd: f64,
     /// Also estimate the effective density, with the prior below.

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
-/// The defaults were measured on synthetic patients of seeds 1 and 2 (`hgm synth --sag fem`), whose displacement is known.
+/// Depth and noise were measured on synthetic patients of seeds 1 and 2 (`hgm synth --sag fem`), whose displacement is
+/// known; the distance is that at which the fit's smoothing (Gaussians of 8 mm) no longer ties two nodes together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplacementSettings {

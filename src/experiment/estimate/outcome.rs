@@ -217,13 +217,22 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_moduli_behind_a_simulation_come_back_from_far_away() {
-        let (mesh, settings) = (block(4), settings());
+    /// A block with its loads, and how the reference's moduli move its nodes, mm.
+    fn phantom(cells: usize) -> (TetMesh, Scenario, Vec<(u32, [f64; 3])>) {
+        let (mesh, settings) = (block(cells), settings());
         let scenario = settings.scenario();
         let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
-        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
-        let observed = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let observed = every_node(&simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm);
+        (mesh, scenario, observed)
+    }
+
+    fn every_node(displacement_mm: &[[f64; 3]]) -> Vec<(u32, [f64; 3])> {
+        displacement_mm.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()
+    }
+
+    #[test]
+    fn the_moduli_behind_a_simulation_come_back_from_far_away() {
+        let (mesh, scenario, observed) = phantom(4);
         let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
         let found = solve_problem(problem(&mesh, &scenario, observed), &precise).unwrap();
         let [grey, white] = [found.outcome.posterior.mode[0], found.outcome.posterior.mode[1]];
@@ -234,11 +243,7 @@ mod tests {
 
     #[test]
     fn a_softer_body_moves_more_and_the_spread_follows_the_interval() {
-        let (mesh, settings) = (block(3), settings());
-        let scenario = settings.scenario();
-        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
-        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
-        let observed: Vec<_> = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let (mesh, scenario, observed) = phantom(3);
         let rough = EstimateSettings { noise_mm: 0.5, ..EstimateSettings::default() };
         let fine = EstimateSettings { noise_mm: 0.05, ..EstimateSettings::default() };
         let rough = solve_problem(problem(&mesh, &scenario, observed.clone()), &rough).unwrap();
@@ -258,22 +263,17 @@ mod tests {
             density_kg_per_m3: 300.0,
             ..crate::fem::Loads::default()
         };
-        let unknowns: Vec<_> = Tissue::whole_brain()
-            .into_iter()
-            .map(Unknown::ShearModulus)
-            .map(|u| (u.prior(7.0, 2.0), u))
-            .chain([Turn::Nodding, Turn::Rolling].map(Unknown::GravityTurn).map(|u| (u.prior(0.0, 0.5), u)))
-            .map(|(prior, unknown)| (unknown, prior))
-            .collect();
-        let list: Vec<Unknown> = unknowns.iter().map(|(u, _)| u.clone()).collect();
-        let everything = Observation::Nodes(Vec::new());
-        let mut truth = Body::new(&mesh, &scenario, list, 0.45, everything).unwrap();
+        let brain = Unknown::ShearModulus(Tissue::whole_brain().remove(0));
+        let list = vec![brain, Unknown::GravityTurn(Turn::Nodding), Unknown::GravityTurn(Turn::Rolling)];
+        let priors = [(7.0, 2.0), (0.0, 0.5), (0.0, 0.5)];
+        let unknowns = list.iter().zip(priors).map(|(u, (mean, sd))| (u.clone(), u.prior(mean, sd))).collect();
+        let mut truth = Body::new(&mesh, &scenario, list, 0.45, Observation::Nodes(Vec::new())).unwrap();
         let degrees = [8.0f64, -5.0];
         let theta = [800f64.ln(), degrees[0].to_radians(), degrees[1].to_radians()];
         let u = truth.solve(&theta).unwrap().outcome.displacement_mm;
         let problem = Problem {
             unknowns,
-            observation: Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()),
+            observation: Observation::Nodes(every_node(&u)),
             start: Vec::new(),
             ..problem(&mesh, &scenario, Vec::new())
         };
@@ -290,11 +290,7 @@ mod tests {
 
     #[test]
     fn a_models_own_error_widens_the_moduli_and_nothing_else() {
-        let (mesh, settings) = (block(3), settings());
-        let scenario = settings.scenario();
-        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
-        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
-        let observed: Vec<_> = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+        let (mesh, scenario, observed) = phantom(3);
         let noise = EstimateSettings { noise_mm: 0.05, ..EstimateSettings::default() };
         let exact = solve_problem(problem(&mesh, &scenario, observed.clone()), &noise).unwrap();
         let rough = Problem { model_log_sd: 0.1, ..problem(&mesh, &scenario, observed) };

@@ -1,9 +1,9 @@
 //! Smooth displacement fields on a coarse grid.
 
 use super::Patient;
-use crate::experiment::counter_rng::CounterRng;
 use crate::geometry::Position;
 use crate::image::{Grid, Volume};
+use crate::material::random::CounterRng;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 

@@ -5,7 +5,7 @@
 //! the brain's closed hull, with thickness that varies smoothly; the face is built from a few ellipsoids. It has to look
 //! like a head to a registration and to a skull stripping, not to an anatomist.
 
-use crate::experiment::counter_rng::{CounterRng, SmoothNoise};
+use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{AffineTransform, Mni};
 use crate::image::components::fill_holes;
 use crate::image::distance::{distance_mm, signed_distance_mm};
@@ -13,6 +13,7 @@ use crate::image::gaussian::gaussian;
 use crate::image::morphology::close;
 use crate::image::resample::resample_nearest;
 use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::material::random::CounterRng;
 use crate::segment::atlas::Atlas;
 use nalgebra::Point3;
 use rayon::prelude::*;

@@ -14,9 +14,10 @@ mod settings;
 
 pub use settings::{SagKind, SynthError, SynthSettings};
 
-use crate::experiment::counter_rng::{CounterRng, SmoothNoise};
+use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
 use field::Field;
 use head::{FLUID, Head};

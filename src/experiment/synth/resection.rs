@@ -3,13 +3,14 @@
 use super::field::Field;
 use super::settings::{SynthError, SynthSettings};
 use super::{Patient, centre, in_template};
-use crate::experiment::counter_rng::{CounterRng, SmoothNoise};
+use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::Position;
 use crate::image::components::{Connectivity, largest_component};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, open};
 use crate::image::{LabelMap, Mask, Volume};
+use crate::material::random::CounterRng;
 use crate::segment::atlas::{Side, temporal_lobe};
 use crate::segment::label;
 use nalgebra::Point3;

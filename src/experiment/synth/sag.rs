@@ -5,8 +5,8 @@ use super::head::Head;
 use super::resection::Resection;
 use super::settings::SynthSettings;
 use super::{Patient, in_template};
-use crate::experiment::counter_rng::CounterRng;
 use crate::image::Grid;
+use crate::material::random::CounterRng;
 use nalgebra::{Point3, Vector3};
 
 /// Where gravity pulls in the patient: the patient lies on the back, the head turned a little by the seed. Unit length.

@@ -1,9 +1,9 @@
 //! From a head to a scan: pose, field of view, slice profile, bias field, noise, storage.
 
 use super::{Patient, head};
-use crate::experiment::counter_rng::CounterRng;
 use crate::geometry::{Frame, Position, RigidTransform};
 use crate::image::{Grid, Volume};
+use crate::material::random::CounterRng;
 use nalgebra::{Matrix3, Matrix4, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Smooth noise over space, from the counter random numbers that the whole program draws from.
 
-pub use crate::material::random::CounterRng;
+use crate::material::random::CounterRng;
 
 /// Noise that varies smoothly over space: hashed values in -1..1 on a cubic lattice, blended by a smooth step.
 #[derive(Clone, Copy, Debug)]
