@@ -32,10 +32,14 @@ impl Stuck {
         match self {
             Self::Iterations => "Newton's method ran out of iterations",
             Self::LineSearch => "no step lowers the energy",
-            Self::NotFinite => "the deformation turns an element inside out",
+            Self::NotFinite => INSIDE_OUT,
         }
     }
 }
+
+/// Why an energy is not finite.
+pub(super) const INSIDE_OUT: &str =
+    "the deformation turns an element inside out, where a law without `inversion_threshold` has no energy";
 
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;
@@ -68,29 +72,63 @@ impl Model {
         let mut forces = vec![[0.0; 3]; nodes];
         let load_scale = reduce::norm(&self.free_part(&self.load_n));
 
+        let work = |u: &[[f64; 3]]| reduce::dot(&self.load_n, u);
+        // An equilibrium from cells inside out.
+        let mut doubtful = None;
         if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
             let mut u = state.u.clone();
             self.move_prescribed(&mut u, 1.0);
-            if self.body.energy(&u, &laws).is_finite() {
+            let stored = self.body.energy(&u, &laws);
+            if stored.is_finite() {
+                let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);
+                let start_whole = all_whole(&u);
                 let stage = Stage { laws: &laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], progress };
                 let found = self.newton(&stage, &mut u, &mut forces, solver.as_mut(), &mut record).is_ok();
                 // A start far off may lead to an equilibrium with cells inside out: then the way is from rest.
-                if found && self.body.state(&u, &laws).iter().all(|s| s[1] > 0.0) {
-                    record.load_steps.push(1.0);
-                    return Ok((self.outcome(&u, &forces, &laws, record), State { u }));
+                if found && all_whole(&u) {
+                    if start_whole {
+                        record.load_steps.push(1.0);
+                        return Ok((self.outcome(&u, &forces, &laws, record), State { u }));
+                    }
+                    // From cells inside out Newton may end in a body that overlaps itself, all volumes positive and in
+                    // equilibrium: it is taken only if the one from rest has no lower potential (but for rounding).
+                    let potential = self.body.energy(&u, &laws) - work(&u);
+                    doubtful = Some((u, forces.clone(), record.relative_residual, potential - 1e-9 * stored));
                 }
             }
         }
 
-        let mut u = vec![[0.0; 3]; nodes];
+        let from_rest = self.from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
+        let (u, forces) = match (from_rest, doubtful) {
+            (Ok(u), Some((.., lower))) if self.body.energy(&u, &laws) - work(&u) < lower => (u, forces),
+            (_, Some((u, forces, relative_residual, _))) => {
+                record = ConvergenceRecord { load_steps: vec![1.0], relative_residual, ..record };
+                (u, forces)
+            }
+            (from_rest, None) => (from_rest?, forces),
+        };
+        Ok((self.outcome(&u, &forces, &laws, record), State { u }))
+    }
+
+    /// Equilibrium from rest, in load steps; `forces` become its internal forces.
+    fn from_rest(
+        &self,
+        laws: &Laws,
+        load_scale: f64,
+        forces: &mut [[f64; 3]],
+        solver: &mut dyn LinearSolver,
+        record: &mut ConvergenceRecord,
+        progress: &dyn Fn(&Progress),
+    ) -> Result<Vec<[f64; 3]>, FemError> {
+        let mut u = vec![[0.0; 3]; self.nodes_m.len()];
         let mut before: Option<(f64, Vec<[f64; 3]>)> = None;
         let (mut reached, mut step) = (0.0_f64, 1.0_f64);
         while reached < 1.0 {
             let factor = (reached + step).min(1.0);
-            let stage = Stage { laws: &laws, factor, load_scale, first_forcing: FIRST_FORCING[0], progress };
-            let start = self.predicted(&u, reached, before.as_ref(), factor, &laws, solver.as_mut());
+            let stage = Stage { laws, factor, load_scale, first_forcing: FIRST_FORCING[0], progress };
+            let start = self.predicted(&u, reached, before.as_ref(), factor, laws, solver);
             let mut trial = start;
-            match self.newton(&stage, &mut trial, &mut forces, solver.as_mut(), &mut record) {
+            match self.newton(&stage, &mut trial, forces, solver, record) {
                 Ok(()) => {
                     before = Some((reached, std::mem::replace(&mut u, trial)));
                     reached = factor;
@@ -101,7 +139,7 @@ impl Model {
                     step *= 0.5;
                     let spent = record.iterations.len() >= BUDGET * self.scenario.solver.newton_iterations;
                     if spent || step < self.scenario.solver.smallest_load_step {
-                        let state = self.body.state(&trial, &laws);
+                        let state = self.body.state(&trial, laws);
                         let worst = worst(&state);
                         return Err(FemError::NoEquilibrium {
                             percent: 100.0 * reached,
@@ -113,7 +151,7 @@ impl Model {
                 }
             }
         }
-        Ok((self.outcome(&u, &forces, &laws, record), State { u }))
+        Ok(u)
     }
 
     /// Puts prescribed components where they belong at a part of the load.
@@ -168,7 +206,7 @@ impl Model {
         let mut moved = u.to_vec();
         self.move_prescribed(&mut moved, reached + small * (factor - reached));
         let (mut here, mut there) = (vec![[0.0; 3]; u.len()], vec![[0.0; 3]; u.len()]);
-        let tangent = self.tangent(u, laws, &mut here, true);
+        let tangent = self.tangent(u, laws, &mut here, true, None);
         self.body.assemble(&moved, laws, &self.partition, &mut there, None, false);
         let difference: Vec<[f64; 3]> =
             there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
@@ -210,8 +248,9 @@ impl Model {
         let mut reference = stage.load_scale;
         let mut project = false;
         let (mut best, mut since_best) = (f64::INFINITY, 0);
+        let mut spare = None;
         for iteration in 0..=settings.newton_iterations {
-            let mut tangent = self.tangent(u, laws, forces, project);
+            let mut tangent = self.tangent(u, laws, forces, project, spare.take());
             let rhs = self.out_of_balance(forces, factor);
             let size = reduce::norm(&rhs);
             if !size.is_finite() {
@@ -249,7 +288,7 @@ impl Model {
             let mut report = solver.solve(&tangent, &rhs, &mut step, forcing);
             if report.negative_curvature && !project {
                 // Not a minimum's neighbourhood: with projected elements the step certainly goes down.
-                tangent = self.tangent(u, laws, forces, true);
+                tangent = self.tangent(u, laws, forces, true, Some(tangent));
                 solver.prepare(&tangent);
                 let again = solver.solve(&tangent, &rhs, &mut step, forcing);
                 report = LinearReport { iterations: report.iterations + again.iterations, ..again };
@@ -292,15 +331,17 @@ impl Model {
             });
             *u = trial;
             potential = next;
+            spare = Some(tangent);
         }
         Err(Stuck::Iterations)
     }
 
     /// Applied minus internal forces on the free rows.
     pub(super) fn out_of_balance(&self, forces: &[[f64; 3]], factor: f64) -> Vec<[f64; 3]> {
-        let all: Vec<[f64; 3]> =
-            forces.iter().zip(&self.load_n).map(|(f, l)| [0, 1, 2].map(|i| factor * l[i] - f[i])).collect();
-        self.free_part(&all)
+        let both = self.node_of_row.iter().map(|&n| (&forces[n as usize], &self.load_n[n as usize]));
+        let mut rows: Vec<[f64; 3]> = both.map(|(f, l)| [0, 1, 2].map(|i| factor * l[i] - f[i])).collect();
+        self.clear_held(&mut rows);
+        rows
     }
 
     /// Size of the internal forces on held nodes: what the supports carry.

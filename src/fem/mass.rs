@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::linear::Tangent;
 use super::model::Model;
+use super::reduce::by_rows;
 use super::scenario::MassKind;
 use super::sparse::{BlockPattern, HELD};
 use std::sync::Arc;
@@ -83,25 +84,35 @@ impl Mass {
     /// M x.
     pub(super) fn product(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let pattern = &*self.pattern;
-        (0..pattern.rows())
-            .map(|row| {
-                let mut sum = [0.0; 3];
+        let mut product = vec![[0.0; 3]; pattern.rows()];
+        by_rows(&mut product, |first, rows| {
+            for (row, sum) in (first..).zip(rows) {
                 for at in pattern.row_start[row]..pattern.row_start[row + 1] {
                     let (m, x) = (self.blocks[at], x[pattern.columns[at] as usize]);
                     (0..3).for_each(|i| sum[i] += m * x[i]);
                 }
-                sum
-            })
-            .collect()
+            }
+            []
+        });
+        product
     }
 
-    /// tangent += factor M.
-    pub(super) fn add_to(&self, tangent: &mut Tangent, factor: f64) {
-        for (block, m) in tangent.matrix.blocks.iter_mut().zip(&self.blocks) {
-            for i in [0, 4, 8] {
-                block[i] += factor * m;
+    /// factor M + stiffness_factor K.
+    pub(super) fn plus(&self, factor: f64, mut tangent: Tangent, stiffness_factor: f64) -> Tangent {
+        by_rows(&mut tangent.matrix.blocks, |first, blocks| {
+            for (block, m) in blocks.iter_mut().zip(&self.blocks[first..]) {
+                block.iter_mut().for_each(|v| *v *= stiffness_factor);
+                [0, 4, 8].into_iter().for_each(|i| block[i] += factor * m);
             }
+            []
+        });
+        if let Some(nodal) = &mut tangent.nodal {
+            by_rows(&mut nodal.moduli, |_, moduli| {
+                moduli.as_flattened_mut().iter_mut().for_each(|v| *v *= stiffness_factor);
+                []
+            });
         }
+        tangent
     }
 }
 

@@ -21,6 +21,7 @@ mod reduce;
 mod scenario;
 mod sensitivity;
 mod sparse;
+mod stiffness;
 pub mod units;
 
 pub use element::ElementKind;
@@ -34,6 +35,7 @@ pub use scenario::{
     ScenarioError, SolverSettings,
 };
 pub use sensitivity::By;
+pub use stiffness::Stiffness;
 
 use crate::mesh::TetMesh;
 
@@ -50,7 +52,8 @@ pub fn simulate(mesh: &TetMesh, scenario: &Scenario, progress: &dyn Fn(&Progress
 }
 
 /// [`simulate`] from a displacement of the nodes (mm) near the answer, such as that of neighbouring materials: fewer
-/// iterations, the same equilibrium within the residual asked for. A start that leads nowhere is dropped for rest.
+/// iterations, the same equilibrium within the residual asked for. A start that leads nowhere, or from
+/// cells inside out to an equilibrium of higher energy, is dropped for rest.
 ///
 /// # Errors
 /// As [`simulate`]; a start of another length or with numbers that are not finite is refused.

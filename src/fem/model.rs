@@ -47,7 +47,7 @@ pub struct Model {
     pub(super) number: Vec<u32>,
     pub(super) corners: usize,
     /// Ends of the mid-edge nodes, in mesh numbering.
-    edges: Vec<[u32; 2]>,
+    pub(super) edges: Vec<[u32; 2]>,
     pub(super) warnings: Vec<String>,
     /// Elimination order of the direct solver, found when first needed.
     symbolic: OnceLock<Option<Arc<Symbolic>>>,
@@ -280,9 +280,16 @@ impl Model {
         })
     }
 
-    /// Tangent at u; also fills the internal forces of all nodes.
-    pub(super) fn tangent(&self, u: &[[f64; 3]], laws: &Laws, forces: &mut [[f64; 3]], project: bool) -> Tangent {
-        let mut matrix = BlockMatrix::zero(Arc::clone(&self.pattern));
+    /// Tangent at u, in the memory of a spare one; also fills the internal forces of all nodes.
+    pub(super) fn tangent(
+        &self,
+        u: &[[f64; 3]],
+        laws: &Laws,
+        forces: &mut [[f64; 3]],
+        project: bool,
+        spare: Option<Tangent>,
+    ) -> Tangent {
+        let mut matrix = spare.map_or_else(|| BlockMatrix::zero(Arc::clone(&self.pattern)), |spare| spare.matrix);
         self.body.assemble(u, laws, &self.partition, forces, Some(&mut matrix), project);
         if let Some(held) = &self.held_components {
             matrix.hold_components(held);
@@ -295,6 +302,14 @@ impl Model {
         let mut rows: Vec<[f64; 3]> = self.node_of_row.iter().map(|&n| of_nodes[n as usize]).collect();
         self.clear_held(&mut rows);
         rows
+    }
+
+    /// Which components of a row, or of [`HELD`], are held.
+    pub(super) fn held_of_row(&self, row: u32) -> [bool; 3] {
+        if row == HELD {
+            return [true; 3];
+        }
+        self.held_components.as_ref().map_or([false; 3], |held| held[row as usize])
     }
 
     /// Held components of free rows become zero.

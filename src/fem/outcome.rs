@@ -2,7 +2,6 @@
 
 use super::body::{Body, Laws};
 use super::model::Model;
-use super::sparse::HELD;
 use serde::{Deserialize, Serialize};
 
 /// A deformed state; nodes and cells numbered as in the mesh.
@@ -113,12 +112,7 @@ impl Model {
         let state = self.body.state(u, laws);
         let reaction = |n: usize| {
             let new = self.number[n] as usize;
-            let row = self.row_of[new];
-            let held = if row == HELD {
-                [true; 3]
-            } else {
-                self.held_components.as_ref().map_or([false; 3], |h| h[row as usize])
-            };
+            let held = self.held_of_row(self.row_of[new]);
             [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
         };
         let mut density: Vec<f64> = state.iter().map(|s| s[2]).collect();

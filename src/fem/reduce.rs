@@ -1,18 +1,69 @@
-//! Sums whose rounding does not depend on the number of threads: fixed chunks, added in order.
+//! Work in tasks of rows, and sums whose rounding does not depend on the number of threads: the tasks follow from the
+//! number of rows alone and are added in order.
 
 use rayon::prelude::*;
 
-/// Rows per partial sum; a constant, so that every machine adds in the same order.
+/// Most rows of a task.
 pub(super) const CHUNK: usize = 1024;
 
-/// Sum of `term(range)` over fixed chunks of 0..n.
+/// Rows of a task: a sixteenth of all, which a few threads share evenly, unless that is too little for a task to be
+/// worth it or more than a cache holds.
+fn rows_of_task(n: usize) -> usize {
+    n.div_ceil(16).clamp(64, CHUNK)
+}
+
+/// Sum of `term(range)` over the tasks of 0..n.
 pub(super) fn chunked(n: usize, term: impl Fn(std::ops::Range<usize>) -> f64 + Sync) -> f64 {
-    let range = |chunk: usize| chunk * CHUNK..n.min((chunk + 1) * CHUNK);
+    let rows = rows_of_task(n);
+    let range = |task: usize| task * rows..n.min((task + 1) * rows);
     if n <= 4 * CHUNK || rayon::current_num_threads() == 1 {
-        return (0..n.div_ceil(CHUNK)).map(|c| term(range(c))).sum();
+        return (0..n.div_ceil(rows)).map(|task| term(range(task))).sum();
     }
-    let parts: Vec<f64> = (0..n.div_ceil(CHUNK)).into_par_iter().map(|c| term(range(c))).collect();
+    let parts: Vec<f64> = (0..n.div_ceil(rows)).into_par_iter().map(|task| term(range(task))).collect();
     parts.iter().sum()
+}
+
+/// Runs `f(first row, rows)` over the tasks of a slice, on threads when there are any; what they return is added.
+pub(super) fn by_rows<A: Send, const N: usize>(
+    rows: &mut [A],
+    f: impl Fn(usize, &mut [A]) -> [f64; N] + Sync,
+) -> [f64; N] {
+    by_tasks(rows_of_task(rows.len()), rows, f)
+}
+
+/// The same with so many rows a task, for rows that are more than a few numbers.
+pub(super) fn by_tasks<A: Send, const N: usize>(
+    rows_of_task: usize,
+    rows: &mut [A],
+    f: impl Fn(usize, &mut [A]) -> [f64; N] + Sync,
+) -> [f64; N] {
+    // A vector of nothing takes no memory.
+    pairs(rows_of_task, rows, &mut vec![(); rows.len()], |first, rows, _| f(first, rows))
+}
+
+/// [`by_rows`] over two slices of equal length.
+pub(super) fn by_row_pairs<A: Send, B: Send, const N: usize>(
+    a: &mut [A],
+    b: &mut [B],
+    f: impl Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync,
+) -> [f64; N] {
+    pairs(rows_of_task(a.len()), a, b, f)
+}
+
+fn pairs<A: Send, B: Send, const N: usize>(
+    rows: usize,
+    a: &mut [A],
+    b: &mut [B],
+    f: impl Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync,
+) -> [f64; N] {
+    let add = |sum: [f64; N], part: [f64; N]| std::array::from_fn(|i| sum[i] + part[i]);
+    if a.len() <= rows || rayon::current_num_threads() == 1 {
+        let tasks = a.chunks_mut(rows).zip(b.chunks_mut(rows)).enumerate();
+        return tasks.map(|(task, (a, b))| f(task * rows, a, b)).fold([0.0; N], add);
+    }
+    let tasks = a.par_chunks_mut(rows).zip(b.par_chunks_mut(rows)).enumerate();
+    let parts: Vec<[f64; N]> = tasks.map(|(task, (a, b))| f(task * rows, a, b)).collect();
+    parts.into_iter().fold([0.0; N], add)
 }
 
 /// a . b over 3-vectors.

@@ -109,7 +109,7 @@ impl<'a> Linearised<'a> {
     fn new(model: &'a Model, materials: &'a Materials, state: &'a State) -> Result<Self, FemError> {
         let laws = model.laws(materials)?;
         let mut forces = vec![[0.0; 3]; state.u.len()];
-        let tangent = model.tangent(&state.u, &laws, &mut forces, false);
+        let tangent = model.tangent(&state.u, &laws, &mut forces, false, None);
         let mut solver = linear::for_model(model, largest_ratio(materials));
         solver.prepare(&tangent);
         Ok(Self { model, materials, u: &state.u, tangent, solver })

@@ -151,14 +151,16 @@ fn statics(small: &TetMesh, large: &TetMesh, bars: &mut Vec<Bar>) -> Vec<(f64, f
     let ((fine, more), (rough, fewer)) = (run("1e-10"), run("1e-3"));
     let per = 1e3 * (fine - rough) / (more - fewer);
     bars.push(Bar::new("fem brain30k CG iteration", "<= 2 ms", format!("{per:.2} ms"), per <= 2.0));
-    // From the solution: one energy, one force and tangent, one outcome; an upper bound of the assembly.
+    // At the solution, the memory of the matrix included; the model deals its rows out to the one thread there is.
     let scenario = two_tissues(0.45, GRAVITY, "");
-    if let Ok(model) = Model::new(large, &scenario)
-        && let Ok((_, state)) = model.solve(&scenario.materials, None, &|_| ())
-    {
-        let again = || single(|| model.solve(&scenario.materials, Some(&state), &|_| ()).is_ok());
-        let per = 1e6 * timed(again).0 / large.tets().len() as f64;
-        let text = format!("{per:.2} us with energy and outcome");
+    let assembly = single(|| {
+        let model = Model::new(large, &scenario).ok()?;
+        let (_, state) = model.solve(&scenario.materials, None, &|_| ()).ok()?;
+        Some(timed(|| model.stiffness(&scenario.materials, &state).is_ok()).0)
+    });
+    if let Some(seconds) = assembly {
+        let per = 1e6 * seconds / large.tets().len() as f64;
+        let text = format!("{per:.2} us");
         bars.push(Bar::new("fem assembly of force and tangent", "<= 0.4 us per tet", text, per <= 0.4));
     }
     let memory = peak_mb();

@@ -1,7 +1,7 @@
 //! Jacobi preconditioners: the inverse of the diagonal, entry by entry or 3 x 3 block by block.
 
 use super::Tangent;
-use super::operator::{Lanes, Real, by_rows};
+use super::operator::{Lanes, Real};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ impl<T: Real> BlockJacobi<T> {
     pub(super) fn new(tangent: &Tangent, blocks: bool) -> Self {
         let inverse = (0..tangent.matrix.pattern.rows())
             .into_par_iter()
-            .with_min_len(512)
+            .with_min_len(256)
             .map(|row| {
                 let block = Matrix3::from_column_slice(&tangent.diagonal_block(row));
                 let diagonal =
@@ -34,15 +34,12 @@ impl<T: Real> BlockJacobi<T> {
         Self { inverse }
     }
 
-    /// z = D^-1 r.
-    pub(super) fn apply(&self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
-        by_rows(z, |first, rows| {
-            for (row, out) in (first..).zip(rows) {
-                let (d, r) = (&self.inverse[row], &r[row]);
-                for lane in 0..4 {
-                    out[lane] = d[0][lane] * r[0] + d[1][lane] * r[1] + d[2][lane] * r[2];
-                }
+    /// z = D^-1 r of the rows from `first` on.
+    pub(super) fn apply(&self, first: usize, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
+        for ((d, r), out) in self.inverse[first..].iter().zip(r).zip(z) {
+            for lane in 0..4 {
+                out[lane] = d[0][lane] * r[0] + d[1][lane] * r[1] + d[2][lane] * r[2];
             }
-        });
+        }
     }
 }

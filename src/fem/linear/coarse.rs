@@ -7,10 +7,11 @@
 //! sparse as K and factored as sparsely, so that the pieces can grow in number with the rows. K changes little from one Newton
 //! iteration to the next: the factor of the first is kept.
 
+use super::super::reduce::{by_rows, by_tasks};
 use super::super::sparse::{BlockMatrix, BlockPattern};
 use super::Tangent;
 use super::factor::{Factor, Symbolic};
-use super::operator::{Lanes, Real, by_rows};
+use super::operator::{Lanes, Real, dot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -227,10 +228,10 @@ impl Pieces {
 }
 
 impl Coarse {
-    /// z += Z (Z^T K Z)^-1 Z^T r.
-    pub(super) fn add<T: Real>(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
+    /// z += Z (Z^T K Z)^-1 Z^T r; returns r . z.
+    pub(super) fn add<T: Real>(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) -> f64 {
         let Self { pieces, factor, loads, motion } = self;
-        by_rows(loads.as_chunks_mut::<2>().0, |first, loads| {
+        by_tasks(1, loads.as_chunks_mut::<2>().0, |first, loads| {
             for (p, load) in (first..).zip(loads) {
                 *load = [[0.0; 3]; 2];
                 for &row in &pieces.rows[pieces.start[p]..pieces.start[p + 1]] {
@@ -242,11 +243,12 @@ impl Coarse {
                     }
                 }
             }
+            []
         });
         factor.solve(loads, motion);
         let motion = motion.as_chunks::<2>().0;
-        by_rows(z, |first, rows| {
-            for (row, out) in (first..).zip(rows) {
+        let [product] = by_rows(z, |first, rows| {
+            for (row, out) in (first..).zip(rows.iter_mut()) {
                 let ([shift, turn], d) = (&motion[pieces.piece[row] as usize], pieces.place[row].map(f64::from));
                 let turned =
                     [turn[1] * d[2] - turn[2] * d[1], turn[2] * d[0] - turn[0] * d[2], turn[0] * d[1] - turn[1] * d[0]];
@@ -255,6 +257,8 @@ impl Coarse {
                     out[i] += T::of(shift[i] + turned[i]);
                 }
             }
+            [dot(&r[first..], rows)]
         });
+        product
     }
 }

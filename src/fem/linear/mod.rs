@@ -15,9 +15,9 @@ pub(super) use pcg::Pcg;
 
 use super::element::NodalTangent;
 use super::model::Model;
+use super::reduce::by_rows;
 use super::scenario::LinearMethod;
 use super::sparse::BlockMatrix;
-use rayon::prelude::*;
 
 /// A tangent: sparse blocks and, for elements with averaged deformation, the nodes' part on top.
 pub(super) struct Tangent {
@@ -55,24 +55,12 @@ impl Tangent {
         }
     }
 
-    /// factor K.
-    pub(super) fn scaled(mut self, factor: f64) -> Self {
-        let times = |block: &mut [f64]| block.iter_mut().for_each(|v| *v *= factor);
-        self.matrix.blocks.par_iter_mut().with_min_len(4096).for_each(|block| times(block));
-        if let Some(nodal) = &mut self.nodal {
-            nodal.moduli.par_iter_mut().with_min_len(512).for_each(|moduli| times(moduli));
-        }
-        self
-    }
-
     /// K + factor other.
     pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
         let mut sum = Self { matrix: self.matrix.clone(), nodal: self.nodal.clone() };
-        let (own, more) = (sum.matrix.blocks.as_flattened_mut(), other.matrix.blocks.as_flattened());
-        own.iter_mut().zip(more).for_each(|(a, b)| *a += factor * b);
+        by_rows(&mut sum.matrix.blocks, |first, blocks| add_scaled(blocks, factor, &other.matrix.blocks[first..]));
         if let (Some(own), Some(more)) = (&mut sum.nodal, &other.nodal) {
-            let pairs = own.moduli.as_flattened_mut().iter_mut().zip(more.moduli.as_flattened());
-            pairs.for_each(|(a, b)| *a += factor * b);
+            by_rows(&mut own.moduli, |first, moduli| add_scaled(moduli, factor, &more.moduli[first..]));
         }
         sum
     }
@@ -85,6 +73,11 @@ impl Tangent {
         }
         block
     }
+}
+
+fn add_scaled<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) -> [f64; 0] {
+    a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += factor * b);
+    []
 }
 
 /// Poisson's ratio from which a factor is cheaper than conjugate gradients with a Jacobi preconditioner. Measured on

@@ -1,9 +1,9 @@
 //! The tangent packed for the iteration: single or double precision, four lanes per node.
 
 use super::super::element::{NodalTangent, Rings};
+use super::super::reduce::by_rows;
 use super::super::sparse::BlockPattern;
 use super::Tangent;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Arithmetic of an iteration.
@@ -43,11 +43,8 @@ impl Real for f64 {
     }
 }
 
-/// A 3-vector in four lanes; the last one is zero.
+/// A 3-vector in four lanes; what the last one holds means nothing: setting it would cost the compiler its vectors.
 pub(super) type Lanes<T> = [T; 4];
-
-/// Rows per task: small enough to share, large enough to be worth a thread.
-const ROWS: usize = 1024;
 
 /// The packed tangent.
 pub(super) struct Operator<T> {
@@ -70,17 +67,27 @@ struct PackedNodal<T> {
 
 impl<T: Real> PackedNodal<T> {
     fn new(tangent: &NodalTangent) -> Self {
-        let lanes = |v: &[f64; 3]| [T::of(v[0]), T::of(v[1]), T::of(v[2]), T::default()];
-        let column =
-            |column: &[f64; 9]| std::array::from_fn(|c| lanes(&[column[3 * c], column[3 * c + 1], column[3 * c + 2]]));
+        let zero = [T::default(); 4];
         Self {
             rings: Arc::clone(&tangent.rings),
             held: tangent.held.clone(),
             gradients: tangent.rings.gradients.iter().map(lanes).collect(),
             gradients_of_row: tangent.rings.gradients_of_row.iter().map(lanes).collect(),
-            moduli: tangent.moduli.iter().map(|m| std::array::from_fn(|k| column(&m.as_chunks::<9>().0[k]))).collect(),
-            stresses: vec![[[T::default(); 4]; 3]; tangent.moduli.len()],
+            moduli: vec![[[zero; 3]; 9]; tangent.moduli.len()],
+            stresses: vec![[zero; 3]; tangent.moduli.len()],
         }
+    }
+
+    fn take_up(&mut self, tangent: &NodalTangent) {
+        let column = |column: &[f64; 9]| -> [Lanes<T>; 3] {
+            std::array::from_fn(|c| lanes(&[column[3 * c], column[3 * c + 1], column[3 * c + 2]]))
+        };
+        by_rows(&mut self.moduli, |first, moduli| {
+            for (out, m) in moduli.iter_mut().zip(&tangent.moduli[first..]) {
+                *out = std::array::from_fn(|k| column(&m.as_chunks::<9>().0[k]));
+            }
+            []
+        });
     }
 
     /// Stress of every group for the displacements p.
@@ -104,6 +111,7 @@ impl<T: Real> PackedNodal<T> {
                 }
                 *out = stress;
             }
+            []
         });
     }
 
@@ -123,13 +131,19 @@ impl<T: Real> PackedNodal<T> {
     }
 }
 
-/// Runs `f(first row, rows)` over slices, on threads when there are any.
-pub(super) fn by_rows<A: Send>(out: &mut [A], f: impl Fn(usize, &mut [A]) + Sync) {
-    if rayon::current_num_threads() == 1 || out.len() <= ROWS {
-        f(0, out);
-    } else {
-        out.par_chunks_mut(ROWS).enumerate().for_each(|(chunk, rows)| f(chunk * ROWS, rows));
+/// a . b in double precision, as far as the shorter one goes.
+pub(super) fn dot<T: Real>(a: &[Lanes<T>], b: &[Lanes<T>]) -> f64 {
+    let mut sum = [0.0; 4];
+    for (x, y) in a.iter().zip(b) {
+        for lane in 0..4 {
+            sum[lane] += x[lane].wide() * y[lane].wide();
+        }
     }
+    sum[0] + sum[1] + sum[2]
+}
+
+fn lanes<T: Real>(v: &[f64; 3]) -> Lanes<T> {
+    [T::of(v[0]), T::of(v[1]), T::of(v[2]), T::default()]
 }
 
 #[inline(always)]
@@ -139,48 +153,66 @@ fn add_scaled<T: Real>(sum: &mut Lanes<T>, column: &[T], factor: T) {
     }
 }
 
+/// Blocks of one row times the entries of their columns. Apart from what else happens to the row, so that the compiler
+/// keeps four lanes together, and with a sum for each column of the blocks: additions to one sum would wait for each other.
+#[inline(never)]
+fn row_product<T: Real>(values: &[T], columns: &[u32], p: &[Lanes<T>]) -> Lanes<T> {
+    let mut sums = [[T::default(); 4]; 3];
+    for (k, &column) in columns.iter().enumerate() {
+        let x = &p[column as usize];
+        let block = &values[9 * k..9 * k + 10];
+        add_scaled(&mut sums[0], &block[0..4], x[0]);
+        add_scaled(&mut sums[1], &block[3..7], x[1]);
+        add_scaled(&mut sums[2], &block[6..10], x[2]);
+    }
+    std::array::from_fn(|lane| sums[0][lane] + sums[1][lane] + sums[2][lane])
+}
+
 impl<T: Real> Operator<T> {
     pub(super) fn new(tangent: &Tangent) -> Self {
-        let mut packed = vec![T::default(); 9 * tangent.matrix.blocks.len() + 1];
-        by_rows(packed.as_chunks_mut::<9>().0, |first, blocks| {
+        let packed = vec![T::default(); 9 * tangent.matrix.blocks.len() + 1];
+        let nodal = tangent.nodal.as_ref().map(PackedNodal::new);
+        let mut operator = Self { pattern: Arc::clone(&tangent.matrix.pattern), packed, nodal };
+        operator.take_up(tangent);
+        operator
+    }
+
+    /// Another tangent of the same model.
+    pub(super) fn take_up(&mut self, tangent: &Tangent) {
+        by_rows(self.packed.as_chunks_mut::<9>().0, |first, blocks| {
             for (out, block) in blocks.iter_mut().zip(&tangent.matrix.blocks[first..]) {
                 *out = block.map(T::of);
             }
+            []
         });
-        let nodal = tangent.nodal.as_ref().map(PackedNodal::new);
-        Self { pattern: Arc::clone(&tangent.matrix.pattern), packed, nodal }
+        if let (Some(own), Some(nodal)) = (&mut self.nodal, &tangent.nodal) {
+            own.take_up(nodal);
+        }
     }
 
     pub(super) fn rows(&self) -> usize {
         self.pattern.rows()
     }
 
-    /// y = A p.
-    pub(super) fn apply(&mut self, p: &[Lanes<T>], y: &mut [Lanes<T>]) {
+    /// y = A p; returns p . y.
+    pub(super) fn apply(&mut self, p: &[Lanes<T>], y: &mut [Lanes<T>]) -> f64 {
         let (pattern, packed) = (&*self.pattern, &self.packed);
         if let Some(nodal) = &mut self.nodal {
             nodal.stretch(p);
         }
         let nodal = self.nodal.as_ref();
-        by_rows(y, |first, rows| {
-            for (row, out) in (first..).zip(rows) {
+        let [curvature] = by_rows(y, |first, rows| {
+            for (row, out) in (first..).zip(rows.iter_mut()) {
                 let range = pattern.row_start[row]..pattern.row_start[row + 1];
                 let values = &packed[9 * range.start..=9 * range.end];
-                let mut sum = [T::default(); 4];
-                for (k, &column) in pattern.columns[range].iter().enumerate() {
-                    let x = &p[column as usize];
-                    let block = &values[9 * k..9 * k + 10];
-                    add_scaled(&mut sum, &block[0..4], x[0]);
-                    add_scaled(&mut sum, &block[3..7], x[1]);
-                    add_scaled(&mut sum, &block[6..10], x[2]);
-                }
+                let mut sum = row_product(values, &pattern.columns[range], p);
                 if let Some(nodal) = nodal {
                     nodal.add_force(row, &mut sum);
                 }
-                // The fourth lane held the neighbour block's first entry.
-                sum[3] = T::default();
                 *out = sum;
             }
+            [dot(&p[first..], rows)]
         });
+        curvature
     }
 }

@@ -2,10 +2,10 @@
 //! refinement: the matrix is read in half the bytes, and the residual that decides is the double-precision one. Larger
 //! systems have a coarse correction besides the blocks of the diagonal.
 
-use super::super::reduce;
+use super::super::reduce::{self, by_row_pairs};
 use super::block_jacobi::BlockJacobi;
 use super::coarse::{Coarse, Rows};
-use super::operator::{Lanes, Operator, Real};
+use super::operator::{Lanes, Operator, Real, dot};
 use super::{LinearReport, LinearSolver, Tangent};
 
 /// Conjugate gradients with a Jacobi or block-Jacobi preconditioner.
@@ -39,11 +39,19 @@ struct Preconditioner<'a, T> {
 }
 
 impl<T: Real> Preconditioner<'_, T> {
-    fn apply(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) {
-        self.jacobi.apply(r, z);
-        if let Some(coarse) = &mut self.coarse {
-            coarse.add(r, z);
-        }
+    /// r -= alpha q and z = M^-1 r; returns r . r and r . z.
+    fn advance(&mut self, alpha: T, q: &[Lanes<T>], r: &mut [Lanes<T>], z: &mut [Lanes<T>]) -> [f64; 2] {
+        let jacobi = self.jacobi;
+        let [square, product] = by_row_pairs(r, z, |first, r, z| {
+            for (r, q) in r.iter_mut().zip(&q[first..]) {
+                for lane in 0..4 {
+                    r[lane] = r[lane] - alpha * q[lane];
+                }
+            }
+            jacobi.apply(first, r, z);
+            [dot(r, r), dot(r, z)]
+        });
+        [square, self.coarse.as_mut().map_or(product, |coarse| coarse.add(r, z))]
     }
 }
 
@@ -52,29 +60,6 @@ struct Inner {
     iterations: usize,
     reached: bool,
     negative_curvature: bool,
-}
-
-fn dot<T: Real>(a: &[Lanes<T>], b: &[Lanes<T>]) -> f64 {
-    reduce::chunked(a.len(), |range| {
-        let mut sum = [0.0; 4];
-        for (x, y) in a[range.clone()].iter().zip(&b[range]) {
-            for lane in 0..4 {
-                sum[lane] += x[lane].wide() * y[lane].wide();
-            }
-        }
-        sum[0] + sum[1] + sum[2]
-    })
-}
-
-/// a += factor b
-fn add<T: Real>(a: &mut [Lanes<T>], factor: T, b: &[Lanes<T>]) {
-    super::operator::by_rows(a, |first, rows| {
-        for (x, y) in rows.iter_mut().zip(&b[first..]) {
-            for lane in 0..4 {
-                x[lane] += factor * y[lane];
-            }
-        }
-    });
 }
 
 fn conjugate_gradients<T: Real>(
@@ -88,28 +73,37 @@ fn conjugate_gradients<T: Real>(
     let n = operator.rows();
     let zero = vec![[T::default(); 4]; n];
     let (mut r, mut z, mut q) = (b.to_vec(), zero.clone(), zero);
-    let goal = tolerance * tolerance * dot(b, b);
-    preconditioner.apply(&r, &mut z);
+    let [square, mut rho] = preconditioner.advance(T::default(), &q, &mut r, &mut z);
+    let goal = tolerance * tolerance * square;
     let mut p = z.clone();
-    let mut rho = dot(&r, &z);
     let mut best = f64::INFINITY;
     let mut since_best = 0;
     for iteration in 0..most_iterations {
-        operator.apply(&p, &mut q);
-        let curvature = dot(&p, &q);
+        let end = |reached, negative_curvature| Inner { iterations: iteration + 1, reached, negative_curvature };
+        let curvature = operator.apply(&p, &mut q);
         if curvature.is_nan() || curvature <= 0.0 {
             if iteration == 0 {
                 // The preconditioned residual is still a descent direction.
                 x.copy_from_slice(&p);
             }
-            return Inner { iterations: iteration + 1, reached: false, negative_curvature: true };
+            return end(false, true);
         }
-        let alpha = rho / curvature;
-        add(x, T::of(alpha), &p);
-        add(&mut r, T::of(-alpha), &q);
-        let square = dot(&r, &r);
+        let step = T::of(rho / curvature);
+        let [square, next] = preconditioner.advance(step, &q, &mut r, &mut z);
+        let beta = T::of(next / rho);
+        rho = next;
+        // x += step p and p = z + beta p in one pass.
+        by_row_pairs(x, &mut p, |first, x, p| {
+            for ((x, p), z) in x.iter_mut().zip(p).zip(&z[first..]) {
+                for lane in 0..4 {
+                    x[lane] += step * p[lane];
+                    p[lane] = z[lane] + beta * p[lane];
+                }
+            }
+            []
+        });
         if square <= goal {
-            return Inner { iterations: iteration + 1, reached: true, negative_curvature: false };
+            return end(true, false);
         }
         // Rounding has eaten the iteration when the residual has not fallen for long.
         if square < 0.81 * best {
@@ -118,20 +112,9 @@ fn conjugate_gradients<T: Real>(
         } else {
             since_best += 1;
             if since_best > 400 + n / 20 {
-                return Inner { iterations: iteration + 1, reached: false, negative_curvature: false };
+                return end(false, false);
             }
         }
-        preconditioner.apply(&r, &mut z);
-        let next = dot(&r, &z);
-        let beta = T::of(next / rho);
-        rho = next;
-        super::operator::by_rows(&mut p, |first, rows| {
-            for (p, z) in rows.iter_mut().zip(&z[first..]) {
-                for lane in 0..4 {
-                    p[lane] = z[lane] + beta * p[lane];
-                }
-            }
-        });
     }
     Inner { iterations: most_iterations, reached: false, negative_curvature: false }
 }
@@ -212,7 +195,13 @@ impl LinearSolver for Pcg {
         if let (None, Some(rows)) = (&self.coarse, &self.rows) {
             self.coarse = Coarse::new(tangent, rows);
         }
-        self.single = Some(Packed::new(tangent, self.blocks, 1e-5));
+        match &mut self.single {
+            Some(single) => {
+                single.operator.take_up(tangent);
+                single.preconditioner = BlockJacobi::new(tangent, self.blocks);
+            }
+            None => self.single = Some(Packed::new(tangent, self.blocks, 1e-5)),
+        }
         self.double = None;
     }
 

@@ -8,3 +8,4 @@ mod motion;
 mod refusals;
 mod sensitivities;
 mod statics;
+mod stiffness;
