@@ -1,6 +1,8 @@
 //! `hgm prep`: a T1 pair to registered images, masks and a tagged mesh.
 
-use super::case::{self, AnatFacts, Anatomy, Case, MeshFacts, MeshOptions, Overrides, RegistrationFacts, Scans};
+use super::case::{
+    self, AnatFacts, Anatomy, Case, MeshFacts, MeshOptions, Overrides, OwnMasks, RegistrationFacts, Scans,
+};
 use super::{Failure, Session};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
@@ -73,8 +75,9 @@ impl Images {
     /// Runs (or skips) them.
     fn of(case: &Case, args: &Args, session: &Session) -> Result<Self, Failure> {
         let scans = Scans::read(&args.pre, &args.post, session)?;
+        let own = OwnMasks::read(&args.overrides, &scans, session)?;
         let (registered, registration) = case::registration(case, &scans, session)?;
-        let (segmented, anat) = case::anat(case, &scans, &args.overrides, &registered, session)?;
+        let (segmented, anat) = case::anat(case, &scans, &own, &registered, session)?;
         Ok(Self { manifests: [registered, segmented], registration, anat })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError};
-use crate::experiment::synth::{SagKind, SynthError, SynthSettings, synthesize};
+use crate::experiment::synth::{Contrast, SagKind, SynthError, SynthSettings, synthesize};
 use crate::segment::atlas::Side;
 use std::path::PathBuf;
 
@@ -38,6 +38,9 @@ pub struct Args {
     /// Air in the cavity
     #[arg(long)]
     pub air: bool,
+    /// Scans taken after gadolinium [default: none]
+    #[arg(long, value_parser = contrast, value_name = "none|pre|post|both")]
+    pub contrast: Option<Contrast>,
 }
 
 fn side(text: &str) -> Result<Side, String> {
@@ -57,6 +60,16 @@ fn sag(text: &str) -> Result<SagKind, String> {
     }
 }
 
+fn contrast(text: &str) -> Result<Contrast, String> {
+    match text {
+        "none" => Ok(Contrast::None),
+        "pre" => Ok(Contrast::Pre),
+        "post" => Ok(Contrast::Post),
+        "both" => Ok(Contrast::Both),
+        _ => Err("say none, pre, post or both".to_owned()),
+    }
+}
+
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut settings: SynthSettings = session.settings("synth")?;
     settings.seed = session.options.seed.unwrap_or(settings.seed);
@@ -66,6 +79,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     settings.sag = args.sag.unwrap_or(settings.sag);
     settings.blood |= args.blood;
     settings.air |= args.air;
+    settings.contrast = args.contrast.unwrap_or(settings.contrast);
     if let Some(spacing_mm) = args.spacing_mm {
         settings.spacing_mm = spacing_mm;
         // The default of 1 mm must not be thinner than the voxels asked for.

@@ -6,7 +6,7 @@ use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
 use super::priors::AtlasPriors;
-use super::ventricle::{VentricleSettings, ventricles};
+use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles};
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
@@ -236,11 +236,13 @@ pub fn segment_with_priors<F: Frame>(
     }
     let mut labels_mni = most_probable(&raw, &model);
     let csf = labels_mni.map(|l| l == label::CSF);
+    let t1_mni = without_bias(&raw, &model);
     let ventricle = if let Some(mask) = overrides.ventricle {
         let given = mask_on(mask, &grid, &t1_from_mni);
         at_each(&raw, |n| given.data[n] && brain.data[n])
     } else {
-        ventricles(&csf, &brain, priors, &settings.ventricle)
+        let plexus = enhanced_plexus(&t1_mni, model.means[2], priors);
+        ventricles(&csf, &plexus, &brain, priors, &settings.ventricle)
     };
     if ventricle.count() == 0 {
         warnings.push(SegmentWarning::NoVentricle);
@@ -258,7 +260,18 @@ pub fn segment_with_priors<F: Frame>(
         white_matter_cc: volume(label::WHITE_MATTER),
         ventricle_cc: volume(label::VENTRICLE),
     };
-    let labels = labels_on(&labels_mni, &t1.grid, mni_from_t1);
+    let mut labels = labels_on(&labels_mni, &t1.grid, mni_from_t1);
+    if let Some(mask) = overrides.ventricle.filter(|m| m.grid.coincides(&t1.grid, 1e-3)) {
+        // Voxel by voxel what the user drew, without the way there and back.
+        for (l, &drawn) in labels.data.iter_mut().zip(&mask.data) {
+            *l = match *l {
+                label::BACKGROUND => label::BACKGROUND,
+                _ if drawn => label::VENTRICLE,
+                label::VENTRICLE => label::CSF,
+                other => other,
+            };
+        }
+    }
     Ok(Segmentation {
         brain: overrides
             .brain
@@ -266,7 +279,7 @@ pub fn segment_with_priors<F: Frame>(
             .cloned()
             .unwrap_or_else(|| labels.map(|l| l > 0)),
         labels,
-        t1_mni: without_bias(&raw, &model),
+        t1_mni,
         known_mni: known,
         brain_mni: brain,
         labels_mni,
@@ -338,4 +351,46 @@ fn most_probable(like: &Volume<f32, Mni>, model: &Mixture) -> LabelMap<Mni> {
         };
     }
     labels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Position, Pre};
+    use crate::image::VoxelBox;
+
+    fn template() -> Volume<f32, Pre> {
+        atlas::template().t1_f32().relabelled()
+    }
+
+    fn refusal(t1: &Volume<f32, Pre>, brain: Option<&Mask<Pre>>) -> SegmentError {
+        let masks = SegmentOverrides { brain, ventricle: None };
+        segment_t1(t1, &RigidTransform::identity(), &masks, &SegmentSettings::default()).unwrap_err()
+    }
+
+    #[test]
+    fn a_brain_smaller_than_700_or_larger_than_2200_cc_is_refused_with_its_volume() {
+        let t1 = template();
+        let ball = |radius_mm: f64| {
+            Mask::from_fn(t1.grid, |n| {
+                let voxel = nalgebra::Point3::from(t1.grid.voxel(n).map(|v| v as f64));
+                t1.grid.position(voxel).distance_mm(&Position::new(0.0, -18.0, 8.0)) < radius_mm
+            })
+        };
+        for mask in [ball(54.0), ball(85.0)] {
+            let message = refusal(&t1, Some(&mask)).to_string();
+            let words = format!("is {:.0} cc", mask.volume_cc());
+            assert!(message.contains(&words) && message.contains("outside 700 to 2200 cc"), "{message}");
+            assert!(message.contains("give a brain mask"), "{message}");
+        }
+    }
+
+    #[test]
+    fn an_image_of_less_than_half_the_brain_is_refused_with_its_share() {
+        let whole = template();
+        let [nx, ny, nz] = whole.grid.dims;
+        let upper = whole.cropped(&VoxelBox { first: [0, 0, nz * 6 / 10], end: [nx, ny, nz] });
+        let error = refusal(&upper, None);
+        assert!(matches!(error, SegmentError::LittleBrain { percent } if (15.0..50.0).contains(&percent)), "{error}");
+    }
 }

@@ -4,7 +4,7 @@ use super::brain::at_each;
 use super::priors::AtlasPriors;
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, fill_holes, without_islands};
-use crate::image::morphology::{close, erode};
+use crate::image::morphology::{close, dilate, erode};
 use crate::image::{Mask, Volume};
 
 /// How the ventricles are told from the other CSF.
@@ -25,13 +25,27 @@ impl Default for VentricleSettings {
     }
 }
 
+/// Choroid plexus that contrast agent made at least as bright as white matter: inside the template's ventricles, with the
+/// mixed voxels around it.
+///
+/// `t1` has its bias taken out.
+pub(super) fn enhanced_plexus(t1: &Volume<f32, Mni>, white_mean: f64, priors: &AtlasPriors) -> Mask<Mni> {
+    // The carried ventricles are about a voxel off: nearer to their wall, white matter is bright.
+    const DEPTH_MM: f32 = 0.5;
+    let bright = at_each(t1, |n| priors.ventricle_mm.data[n] < -DEPTH_MM && f64::from(t1.data[n]) >= white_mean);
+    let around = dilate(&bright, 1.5);
+    at_each(t1, |n| around.data[n] && priors.ventricle_mm.data[n] < DEPTH_MM)
+}
+
 /// The ventricles among the voxels of `csf`, on the working grid; may be empty.
 ///
 /// Two fronts start together and advance through CSF at one voxel a step: one from the CSF deep in the template's
 /// ventricles, one from the CSF in its cisterns and sulci; where they meet, they stop. Enlarged ventricles grow into
-/// what is tissue in the template, where no cistern starts.
+/// what is tissue in the template, where no cistern starts. Choroid plexus that contrast agent made bright is passed like
+/// CSF.
 pub(super) fn ventricles(
     csf: &Mask<Mni>,
+    plexus: &Mask<Mni>,
     brain: &Mask<Mni>,
     priors: &AtlasPriors,
     settings: &VentricleSettings,
@@ -40,6 +54,7 @@ pub(super) fn ventricles(
     const CISTERN: u8 = 2;
     let (reach, clearance) = (settings.reach_mm as f32, settings.cistern_clearance_mm as f32);
     let deep = erode(csf, 1.0);
+    let csf = &at_each(&priors.ventricle_mm, |n| csf.data[n] || plexus.data[n]);
     let mut owner: Vec<u8> = (0..csf.data.len())
         .map(|n| {
             let from_ventricle = priors.ventricle_mm.data[n];

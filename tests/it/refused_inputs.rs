@@ -96,41 +96,43 @@ fn refuses(arguments: &[&str], name: &str, words: &[&str], case: &str) {
 }
 
 #[test]
-fn slow_masks_that_do_not_fit_are_refused_by_name() {
+fn masks_that_fit_neither_scan_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
-    let plain = unpacked(&std::fs::read(&pre).unwrap());
-    let masks: [(&str, &str, Vec<u8>, &[&str]); 3] = [
-        ("--brain-mask", "empty.nii.gz", packed(&filled(&plain, 0), 1), &["empty.nii.gz"]),
-        // The first voxel lies ten millimetres from where the scan's does.
-        (
-            "--cavity-mask",
-            "elsewhere.nii.gz",
-            {
-                let moved = |at: usize, copy: Vec<u8>| {
-                    let old = f32::from_le_bytes(copy[at..at + 4].try_into().unwrap());
-                    with(&copy, at, &(old + 10.0).to_le_bytes())
-                };
-                let mut mask = moved(292, moved(268, filled(&plain, 0)));
-                let middle = 352 + (mask.len() - 352) / 4 * 2;
-                mask[middle] = 1;
-                packed(&mask, 1)
-            },
-            &["elsewhere.nii.gz", "resample"],
-        ),
-        ("--resected-mask", "labels.nii.gz", packed(&plain, 1), &["outside the brain", "check the masks"]),
+    let good = std::fs::read(&pre).unwrap();
+    let plain = unpacked(&good);
+    // The first voxel lies ten millimetres from where the scan's does.
+    let moved = |at: usize, copy: &[u8]| {
+        let old = f32::from_le_bytes(copy[at..at + 4].try_into().unwrap());
+        with(copy, at, &(old + 10.0).to_le_bytes())
+    };
+    let masks: [(&str, Vec<u8>, &[&str]); 3] = [
+        ("empty.nii.gz", packed(&filled(&plain, 0), 1), &["the mask is empty"]),
+        ("elsewhere.nii.gz", packed(&moved(292, &moved(268, &plain)), 1), &["neither scan", "resample"]),
+        ("cut.nii.gz", good[..good.len() / 2].to_vec(), &["gzip", "again"]),
     ];
-    for (option, name, bytes, words) in &masks {
+    for (name, bytes, words) in &masks {
         std::fs::write(path(name), bytes).unwrap();
-        let arguments =
-            ["run", pre.to_str().unwrap(), post.to_str().unwrap(), option, &path(name), "-o", &path("case")];
-        let result = output(&arguments);
-        let message = String::from_utf8_lossy(&result.stderr).into_owned();
-        assert_eq!(result.status.code(), Some(3), "{name}: {message}");
-        for word in *words {
-            assert!(message.contains(word), "{name}: {message:?} lacks {word:?}");
+        for option in ["--brain-mask", "--ventricle-mask", "--cavity-mask", "--resected-mask"] {
+            let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
+            let arguments = ["prep", pair[0], pair[1], option, &path(name), "-o", &path("case")];
+            refuses(&arguments, name, words, &path("case"));
         }
-        assert!(!folder.path().join("case/anat").exists(), "{name}: masks were written");
     }
+}
+
+#[test]
+fn slow_a_mask_outside_the_brain_is_refused_and_no_mask_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    // The scan itself: everything is inside.
+    std::fs::copy(&pre, path("head.nii.gz")).unwrap();
+    let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
+    let result = output(&["run", pair[0], pair[1], "--resected-mask", &path("head.nii.gz"), "-o", &path("case")]);
+    let message = String::from_utf8_lossy(&result.stderr).into_owned();
+    assert_eq!(result.status.code(), Some(3), "{message}");
+    assert!(message.contains("outside the brain") && message.contains("check the masks"), "{message:?}");
+    assert!(!folder.path().join("case/anat").exists(), "masks were written");
 }

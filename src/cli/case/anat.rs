@@ -1,8 +1,8 @@
 //! Stage `anat`: both scans in MNI space, brain masks, labels, cavity, resected tissue.
 
 use super::registration::transforms;
-use super::scans::{GivenMask, given_mask};
-use super::{Case, Failure, Overrides, Reject, ScanSums, Scans, facts};
+use super::scans::GivenMask;
+use super::{Case, Failure, OwnMasks, Reject, ScanSums, Scans, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::ResectionVolumes;
@@ -15,10 +15,9 @@ use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, take_pair_apa
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
 const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
 const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";
@@ -107,37 +106,37 @@ pub fn anat_stage(
 pub fn anat(
     case: &Case,
     scans: &Scans,
-    overrides: &Overrides,
+    own: &OwnMasks,
     after: &Manifest,
     session: &Session,
 ) -> Result<(Manifest, AnatFacts), Failure> {
     let (mut stage, settings) = anat_stage(case, &scans.sums, after, session)?;
-    let mut given = |role: &str, path: &Option<PathBuf>| -> Result<Option<GivenMask>, Failure> {
-        let Some(path) = path else { return Ok(None) };
-        let (mask, bytes) = given_mask(path, scans, session)?;
-        stage = stage.clone().input(role, &bytes);
-        Ok(Some(mask))
-    };
-    let brain = given("brain mask", &overrides.brain_mask)?;
-    let ventricle = given("ventricle mask", &overrides.ventricle_mask)?;
-    let cavity = given("cavity mask", &overrides.cavity_mask)?;
-    let resected = given("resected mask", &overrides.resected_mask)?;
+    for (role, mask) in [
+        ("brain mask", &own.brain),
+        ("ventricle mask", &own.ventricle),
+        ("cavity mask", &own.cavity),
+        ("resected mask", &own.resected),
+    ] {
+        if let Some((_, bytes)) = mask {
+            stage = stage.input(role, bytes);
+        }
+    }
 
     case.run(&stage, "anat", || {
         let bar = session.progress(6, "images");
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let mni_from_post = pre_from_post.then(&mni_from_pre);
         let grid = atlas::template().grid();
-        let on_mni = |mask: &GivenMask| mask.on_mni(&grid, &mni_from_pre, &mni_from_post);
-        let on_pre = |mask: &GivenMask| match mask {
+        let on_mni = |(mask, _): &(GivenMask, Vec<u8>)| mask.on_mni(&grid, &mni_from_pre, &mni_from_post);
+        let on_pre = |(mask, _): &(GivenMask, Vec<u8>)| match mask {
             GivenMask::Pre(mask) => mask.clone(),
             GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
         };
         let given = GivenMasks {
-            brain: brain.as_ref().map(on_pre),
-            ventricle: ventricle.as_ref().map(on_pre),
-            cavity: cavity.as_ref().map(on_mni),
-            resected: resected.as_ref().map(on_mni),
+            brain: own.brain.as_ref().map(on_pre),
+            ventricle: own.ventricle.as_ref().map(on_pre),
+            cavity: own.cavity.as_ref().map(on_mni),
+            resected: own.resected.as_ref().map(on_mni),
         };
         let step = |what: &'static str| {
             bar.inc(1);
@@ -166,12 +165,12 @@ pub fn anat(
         write("anat/pre_space-native_desc-brain_mask.nii.gz", encode_mask(&before.brain));
         write("anat/pre_space-native_dseg.nii.gz", encode_u8(&before.labels));
         write("anat/post_space-native_desc-brain_mask.nii.gz", encode_mask(&after.brain));
-        let native_cavity = match &cavity {
-            Some(GivenMask::Post(mask)) => mask.clone(),
+        let native_cavity = match &own.cavity {
+            Some((GivenMask::Post(mask), _)) => mask.clone(),
             _ => mask_on(&found.cavity, &scans.post.grid, &mni_from_post),
         };
-        let native_resected = match &resected {
-            Some(GivenMask::Pre(mask)) => mask.clone(),
+        let native_resected = match &own.resected {
+            Some((GivenMask::Pre(mask), _)) => mask.clone(),
             _ => mask_on(&found.resected, &scans.pre.grid, &mni_from_pre),
         };
         write("anat/post_space-native_label-cavity_mask.nii.gz", encode_mask(&native_cavity));

@@ -17,7 +17,7 @@ pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_s
 pub use observed::{observed_surfaces, reference, reference_stage};
 pub use registration::{RegistrationFacts, mni_from_gravity_frame, registration, registration_stage};
 pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, sample_stage, samples};
-pub use scans::{Overrides, ScanSums, Scans};
+pub use scans::{Overrides, OwnMasks, ScanSums, Scans};
 
 use super::Session;
 use super::failure::{Failure, Reject};

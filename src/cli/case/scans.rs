@@ -83,7 +83,36 @@ impl Scans {
     }
 }
 
-/// A mask of the user's and its bytes, in the frame of the scan whose grid it has.
+/// The user's own masks with the bytes of their files.
+#[derive(Debug)]
+pub struct OwnMasks {
+    /// The brain.
+    pub brain: Option<(GivenMask, Vec<u8>)>,
+    /// Lateral and third ventricles.
+    pub ventricle: Option<(GivenMask, Vec<u8>)>,
+    /// The cavity.
+    pub cavity: Option<(GivenMask, Vec<u8>)>,
+    /// The resected tissue.
+    pub resected: Option<(GivenMask, Vec<u8>)>,
+}
+
+impl OwnMasks {
+    /// Reads those that were given. Comes before any stage: a mask that fits neither scan leaves nothing behind.
+    ///
+    /// # Errors
+    /// Rejected when one is on neither scan's grid, empty, or not a mask.
+    pub fn read(overrides: &Overrides, scans: &Scans, session: &Session) -> Result<Self, Failure> {
+        let read = |path: &Option<PathBuf>| path.as_deref().map(|path| given_mask(path, scans, session)).transpose();
+        Ok(Self {
+            brain: read(&overrides.brain_mask)?,
+            ventricle: read(&overrides.ventricle_mask)?,
+            cavity: read(&overrides.cavity_mask)?,
+            resected: read(&overrides.resected_mask)?,
+        })
+    }
+}
+
+/// A mask in the frame of the scan whose grid it has.
 #[derive(Debug)]
 pub enum GivenMask {
     /// On the pre-operative grid.
@@ -93,10 +122,7 @@ pub enum GivenMask {
 }
 
 /// Reads a mask and finds whose grid it is on.
-///
-/// # Errors
-/// Rejected when it is on neither grid, empty, or not a mask.
-pub fn given_mask(path: &Path, scans: &Scans, session: &Session) -> Result<(GivenMask, Vec<u8>), Failure> {
+fn given_mask(path: &Path, scans: &Scans, session: &Session) -> Result<(GivenMask, Vec<u8>), Failure> {
     // Half a voxel is what two programs may disagree about an origin; more is another grid.
     const TOLERANCE_MM: f64 = 0.1;
     let options: ReadOptions = session.settings("image")?;

@@ -3,6 +3,7 @@
 //! The template's brain gets a head, a random anatomy and two poses; the front of one temporal lobe is taken out and the
 //! brain sags. What is known exactly goes out beside the scans: the rigid transform, the masks, the displacement.
 
+mod enhancement;
 mod field;
 mod files;
 mod head;
@@ -12,13 +13,14 @@ mod sag_fem;
 mod scan;
 mod settings;
 
-pub use settings::{SagKind, SynthError, SynthSettings};
+pub use settings::{Contrast, SagKind, SynthError, SynthSettings};
 
 use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
+use enhancement::Enhancement;
 use field::Field;
 use head::{FLUID, Head};
 use nalgebra::{Point3, Vector3};
@@ -112,6 +114,8 @@ struct Anatomy {
     resection: Resection,
     sag: Option<Field>,
     content: Content,
+    enhancement: Option<Enhancement>,
+    contrast: Contrast,
 }
 
 /// What fills the cavity, by height against gravity in mm.
@@ -131,6 +135,17 @@ impl Anatomy {
         self.head.t1.trilinear(in_template(&self.warp, p)).map_or(0.0, f64::from)
     }
 
+    fn intensity_before(&self, p: Point3<f64>) -> f64 {
+        let native = self.intensity(p);
+        let Some(enhancement) = self.enhancement.as_ref().filter(|_| self.contrast.in_pre()) else { return native };
+        let q = in_template(&self.warp, p);
+        let tissue = match self.label(p) {
+            label::GREY_MATTER | label::WHITE_MATTER => enhancement.rim(native, p, self.resection.distance_mm(p)),
+            _ => native,
+        };
+        enhancement.at_skull(enhancement.in_brain(tissue, q), q)
+    }
+
     fn in_skull(&self, p: Point3<f64>) -> bool {
         self.head.skull_mm.trilinear(in_template(&self.warp, p)).is_some_and(|d| d < 0.0)
     }
@@ -141,14 +156,25 @@ impl Anatomy {
     }
 
     fn intensity_after(&self, x: Point3<f64>) -> f64 {
-        if !self.in_skull(x) {
-            return self.intensity(x);
-        }
+        let enhancement = self.enhancement.as_ref().filter(|_| self.contrast.in_post());
+        let native = if self.in_skull(x) { self.inside_skull_after(x, enhancement) } else { self.intensity(x) };
+        enhancement.map_or(native, |e| e.at_skull(native, in_template(&self.warp, x)))
+    }
+
+    fn inside_skull_after(&self, x: Point3<f64>, enhancement: Option<&Enhancement>) -> f64 {
         let p = self.before(x);
         let wall_mm = self.resection.distance_mm(p);
         let cavity = (0.5 - wall_mm).clamp(0.0, 1.0);
         // Where brain has left the skull's wall, fluid takes its place.
-        let tissue = |()| if self.in_skull(p) { self.intensity(p) } else { f64::from(FLUID) };
+        let tissue = |()| {
+            let native = if self.in_skull(p) { self.intensity(p) } else { f64::from(FLUID) };
+            let Some(enhancement) = enhancement else { return native };
+            let tissue = match self.label(p) {
+                label::GREY_MATTER | label::WHITE_MATTER => enhancement.bed(native, p, wall_mm),
+                _ => native,
+            };
+            enhancement.in_brain(tissue, in_template(&self.warp, p))
+        };
         match cavity {
             0.0 => tissue(()),
             1.0 => self.content.at(x, -wall_mm),
@@ -195,7 +221,7 @@ pub fn synthesize(settings: &SynthSettings) -> Result<SyntheticPatient, SynthErr
 
     let bias = |rng| Bias::new(rng, settings.bias_fraction);
     let noise = |n| (stream(n), settings.noise_fraction);
-    let pre = scan::scan(pre_grid, &patient_from_pre, |p| anatomy.intensity(p), &bias(pre_rng), noise(403));
+    let pre = scan::scan(pre_grid, &patient_from_pre, |p| anatomy.intensity_before(p), &bias(pre_rng), noise(403));
     let post = scan::scan(post_grid, &patient_from_post, |x| anatomy.intensity_after(x), &bias(post_rng), noise(404));
 
     // Label and displacement of what was at a voxel before the operation.
@@ -291,7 +317,8 @@ fn operate(settings: &SynthSettings) -> Result<Anatomy, SynthError> {
         SagKind::Fem => Some(sag_fem::by_finite_elements(&labels, &warp, &resection, settings)?),
     };
     let content = content(&resection, sag.as_ref(), settings);
-    Ok(Anatomy { head, warp, resection, sag, content })
+    let enhancement = (settings.contrast != Contrast::None).then(|| Enhancement::new(&head, settings.seed));
+    Ok(Anatomy { head, warp, resection, sag, content, enhancement, contrast: settings.contrast })
 }
 
 /// Levels of air and blood: a fifth of the cavity each.

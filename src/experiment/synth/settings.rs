@@ -16,6 +16,33 @@ pub enum SagKind {
     Fem,
 }
 
+/// Which scans were taken after gadolinium.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Contrast {
+    /// Neither.
+    #[default]
+    None,
+    /// The pre-operative one.
+    Pre,
+    /// The post-operative one.
+    Post,
+    /// Both.
+    Both,
+}
+
+impl Contrast {
+    /// Whether the pre-operative scan is enhanced.
+    pub fn in_pre(self) -> bool {
+        matches!(self, Self::Pre | Self::Both)
+    }
+
+    /// Whether the post-operative scan is enhanced.
+    pub fn in_post(self) -> bool {
+        matches!(self, Self::Post | Self::Both)
+    }
+}
+
 /// Everything that decides the bytes of a synthetic patient.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -58,6 +85,8 @@ pub struct SynthSettings {
     pub blood: bool,
     /// An air pocket in the cavity's highest part.
     pub air: bool,
+    /// Scans with gadolinium: bright vessels, sinuses, dura and plexus, a lesion's rim before and its bed after.
+    pub contrast: Contrast,
 }
 
 impl Default for SynthSettings {
@@ -82,6 +111,7 @@ impl Default for SynthSettings {
             effective_density_kg_per_m3: 300.0,
             blood: false,
             air: false,
+            contrast: Contrast::None,
         }
     }
 }

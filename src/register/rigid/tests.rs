@@ -68,6 +68,26 @@ fn the_same_image_twice_stays_where_it_is_on_any_number_of_threads() {
 }
 
 #[test]
+fn an_origin_a_metre_away_changes_nothing() {
+    let (head_from_pre, head_from_post) = known_motion();
+    let pre = scan(&ras(3.0, [105.0, 125.0, 112.0]), &head_from_pre, 1.0, 8);
+    let post = scan(&ras::<Post>(3.0, [110.0, 128.0, 115.0]), &head_from_post, 1.0, 9);
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], ..RigidSettings::default() };
+    let far = Matrix4::new_translation(&Vector3::new(900.0, -1200.0, 700.0));
+    let away =
+        Volume::from_data(Grid::<Post>::new(post.grid.dims, far * post.grid.mm_from_voxel).unwrap(), post.data.clone());
+    let at = |post| register_rigid(post, &pre, RigidMasks::default(), &settings).unwrap().fixed_from_moving;
+    let (near, found) = (at(&post), at(&away));
+    for corner in [[-80.0, -90.0, -60.0], [80.0, 90.0, 60.0]] {
+        let p = Point3::from(corner);
+        let apart = found
+            .apply(Position::from_point(far.transform_point(&p)))
+            .distance_mm(&near.apply(Position::from_point(p)));
+        assert!(apart < 0.01, "{apart} mm");
+    }
+}
+
+#[test]
 fn thick_oblique_cropped_slices_find_the_head() {
     let (head_from_pre, head_from_post) = known_motion();
     let pre = scan(&ras(2.0, [105.0, 125.0, 112.0]), &head_from_pre, 1.0, 3);
@@ -111,6 +131,22 @@ fn an_image_with_exchanged_sides_is_warned_of() {
     let fit = register_rigid(&flipped, &pre, RigidMasks::default(), &settings).unwrap();
     assert!(
         fit.warnings.iter().any(|w| matches!(w, FitWarning::MirrorFitsBetter { .. })),
+        "{:?} {:?}",
+        fit.warnings,
+        fit.quality
+    );
+}
+
+#[test]
+fn an_image_of_something_else_is_warned_of() {
+    let (head_from_pre, _) = known_motion();
+    let pre = scan(&ras(3.0, [105.0, 125.0, 112.0]), &head_from_pre, 1.0, 10);
+    let noise = |n: usize| super::super::sample::uniform(11, n as u64) as f32;
+    let other = Volume::from_fn(ras::<Post>(3.0, [105.0, 125.0, 112.0]), noise);
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], ..RigidSettings::default() };
+    let fit = register_rigid(&other, &pre, RigidMasks::default(), &settings).unwrap();
+    assert!(
+        fit.warnings.iter().any(|w| matches!(w, FitWarning::LowSimilarity { .. })),
         "{:?} {:?}",
         fit.warnings,
         fit.quality
