@@ -22,13 +22,15 @@ fn ball<F: Frame>(grid: Grid<F>, centre: Position<F>) -> Mask<F> {
     })
 }
 
-fn brain_centre() -> Position<Pre> {
+/// A point in the white matter of the right hemisphere, which was not operated on.
+fn in_white_matter() -> Position<Pre> {
     let bytes = std::fs::read(sample("truth/brain_pre.nii.gz")).unwrap();
     let (brain, _) = decode_mask(&bytes, "brain_pre.nii.gz", &ReadOptions::default()).unwrap();
     let inside = (0..brain.data.len()).filter(|&n| brain.data[n]);
     let sum: nalgebra::Vector3<f64> =
         inside.map(|n| brain.grid.position(Point3::from(brain.grid.voxel(n).map(|v| v as f64))).mm.coords).sum();
-    Position::from_point(Point3::from(sum / brain.count() as f64))
+    let middle = Point3::from(sum / brain.count() as f64);
+    Position::from_point(middle + nalgebra::Vector3::new(25.0, 0.0, 15.0))
 }
 
 fn prep(case: &Path, ventricles: &Path) {
@@ -48,7 +50,7 @@ fn ventricles(case: &Path) -> Mask<Pre> {
 fn slow_prep_without_mesh_leaves_images_and_masks_with_the_ventricles_given_in_either_grid() {
     let folder = tempfile::tempdir().unwrap();
     let (case, mask) = (folder.path().join("case"), folder.path().join("mine.nii.gz"));
-    let centre = brain_centre();
+    let centre = in_white_matter();
     let mine = ball(grid::<Pre>("pre.nii.gz"), centre);
     std::fs::write(&mask, encode_mask(&mine)).unwrap();
     prep(&case, &mask);

@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn gadolinium_brightens_the_scans_it_was_given_for_and_leaves_tissue_away_from_the_lesion_as_it_was() {
+    fn gadolinium_brightens_the_scan_it_was_given_for_and_leaves_tissue_away_from_the_lesion_as_it_was() {
         let at = |contrast| {
             let settings = SynthSettings {
                 spacing_mm: 2.0,
@@ -255,20 +255,20 @@ mod tests {
             };
             synthesize(&settings).unwrap()
         };
-        let (native, pre, post) = (at(Contrast::None), at(Contrast::Pre), at(Contrast::Post));
-        assert!(pre.post == native.post && post.pre == native.pre);
-        let far = crate::image::morphology::dilate(&native.resected_pre, 4.0);
+        let (native, pre) = (at(Contrast::None), at(Contrast::Pre));
+        assert!(pre.post == native.post, "only the scan that was asked for");
+        let near = crate::image::morphology::dilate(&native.resected_pre, 4.0);
         let (mut tissue, mut changed, mut brighter) = (0.0, 0.0, 0.0);
         for n in 0..native.pre.data.len() {
             let (a, b) = (native.pre.data[n], pre.pre.data[n]);
             brighter += f64::from(u8::from(b > a + 30)) * 0.008;
-            if matches!(native.tissue_pre.data[n], label::GREY_MATTER | label::WHITE_MATTER) && !far.data[n] {
+            if matches!(native.tissue_pre.data[n], label::GREY_MATTER | label::WHITE_MATTER) && !near.data[n] {
                 tissue += 1.0;
                 changed += f64::from(u8::from((b - a).abs() > 20));
             }
         }
-        // Sinuses, dura, vessels and plexus: tens of cc; of the tissue, what shares a voxel with them.
-        assert!((20.0..200.0).contains(&brighter), "{brighter} cc");
+        // Dura of 1 mm alone is some 200 cc; of the tissue only what shares a voxel with an enhancing structure changes.
+        assert!(brighter > 100.0, "{brighter} cc");
         assert!(changed < 0.05 * tissue, "{changed} of {tissue} voxels");
     }
 }
