@@ -100,7 +100,8 @@ pub fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFacts) {
 
 /// The estimate for a terminal.
 pub fn table(facts: &EstimateFacts) -> String {
-    let EstimateOutcome { posterior, noise_mm, residual_rms_mm, tangent_solves, limits, .. } = &facts.estimate;
+    let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
+        &facts.estimate;
     let mut text = String::from("parameter                            mode   95 % interval\n");
     for (n, name) in posterior.names.iter().enumerate() {
         let [low, high] = posterior.interval_95[n];
@@ -110,6 +111,9 @@ pub fn table(facts: &EstimateFacts) -> String {
         "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {:.1}\n",
         posterior.identifiability.condition
     );
+    if let Some(taken_out) = taken_out_rms_mm {
+        text += &format!("registration's own error, {taken_out:.3} mm, measured on the estimate and taken out\n");
+    }
     for limit in limits {
         text += &format!("limit: {limit}\n");
     }

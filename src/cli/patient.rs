@@ -1,7 +1,7 @@
 //! A prepared patient's case: what `run`, `sweep`, `reduce` and `estimate` share.
 
 use super::case::{
-    self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, PriorOptions, REST_MESH, SampleMode, Sweep,
+    self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, PriorOptions, REST_MESH, Sag, SampleMode, Sweep,
 };
 use super::estimate::with_estimate;
 use super::prep::Prepared;
@@ -14,10 +14,8 @@ use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::shard;
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
-use crate::geometry::Mni;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
-use crate::register::deformable::DisplacementField;
 use std::collections::BTreeMap;
 
 /// Settings by room, as `settings.toml` keeps them.
@@ -43,8 +41,6 @@ pub struct Patient {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
-    /// Where the images say the brain has gone.
-    sag: DisplacementField<Mni>,
 }
 
 impl Patient {
@@ -59,7 +55,7 @@ impl Patient {
         let surfaces = case::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces).reject()?);
         let scenario = settings.scenario(&case::mni_from_gravity_frame(case, settings.gravity_frame)?);
-        Ok(Self { case: case.clone(), prepared, settings, scenario, mesh, mesh_bytes, reference, sag: anatomy.sag })
+        Ok(Self { case: case.clone(), prepared, settings, scenario, mesh, mesh_bytes, reference })
     }
 
     /// A case that `hgm prep` or `hgm run` has made, with the settings it was made with.
@@ -151,6 +147,7 @@ impl Patient {
         earlier: Option<ExperimentOutcome>,
         session: &Session,
     ) -> Result<(ExperimentOutcome, EstimateFacts, String), Failure> {
+        let sag = Sag::read(&self.case, Anatomy::read(&self.case)?, session)?;
         let input = EstimateInput {
             mesh: (&self.mesh, &self.mesh_bytes),
             scenario: &self.scenario,
@@ -158,7 +155,7 @@ impl Patient {
             poisson_ratio: self.settings.poisson_ratio,
             reference: &self.reference,
             after: &self.prepared.manifests[3],
-            sag: Some(&self.sag),
+            sag: Some(&sag),
             noise_mm: self.floor().combined_mm().unwrap_or(options.descent.noise_mm),
         };
         let (manifest, facts) = case::estimate(&self.case, &input, options, session)?;

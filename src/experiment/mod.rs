@@ -9,5 +9,6 @@ pub mod resection;
 pub mod rmse;
 pub mod sample;
 pub mod smooth_noise;
+pub mod spread;
 pub mod sweep;
 pub mod synth;

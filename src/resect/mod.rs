@@ -4,7 +4,9 @@ mod blood;
 mod cavity;
 mod intensity;
 mod pair;
+mod sag;
 
 pub use cavity::{CavityFinding, CavityPair, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
 pub use intensity::on_the_scale_of;
 pub use pair::{GivenMasks, OperatedBrain, PairError, PairSettings, take_pair_apart};
+pub use sag::{SagScans, fit_sag, moved_scan};

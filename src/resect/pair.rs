@@ -2,14 +2,14 @@
 
 use super::blood::{SaggedPair, with_blood};
 use super::cavity::both;
+use super::sag::{SagScans, fit_sag};
 use super::{
     CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, find_cavity, on_the_scale_of, subtract,
 };
 use crate::geometry::{Mni, Post, Pre, RigidTransform};
-use crate::image::morphology::dilate;
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
-use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
+use crate::register::deformable::{AtlasFit, DeformableSettings};
 use crate::segment::{
     HeadError, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, label, segment_head,
     segment_with_priors,
@@ -156,8 +156,15 @@ pub fn take_pair_apart(
     };
 
     step("sag");
-    let sag = fitted_sag(&before, &post_t1, &post_on_mni.inside, &finding.cavity, &settings.sag)
-        .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
+    let scans = SagScans {
+        pre: &before.t1_mni,
+        pre_brain: &before.brain_mni,
+        post: &post_t1,
+        post_known: &post_on_mni.inside,
+        cavity: &finding.cavity,
+    };
+    let sag =
+        fit_sag(&scans, &settings.sag).map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -202,26 +209,6 @@ const NEAR_MM: f64 = 25.0;
 fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {
     let whole = VoxelBox { first: [0; 3], end: mask.grid.dims };
     mask.bounding_box().map_or(whole, |found| found.grown(&mask.grid, margin_mm))
-}
-
-/// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
-const RIM_MM: f64 = 3.0;
-
-/// The pre-operative brain deformed onto the post-operative one around the cavity. Both lie on one grid.
-fn fitted_sag(
-    before: &Segmentation<Pre>,
-    post: &Volume<f32, Mni>,
-    known: &Mask<Mni>,
-    cavity: &Mask<Mni>,
-    settings: &DeformableSettings,
-) -> Result<AtlasFit<Mni>, DeformableError> {
-    // The rim of skull and scalp, which does not move, holds the map at the brain's surface.
-    let near = dilate(&before.brain_mni, RIM_MM);
-    let pre = before.t1_mni.data.iter().zip(&near.data).map(|(t1, near)| if *near { t1.max(1e-3) } else { 0.0 });
-    let post = post.data.iter().zip(&known.data).map(|(t1, known)| if *known { *t1 } else { f32::NAN });
-    let (pre, post) = (Volume::from_data(near.grid, pre.collect()), Volume::from_data(near.grid, post.collect()));
-    // The cavity's own edge is nowhere on the pre-operative scan.
-    fit_atlas(&post, &pre, Some(&dilate(cavity, 1.5)), settings)
 }
 
 /// The tissue that filled the cavity: what lies there once the sag is undone.

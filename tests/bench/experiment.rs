@@ -146,6 +146,7 @@ fn estimated(
         independent_share: 1.0,
         model_log_sd: 0.0,
         start,
+        instrument: None,
     };
     solve_problem(problem, &EstimateSettings { noise_mm, ..EstimateSettings::default() }).unwrap()
 }

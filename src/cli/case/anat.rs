@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 4;
+/// The pre-operative scan and its brain.
+pub const PRE_T1: &str = "anat/pre_space-MNI_T1w.nii.gz";
+pub const PRE_BRAIN: &str = "anat/pre_space-MNI_desc-brain_mask.nii.gz";
 const PRE_DSEG: &str = "anat/pre_space-MNI_dseg.nii.gz";
 const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
 const RESECTED: &str = "anat/pre_space-MNI_label-resected_mask.nii.gz";
@@ -152,9 +155,9 @@ pub fn anat(
         let pre_t1 = resample(&scans.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
         let post_t1 =
             resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        write("anat/pre_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&pre_t1.volume)));
+        write(PRE_T1, encode_i16(&whole_numbers(&pre_t1.volume)));
         write("anat/post_space-MNI_T1w.nii.gz", encode_i16(&whole_numbers(&post_t1.volume)));
-        write("anat/pre_space-MNI_desc-brain_mask.nii.gz", encode_mask(&before.brain_mni));
+        write(PRE_BRAIN, encode_mask(&before.brain_mni));
         write("anat/post_space-MNI_desc-brain_mask.nii.gz", encode_mask(&post_brain));
         write(PRE_DSEG, encode_u8(&before.labels_mni));
         write(CAVITY, encode_mask(&found.cavity));

@@ -1,11 +1,11 @@
 //! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
 
-use super::{Case, Failure, Reject, facts};
+use super::{Case, Failure, Reject, Sag, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::estimate::{
-    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, LogPrior, Observation, Problem, Turn, Unknown,
-    solve_problem,
+    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
+    Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::phantom::neo_hookean;
@@ -13,14 +13,13 @@ use crate::experiment::prior::{PriorSettings, log_prior};
 use crate::experiment::sample::{Sample, Tissue};
 use crate::experiment::sweep::Reference;
 use crate::fem::{ElementKind, Loads, Scenario};
-use crate::geometry::{Frame, Mni, Position};
+use crate::geometry::{Frame, Mni};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
-use crate::register::deformable::DisplacementField;
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Name of the estimate among the samples.
 pub const ESTIMATE: &str = "estimate";
 /// Its numbers.
@@ -131,8 +130,8 @@ pub struct EstimateInput<'a> {
     pub reference: &'a Reference,
     /// The manifest of the stage that made the reference.
     pub after: &'a Manifest,
-    /// The displacement the images show, where there are images.
-    pub sag: Option<&'a DisplacementField<Mni>>,
+    /// What the images show of the displacement, where there are images.
+    pub sag: Option<&'a Sag>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
 }
@@ -166,7 +165,7 @@ pub fn estimate(
         .after(input.after)
         .frame(Mni::NAME);
     case.run(&stage, ESTIMATE, || {
-        let bar = session.progress(1, "estimate");
+        let bar = &session.progress(1, "estimate");
         let mesh = input.mesh.0;
         let mut unknowns = Vec::new();
         for tissue in input.tissues {
@@ -179,6 +178,14 @@ pub fn estimate(
             scenario.solver.element = options.element;
         }
         let (observation, independent_share, noise_mm) = observation(input, options);
+        let believed = &options.displacement;
+        let instrument = input.sag.filter(|_| options.observed == Observed::Displacement).map(|sag| {
+            move |known: &[[f64; 3]]| {
+                bar.set_message("registering the estimate");
+                let shown = sag.registration().sees(mesh, known, &sag.seen)?;
+                Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
+            }
+        });
         let problem = Problem {
             mesh,
             template: &scenario,
@@ -188,6 +195,7 @@ pub fn estimate(
             independent_share,
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             start: Vec::new(),
+            instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         let found = solve_problem(problem, &settings).reject()?;
@@ -204,12 +212,8 @@ fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observa
             (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0, input.noise_mm)
         }
         (Reference::Surfaces(_), Some(sag)) if options.observed == Observed::Displacement => {
-            let seen = |x: [f64; 3]| {
-                let x = Position::new(x[0], x[1], x[2]);
-                (sag.apply(x).mm - x.mm).into()
-            };
             let believed = &options.displacement;
-            let nodes = believed.observed(mesh, seen);
+            let nodes = believed.observed(mesh, |x| moved_by(&sag.seen, x));
             (Observation::Nodes(nodes), believed.independent_share(mesh), believed.noise_mm)
         }
         (Reference::Surfaces(surfaces), _) => {

@@ -8,6 +8,7 @@ mod estimate;
 mod mesh;
 mod observed;
 mod registration;
+mod sag;
 mod samples;
 mod scans;
 
@@ -16,6 +17,7 @@ pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, esti
 pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_stage, programs};
 pub use observed::{observed_surfaces, reference, reference_stage};
 pub use registration::{RegistrationFacts, mni_from_gravity_frame, registration, registration_stage};
+pub use sag::Sag;
 pub use samples::{PriorOptions, SampleMode, Sweep, rest_mesh, sample_stage, samples};
 pub use scans::{Overrides, OwnMasks, ScanSums, Scans};
 

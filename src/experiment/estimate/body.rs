@@ -150,6 +150,19 @@ impl<'a> Body<'a> {
         })
     }
 
+    /// Nodes observed with their displacement (mm); none where surfaces are observed.
+    pub(super) fn observed_nodes(&self) -> &[(u32, [f64; 3])] {
+        match &self.observation {
+            Observation::Nodes(nodes) => nodes,
+            Observation::Surfaces(_) => &[],
+        }
+    }
+
+    /// Compares with another observation from now on.
+    pub(super) fn observe(&mut self, observation: Observation) {
+        self.observation = observation;
+    }
+
     /// The scenario's loads with these parameters.
     fn loads(&self, parameters: &[f64]) -> Loads {
         let mut loads = self.template.loads.clone();

@@ -9,6 +9,7 @@ mod displacement;
 mod levenberg_marquardt;
 mod outcome;
 mod posterior;
+mod re_registration;
 
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown};
 pub use displacement::DisplacementSettings;
@@ -17,6 +18,7 @@ pub use levenberg_marquardt::{
 };
 pub use outcome::{Estimate, EstimateOutcome, Problem, ProblemError, solve_problem};
 pub use posterior::{Identifiability, Posterior, Verdict, laplace};
+pub use re_registration::{Instrument, ReRegistration, moved_by};
 
 use serde::{Deserialize, Serialize};
 

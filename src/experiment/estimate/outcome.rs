@@ -1,10 +1,12 @@
 //! From a posed problem to the estimate that is reported.
 
 use super::body::{Body, BodyError, Observation, Solved, Unknown};
+use super::re_registration::{Instrument, without_own_error};
 use super::{Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Verdict, estimate, laplace};
 use crate::experiment::rmse::root_mean_square;
 use crate::fem::{Outcome, Scenario};
 use crate::mesh::TetMesh;
+use crate::register::deformable::DeformableError;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -26,6 +28,8 @@ pub struct Problem<'a> {
     pub model_log_sd: f64,
     /// Where to start; the prior's mean when empty.
     pub start: Vec<f64>,
+    /// The measurement behind nodes' displacements, where its own error is to be taken out, and how many times.
+    pub instrument: Option<(&'a Instrument<'a>, usize)>,
 }
 
 /// The estimate as tables, JSON and the page show it.
@@ -47,6 +51,9 @@ pub struct EstimateOutcome {
     pub noise_mm: f64,
     /// Root mean square of the residuals at the estimate, mm.
     pub residual_rms_mm: f64,
+    /// Root mean square of the measurement's own error that was taken out of one observation, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken_out_rms_mm: Option<f64>,
     /// How the descent ended.
     pub convergence: Convergence,
     /// Equilibria solved.
@@ -79,6 +86,9 @@ pub enum ProblemError {
     /// The descent cannot start.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// The estimate's state cannot be registered.
+    #[error("the estimate's state, registered like the post-operative scan: {0}")]
+    Instrument(#[from] DeformableError),
 }
 
 /// Finds the most probable parameters and how sure they are.
@@ -98,7 +108,19 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let share = problem.independent_share.clamp(1e-9, 1.0);
     // Neighbours share their error: together they weigh as much as the independent ones alone.
     let descent_settings = EstimateSettings { noise_mm: settings.noise_mm / share.sqrt(), ..settings.clone() };
-    let descent = estimate(&mut body, &prior, &start, &descent_settings)?;
+    let mut descent = estimate(&mut body, &prior, &start, &descent_settings)?;
+    let seen = body.observed_nodes().to_vec();
+    let mut taken_out_rms_mm = None;
+    let (instrument, times) = problem.instrument.unzip();
+    for instrument in instrument.into_iter().cycle().take(times.unwrap_or(0)) {
+        let known = body.solve(&descent.log_parameters)?.outcome.displacement_mm;
+        let corrected = without_own_error(&seen, &known, instrument)?;
+        let pairs = seen.iter().zip(&corrected);
+        let taken_out: Vec<f64> = pairs.flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect();
+        taken_out_rms_mm = root_mean_square(&taken_out);
+        body.observe(Observation::Nodes(corrected));
+        descent = estimate(&mut body, &prior, &descent.log_parameters, &descent_settings)?;
+    }
     let residual_rms_mm = root_mean_square(descent.linearisation.residuals_mm.as_slice()).unwrap_or(0.0);
     // What the model cannot explain is noise to it: a misfit above the measurement's widens the intervals.
     let noise_mm = settings.noise_mm.max(residual_rms_mm);
@@ -113,6 +135,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         independent_observations: share * descent.linearisation.residuals_mm.len() as f64,
         noise_mm,
         residual_rms_mm,
+        taken_out_rms_mm,
         convergence: descent.convergence,
         solves: body.solves,
         tangent_solves: body.tangent_solves,
@@ -205,6 +228,7 @@ mod tests {
             independent_share: 1.0,
             model_log_sd: 0.0,
             start: vec![2299f64.ln(), 1195f64.ln()],
+            instrument: None,
         }
     }
 
@@ -286,6 +310,30 @@ mod tests {
             found.mode
         );
         assert!(found.interval_95[2][0] < degrees[1] && degrees[1] < found.interval_95[2][1]);
+    }
+
+    /// An instrument that sees a tenth too little on one axis and adds a drift.
+    #[test]
+    fn an_instruments_own_error_does_not_reach_the_moduli() {
+        let (mesh, scenario, observed) = phantom(4);
+        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, DeformableError> {
+            let drift = |n: usize| 0.002 * mesh.nodes_mm()[n][0];
+            Ok(u.iter().enumerate().map(|(n, u)| (n as u32, [u[0], u[1] + drift(n), 0.9 * u[2]])).collect())
+        };
+        let truth: Vec<[f64; 3]> = observed.iter().map(|(_, u)| *u).collect();
+        let noise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        let off = |times| {
+            let seen = shown(&truth).unwrap();
+            let posed = Problem { instrument: Some((&shown, times)), ..problem(&mesh, &scenario, seen) };
+            let found = solve_problem(posed, &noise).unwrap().outcome;
+            let mode = &found.posterior.mode;
+            (f64::max((mode[0] / 1370.0).ln().abs(), (mode[1] / 990.0).ln().abs()), found.taken_out_rms_mm)
+        };
+        let [(plain, none), (once, some), (four, _)] = [off(0), off(1), off(4)];
+        assert!(none.is_none() && some.is_some());
+        assert!(plain > 0.03, "{plain}");
+        // Each round leaves the instrument's error on the change only: a tenth of what was left.
+        assert!(once < 0.3 * plain && four < 1e-3, "{plain} {once} {four}");
     }
 
     #[test]

@@ -14,6 +14,11 @@ pub struct Field {
 }
 
 impl Field {
+    /// The field with these displacements (mm) at the nodes of a grid.
+    pub fn of(mm: Volume<[f64; 3], Patient>) -> Self {
+        Self { mm }
+    }
+
     /// The field of a function of position, sampled on `grid`.
     pub fn sampled(grid: Grid<Patient>, at: impl Fn(Point3<f64>) -> Vector3<f64> + Sync) -> Self {
         let value = |n: usize| at(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm).into();

@@ -43,6 +43,13 @@ pub fn section(estimate: &EstimateOutcome) -> String {
         estimate.solves,
         estimate.tangent_solves
     );
+    if let Some(taken_out) = estimate.taken_out_rms_mm {
+        let _ = write!(
+            html,
+            "<p>The registration's own error, {} mm, was measured on the estimate's state and taken out of what it saw.</p>",
+            number(taken_out, 3)
+        );
+    }
     let panel = &posterior.identifiability;
     if posterior.names.len() > 1 {
         let direction: Vec<String> = posterior

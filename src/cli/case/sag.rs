@@ -1,0 +1,75 @@
+//! The registration behind the displacement of a patient's brain, with the images it looked at, as a case's files hold them.
+
+use super::anat::{PRE_BRAIN, PRE_T1};
+use super::registration::transforms;
+use super::{Anatomy, Case, Failure, Reject};
+use crate::cli::Session;
+use crate::experiment::estimate::ReRegistration;
+use crate::geometry::{Mni, Post};
+use crate::image::nifti::{self, ReadOptions};
+use crate::image::resample::{Interpolation, resample};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::register::deformable::{DeformableSettings, DisplacementField};
+use crate::resect::PairSettings;
+use crate::segment::label;
+
+/// A mask on the post-operative scan's own grid: what tells how far that scan looked.
+const POST_BRAIN: &str = "anat/post_space-native_desc-brain_mask.nii.gz";
+
+/// What a patient's scans show of the sag, and what it takes to show the registration another one.
+#[derive(Debug)]
+pub struct Sag {
+    /// Where the brain has moved to, around the cavity.
+    pub seen: DisplacementField<Mni>,
+    pre: Volume<f32, Mni>,
+    pre_brain: Mask<Mni>,
+    post_known: Mask<Mni>,
+    cavity: Mask<Mni>,
+    fluid: f32,
+    settings: DeformableSettings,
+}
+
+impl Sag {
+    /// Reads the images of a case.
+    ///
+    /// # Errors
+    /// Rejected when a file is missing or damaged.
+    pub fn read(case: &Case, anatomy: Anatomy, session: &Session) -> Result<Self, Failure> {
+        let options = ReadOptions::default();
+        let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_T1)?, PRE_T1, &options).reject()?.volume.relabelled();
+        let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options).reject()?;
+        let (on_post, _) = nifti::decode_mask(&case.read(POST_BRAIN)?, POST_BRAIN, &options).reject()?;
+        let on_post: Volume<f32, Post> = on_post.map(f32::from).relabelled();
+        let (pre_from_post, mni_from_pre) = transforms(case)?;
+        let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
+        let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
+        let pair: PairSettings = case.settings_of("anat", session)?;
+        Ok(Self {
+            fluid: mean_in_ventricle(&pre, &anatomy.labels),
+            pre,
+            pre_brain: pre_brain.relabelled(),
+            post_known,
+            seen: anatomy.sag,
+            cavity: anatomy.cavity,
+            settings: pair.sag,
+        })
+    }
+
+    /// The registration, to be shown a displacement that is known.
+    pub fn registration(&self) -> ReRegistration<'_> {
+        ReRegistration {
+            pre: &self.pre,
+            pre_brain: &self.pre_brain,
+            post_known: &self.post_known,
+            cavity: &self.cavity,
+            fluid: self.fluid,
+            settings: &self.settings,
+        }
+    }
+}
+
+fn mean_in_ventricle(t1: &Volume<f32, Mni>, labels: &LabelMap<Mni>) -> f32 {
+    let inside = t1.data.iter().zip(&labels.data).filter(|(_, l)| **l == label::VENTRICLE);
+    let (sum, count) = inside.fold((0.0, 0.0), |(s, c), (t1, _)| (s + f64::from(*t1), c + 1.0));
+    (sum / f64::max(count, 1.0)) as f32
+}

@@ -1,0 +1,94 @@
+//! What the registration makes of a displacement that is known: its own error, taken out of what it has seen.
+//!
+//! A deformable registration smooths. On synthetic patients its displacement in the depth of the brain lay within .19 to
+//! .25 mm of the truth, and that little made white matter 16 to 28 % too stiff: strains were too small. So the estimate's
+//! own state is shown to the registration: the pre-operative scan, moved as the solver says, is registered like the
+//! post-operative one, and what comes out besides the known displacement is taken from what the patient's scans showed
+//! (indirect inference: Gourieroux, Monfort and Renault, Journal of Applied Econometrics 8, 1993). Then the estimate is
+//! found again.
+
+use crate::experiment::spread::on_grid;
+use crate::geometry::{Mni, Position};
+use crate::image::{Mask, Volume};
+use crate::mesh::TetMesh;
+use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
+use crate::resect::{SagScans, fit_sag, moved_scan};
+use nalgebra::Vector3;
+
+/// What a measurement shows of nodes that have moved by a known displacement: all nodes' displacement in, the observed
+/// nodes' out, mm.
+pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<(u32, [f64; 3])>, DeformableError> + 'a;
+
+/// What was seen, without what the instrument adds to a displacement that is known.
+///
+/// # Errors
+/// The instrument's.
+pub fn without_own_error(
+    seen: &[(u32, [f64; 3])],
+    known_mm: &[[f64; 3]],
+    instrument: &Instrument<'_>,
+) -> Result<Vec<(u32, [f64; 3])>, DeformableError> {
+    let shown = instrument(known_mm)?;
+    let corrected = |(&(n, seen), (m, shown)): (&(u32, [f64; 3]), &(u32, [f64; 3]))| {
+        assert_eq!(n, *m, "an instrument shows the nodes that were seen, in their order");
+        let known = known_mm[n as usize];
+        (n, [0, 1, 2].map(|a| seen[a] - (shown[a] - known[a])))
+    };
+    Ok(seen.iter().zip(&shown).map(corrected).collect())
+}
+
+/// The registration of a patient's scans as an instrument. All images lie on one grid in the MNI frame reached rigidly.
+#[derive(Clone, Copy, Debug)]
+pub struct ReRegistration<'a> {
+    /// Pre-operative intensities.
+    pub pre: &'a Volume<f32, Mni>,
+    /// Brain on the pre-operative scan.
+    pub pre_brain: &'a Mask<Mni>,
+    /// Where the post-operative scan looked.
+    pub post_known: &'a Mask<Mni>,
+    /// The cavity on the post-operative scan.
+    pub cavity: &'a Mask<Mni>,
+    /// Intensity of fluid on the pre-operative scan.
+    pub fluid: f32,
+    /// The registration.
+    pub settings: &'a DeformableSettings,
+}
+
+impl ReRegistration<'_> {
+    /// The displacement that the registration sees when the nodes of `mesh` have moved by `displacement_mm`; `like` is a
+    /// displacement on the registration's grid.
+    ///
+    /// # Errors
+    /// [`DeformableError`] when too little of the brain is known.
+    pub fn sees(
+        &self,
+        mesh: &TetMesh,
+        displacement_mm: &[[f64; 3]],
+        like: &DisplacementField<Mni>,
+    ) -> Result<DisplacementField<Mni>, DeformableError> {
+        let moved: Vec<[f64; 3]> = mesh
+            .nodes_mm()
+            .iter()
+            .zip(displacement_mm)
+            .map(|(x, u)| (Vector3::from(*x) + Vector3::from(*u)).into())
+            .collect();
+        let back: Vec<[f64; 3]> = displacement_mm.iter().map(|u| u.map(|v| -v)).collect();
+        let back = on_grid(mesh.tets(), &moved, &back, like.grid());
+        let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
+        let post = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
+        let scans = SagScans {
+            pre: self.pre,
+            pre_brain: self.pre_brain,
+            post: &post,
+            post_known: self.post_known,
+            cavity: self.cavity,
+        };
+        Ok(fit_sag(&scans, self.settings)?.subject_from_atlas)
+    }
+}
+
+/// How far a point moves, mm.
+pub fn moved_by(field: &DisplacementField<Mni>, x: [f64; 3]) -> [f64; 3] {
+    let x = Position::new(x[0], x[1], x[2]);
+    (field.apply(x).mm - x.mm).into()
+}
