@@ -34,6 +34,9 @@ pub struct EstimateSettings {
     pub noise_mm: f64,
     /// Stop when no log-parameter moves more than this.
     pub step_tolerance: f64,
+    /// Stop when the way left to the minimum is below this share of the posterior's standard deviation (the Newton
+    /// decrement): closer than that nothing is known, and the residuals' own rounding ends the descent late.
+    pub decrement_tolerance: f64,
     /// Most iterations.
     pub iterations: usize,
     /// Longest step of a log-parameter: a factor e^1 in one go is as far as a linearisation carries.
@@ -42,7 +45,7 @@ pub struct EstimateSettings {
 
 impl Default for EstimateSettings {
     fn default() -> Self {
-        Self { noise_mm: 0.5, step_tolerance: 1e-6, iterations: 30, longest_step: 1.0 }
+        Self { noise_mm: 0.5, step_tolerance: 1e-6, decrement_tolerance: 1e-4, iterations: 30, longest_step: 1.0 }
     }
 }
 
@@ -50,7 +53,7 @@ impl Default for EstimateSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Convergence {
-    /// The last step was below the tolerance.
+    /// The last step was below a tolerance.
     StepBelowTolerance,
     /// No step, however short, lowered the cost: the residuals' own precision is reached.
     NoDescent,
@@ -134,11 +137,14 @@ pub fn estimate<M: Forward>(
                 continue;
             };
             let mut step = -factor.solve(&gradient);
+            let decrement = (-step.dot(&gradient)).max(0.0).sqrt();
             let longest = step.amax();
             if longest > settings.longest_step {
                 step *= settings.longest_step / longest;
             }
-            if step.amax() < settings.step_tolerance {
+            // A damped step is short without being at the minimum.
+            let arrived = damping <= 1e-3 && decrement < settings.decrement_tolerance;
+            if arrived || step.amax() < settings.step_tolerance {
                 convergence = Convergence::StepBelowTolerance;
                 break 'descent;
             }
@@ -207,6 +213,23 @@ mod tests {
             assert!((descent.log_parameters[p] - truth[p]).abs() < 1e-6);
         }
         assert!(descent.costs.windows(2).all(|w| w[1] < w[0]), "the cost falls at every accepted step");
+    }
+
+    #[test]
+    fn a_descent_ends_where_the_posterior_knows_no_better() {
+        let truth = [1.3, 0.4];
+        let run = |decrement_tolerance| {
+            let mut model = Compliance { observed: simulate(&truth) };
+            let settings = EstimateSettings { noise_mm: 0.1, decrement_tolerance, ..EstimateSettings::default() };
+            estimate(&mut model, &no_prior(), &[3.0, -1.0], &settings).unwrap()
+        };
+        let (fine, rough) = (run(0.0), run(0.1));
+        assert!(rough.evaluations < fine.evaluations, "{} {}", rough.evaluations, fine.evaluations);
+        // Distance to the minimum in standard deviations of the posterior.
+        let jt = fine.linearisation.jacobian_mm.transpose();
+        let information = &jt * &fine.linearisation.jacobian_mm / 0.01;
+        let away = DVector::from_fn(2, |p, _| rough.log_parameters[p] - fine.log_parameters[p]);
+        assert!(away.dot(&(&information * &away)).sqrt() < 0.12);
     }
 
     #[test]
