@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn gadolinium_brightens_the_scan_it_was_given_for_and_leaves_tissue_away_from_the_lesion_as_it_was() {
+    fn slow_gadolinium_brightens_the_scan_it_was_given_for_and_leaves_tissue_away_from_the_lesion_as_it_was() {
         let at = |contrast| {
             let settings = SynthSettings {
                 spacing_mm: 2.0,
