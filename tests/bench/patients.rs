@@ -64,9 +64,12 @@ impl Row {
         );
         std::fs::write(&settings, load).unwrap();
         let (pre, post) = (at(&scans.join("pre.nii.gz")), at(&scans.join("post.nii.gz")));
+        // The patient before must not answer for this one.
+        std::fs::remove_dir_all(&case).ok();
         let run = run_hgm(&["run", "-q", "--force", &pre, &post, "--estimate", "--config", &config, "-o", &at(&case)]);
         let outcome = std::fs::read_to_string(case.join("sim/outcome.json")).unwrap_or_default();
-        let Ok(outcome) = ExperimentOutcome::from_json(&outcome, "outcome.json") else {
+        let outcome = ExperimentOutcome::from_json(&outcome, "outcome.json").ok().filter(|_| run.ok);
+        let Some(outcome) = outcome else {
             println!("patient {seed}: the run failed");
             return None;
         };
