@@ -23,7 +23,7 @@ pub struct DisplacementSettings {
     /// Nodes nearer to each other than this share their error, mm: they count as one.
     pub correlation_mm: f64,
     /// How many times the registration's own error is measured on the estimate's state and taken out. A second time moves
-    /// moduli by less than 3 %.
+    /// moduli by less than 4 %.
     pub re_registrations: usize,
 }
 
