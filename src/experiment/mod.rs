@@ -1,6 +1,7 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
 pub mod estimate;
+pub mod nodal_field;
 pub mod observed;
 pub mod outcome;
 pub mod phantom;
@@ -9,6 +10,5 @@ pub mod resection;
 pub mod rmse;
 pub mod sample;
 pub mod smooth_noise;
-pub mod spread;
 pub mod sweep;
 pub mod synth;

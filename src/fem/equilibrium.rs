@@ -98,7 +98,7 @@ impl Model {
             }
         }
 
-        let from_rest = self.from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
+        let from_rest = self.solve_from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
         let (u, forces) = match (from_rest, doubtful) {
             (Ok(u), Some((.., lower))) if self.body.energy(&u, &laws) - work(&u) < lower => (u, forces),
             (_, Some((u, forces, relative_residual, _))) => {
@@ -111,7 +111,7 @@ impl Model {
     }
 
     /// Equilibrium from rest, in load steps; `forces` become its internal forces.
-    fn from_rest(
+    fn solve_from_rest(
         &self,
         laws: &Laws,
         load_scale: f64,

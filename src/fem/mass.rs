@@ -101,14 +101,20 @@ impl Mass {
     pub(super) fn plus(&self, factor: f64, mut tangent: Tangent, stiffness_factor: f64) -> Tangent {
         by_rows(&mut tangent.matrix.blocks, |first, blocks| {
             for (block, m) in blocks.iter_mut().zip(&self.blocks[first..]) {
-                block.iter_mut().for_each(|v| *v *= stiffness_factor);
-                [0, 4, 8].into_iter().for_each(|i| block[i] += factor * m);
+                for v in block.iter_mut() {
+                    *v *= stiffness_factor;
+                }
+                for i in [0, 4, 8] {
+                    block[i] += factor * m;
+                }
             }
             []
         });
         if let Some(nodal) = &mut tangent.nodal {
             by_rows(&mut nodal.moduli, |_, moduli| {
-                moduli.as_flattened_mut().iter_mut().for_each(|v| *v *= stiffness_factor);
+                for v in moduli.as_flattened_mut() {
+                    *v *= stiffness_factor;
+                }
                 []
             });
         }

@@ -113,19 +113,21 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let descent_settings = EstimateSettings { noise_mm: settings.noise_mm / share.sqrt(), ..settings.clone() };
     // A state that the instrument is shown need not be the best one.
     let rough = EstimateSettings { decrement_tolerance: ROUGH, ..descent_settings.clone() };
-    let rounds = problem.instrument.map_or(0, |(_, times)| times);
-    let mut descent = estimate(&mut body, &prior, &start, if rounds > 0 { &rough } else { &descent_settings })?;
-    let seen = body.observed_nodes().to_vec();
+    let first = if problem.instrument.is_some_and(|(_, rounds)| rounds > 0) { &rough } else { &descent_settings };
+    let mut descent = estimate(&mut body, &prior, &start, first)?;
     let mut taken_out_rms_mm = None;
-    for (round, (instrument, _)) in (1..=rounds).zip(problem.instrument.into_iter().cycle()) {
-        let known = body.solve(&descent.log_parameters)?.outcome.displacement_mm;
-        let corrected = without_own_error(&seen, &known, instrument)?;
-        let pairs = seen.iter().zip(&corrected);
-        let taken_out: Vec<f64> = pairs.flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect();
-        taken_out_rms_mm = root_mean_square(&taken_out);
-        body.observe(Observation::Nodes(corrected));
-        let settings = if round < rounds { &rough } else { &descent_settings };
-        descent = estimate(&mut body, &prior, &descent.log_parameters, settings)?;
+    if let Some((instrument, rounds)) = problem.instrument {
+        let seen = body.observed_nodes().to_vec();
+        for round in 1..=rounds {
+            let known = body.solve(&descent.log_parameters)?.outcome.displacement_mm;
+            let corrected = without_own_error(&seen, &known, instrument)?;
+            let pairs = seen.iter().zip(&corrected);
+            let taken_out: Vec<f64> = pairs.flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect();
+            taken_out_rms_mm = root_mean_square(&taken_out);
+            body.observe(Observation::Nodes(corrected));
+            let settings = if round < rounds { &rough } else { &descent_settings };
+            descent = estimate(&mut body, &prior, &descent.log_parameters, settings)?;
+        }
     }
     let residual_rms_mm = root_mean_square(descent.linearisation.residuals_mm.as_slice()).unwrap_or(0.0);
     // What the model cannot explain is noise to it: a misfit above the measurement's widens the intervals.

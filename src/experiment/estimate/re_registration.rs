@@ -7,7 +7,7 @@
 //! (indirect inference: Gourieroux, Monfort and Renault, Journal of Applied Econometrics 8, 1993). Then the estimate is
 //! found again.
 
-use crate::experiment::spread::on_grid;
+use crate::experiment::nodal_field::on_grid;
 use crate::geometry::{Mni, Position};
 use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
@@ -15,21 +15,24 @@ use crate::register::deformable::{DeformableError, DeformableSettings, Displacem
 use crate::resect::{SagScans, fit_sag, moved_scan};
 use nalgebra::Vector3;
 
+/// A node and its displacement, mm.
+pub type MovedNode = (u32, [f64; 3]);
+
 /// What a measurement shows of nodes that have moved by a known displacement: all nodes' displacement in, the observed
 /// nodes' out, mm.
-pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<(u32, [f64; 3])>, DeformableError> + 'a;
+pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<MovedNode>, DeformableError> + 'a;
 
 /// What was seen, without what the instrument adds to a displacement that is known.
 ///
 /// # Errors
 /// The instrument's.
 pub fn without_own_error(
-    seen: &[(u32, [f64; 3])],
+    seen: &[MovedNode],
     known_mm: &[[f64; 3]],
     instrument: &Instrument<'_>,
-) -> Result<Vec<(u32, [f64; 3])>, DeformableError> {
+) -> Result<Vec<MovedNode>, DeformableError> {
     let shown = instrument(known_mm)?;
-    let corrected = |(&(n, seen), (m, shown)): (&(u32, [f64; 3]), &(u32, [f64; 3]))| {
+    let corrected = |(&(n, seen), (m, shown)): (&MovedNode, &MovedNode)| {
         assert_eq!(n, *m, "an instrument shows the nodes that were seen, in their order");
         let known = known_mm[n as usize];
         (n, [0, 1, 2].map(|a| seen[a] - (shown[a] - known[a])))

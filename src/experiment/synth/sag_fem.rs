@@ -8,7 +8,7 @@ use super::resection::Resection;
 use super::sag::{gravity, grid};
 use super::settings::{SynthError, SynthSettings};
 use super::{Patient, in_template};
-use crate::experiment::spread::on_grid;
+use crate::experiment::nodal_field::on_grid;
 use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, simulate};
 use crate::image::LabelMap;
 use crate::material::law::Material;

@@ -62,7 +62,8 @@ fn at_equilibrium_the_internal_forces_are_the_weight() {
     let mesh = two_tissue_cube(4, 40.0);
     let text =
         LAWS.replace("[solver]", "[loads]\ngravity_m_per_s2 = [0.0, 0.0, -9.81]\n[solver]\nrelative_residual = 1e-10");
-    let text: String = text.lines().filter(|l| !l.contains("prescribed")).map(|l| format!("{l}\n")).collect();
+    let kept: Vec<&str> = text.lines().filter(|l| !l.contains("prescribed")).collect();
+    let text = kept.join("\n");
     let scenario = Scenario::from_toml(&text).unwrap();
     let model = Model::new(&mesh, &scenario).unwrap();
     let (outcome, state) = model.solve(&scenario.materials, None, &|_| ()).unwrap();

@@ -1,0 +1,110 @@
+//! What is read all the same, and as what.
+
+use super::{File, NAME, gzip, read};
+use hgm::geometry::Position;
+use hgm::image::nifti::{NiftiProblem, ReadOptions, decode, decode_labels, decode_mask};
+use nalgebra::Point3;
+
+#[test]
+fn every_version_byte_order_and_packing_reads_the_same() {
+    let base = read(&File::sound().bytes());
+    assert!(base.warnings.is_empty(), "{:?}", base.warnings);
+    assert_eq!(base.volume.grid.dims, [4, 3, 2]);
+    let expected: Vec<f32> = (0..24u8).map(f32::from).collect();
+    assert_eq!(base.volume.data, expected);
+    let last = base.volume.grid.position(Point3::new(3.0, 2.0, 1.0));
+    assert!(last.distance_mm(&Position::new(13.0, -16.0, 33.0)) < 1e-9);
+    for version in [1, 2] {
+        for big in [false, true] {
+            let mut file = File::sound();
+            if version == 2 {
+                file = file.version_2();
+            }
+            file.big = big;
+            for bytes in [file.bytes(), gzip(&file.bytes())] {
+                let image = read(&bytes);
+                assert_eq!((&image.volume, &image.warnings), (&base.volume, &base.warnings), "{version} {big}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_real_data_type_is_read_with_its_scaling() {
+    for (datatype, bitpix, signed) in [
+        (2, 8, false),
+        (256, 8, true),
+        (4, 16, true),
+        (512, 16, false),
+        (8, 32, true),
+        (768, 32, false),
+        (1024, 64, true),
+        (1280, 64, false),
+        (16, 32, true),
+        (64, 64, true),
+    ] {
+        for big in [false, true] {
+            let bytes = File::with(|f| {
+                (f.datatype, f.bitpix, f.big) = (datatype, bitpix, big);
+                (f.slope, f.inter) = (0.5, -3.0);
+                f.voxels = (0..24).map(|n| f64::from(n - if signed { 12 } else { 0 })).collect();
+            });
+            let image = read(&bytes);
+            for (n, &x) in image.volume.data.iter().enumerate() {
+                let stored = n as f32 - if signed { 12.0 } else { 0.0 };
+                assert_eq!(x, 0.5 * stored - 3.0, "datatype {datatype}");
+            }
+        }
+    }
+    // Slope 0 means: not scaled, whatever the intercept.
+    let plain = read(&File::with(|f| (f.slope, f.inter) = (0.0, 55.0)));
+    assert_eq!(plain.volume.data[5], 5.0);
+}
+
+#[test]
+fn nan_voxels_become_zero_and_are_counted() {
+    let image = read(&File::with(|f| {
+        (f.datatype, f.bitpix) = (16, 32);
+        f.voxels[3] = f64::NAN;
+        f.voxels[4] = f64::INFINITY;
+    }));
+    assert_eq!((image.nonfinite_voxels, image.volume.data[3], image.volume.data[4]), (2, 0.0, 0.0));
+    assert!(image.warnings[0].contains("2 voxels"), "{:?}", image.warnings);
+}
+
+#[test]
+fn singleton_dimensions_are_dropped_and_a_volume_can_be_chosen() {
+    for dim in [[4, 4, 3, 2, 1, 1, 1, 1], [5, 4, 3, 2, 1, 1, 1, 1], [3, 4, 3, 2, 9, 9, 9, 9]] {
+        assert_eq!(read(&File::with(|f| f.dim = dim)).volume.grid.dims, [4, 3, 2]);
+    }
+    let bytes = File::with(|f| f.dim = [4, 2, 3, 2, 2, 1, 1, 1]);
+    for bytes in [bytes.clone(), gzip(&bytes)] {
+        for volume in 0..2 {
+            let options = ReadOptions { volume: Some(volume), ..ReadOptions::default() };
+            let image = decode(&bytes, NAME, &options).unwrap();
+            assert_eq!(image.volume.data[0], 12.0 * volume as f32);
+        }
+        let options = ReadOptions { volume: Some(2), ..ReadOptions::default() };
+        assert_eq!(
+            decode(&bytes, NAME, &options).unwrap_err().problem,
+            NiftiProblem::NoSuchVolume { chosen: 2, volumes: 2 }
+        );
+    }
+}
+
+#[test]
+fn labels_and_masks_hold_what_they_should() {
+    let options = ReadOptions::default();
+    let (labels, _) = decode_labels(&File::sound().bytes(), NAME, &options).unwrap();
+    assert_eq!(labels.data[23], 23);
+    let fractions = File::with(|f| f.slope = 0.3);
+    let text = decode_labels(&fractions, NAME, &options).unwrap_err().to_string();
+    assert!(text.contains("voxels") && text.contains("whole numbers") && text.contains("label map"), "{text}");
+    let (mask, _) = decode_mask(&File::sound().bytes(), NAME, &options).unwrap();
+    assert_eq!((mask.count(), mask.data[0]), (23, false));
+    let (soft, warnings) = decode_mask(&File::with(|f| f.slope = 1.0 / 24.0), NAME, &options).unwrap();
+    assert!(soft.count() == 12 && warnings[0].contains("fractions"), "{} {warnings:?}", soft.count());
+    let empty = File::with(|f| f.voxels = vec![0.0; 24]);
+    let text = decode_mask(&empty, "mask.nii", &options).unwrap_err().to_string();
+    assert!(text.starts_with("mask.nii: voxels: the mask is empty") && text.contains("leave the option out"), "{text}");
+}
