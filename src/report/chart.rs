@@ -109,7 +109,7 @@ impl Axis {
         self.pixels[0] + t * (self.pixels[1] - self.pixels[0])
     }
 
-    fn ticks(&self, count: usize) -> Vec<(f64, String)> {
+    pub(super) fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         if !self.log {
             let values = ticks(self.low, self.high, count);
             let step = if values.len() > 1 { values[1] - values[0] } else { values[0].abs().max(1.0) };
@@ -153,7 +153,7 @@ fn grouped(text: &str) -> String {
     }
 }
 
-fn open(width: f64, height: f64, description: &str) -> String {
+pub(super) fn open(width: f64, height: f64, description: &str) -> String {
     format!(
         "<svg class=\"chart\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\" \
          font-family=\"inherit\" font-size=\"12\"><title>{0}</title>",

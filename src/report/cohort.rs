@@ -1,5 +1,6 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
+use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::resection::improvement;
 use crate::experiment::rmse::median_and_mad;
@@ -72,6 +73,8 @@ pub struct Cohort {
     pub median: BTreeMap<String, f64>,
     /// Median absolute deviation from it (not scaled).
     pub mad: BTreeMap<String, f64>,
+    /// Every sample over the subjects, where all were run with the same ones.
+    pub median_samples: Vec<MedianSample>,
     /// What a reader must know before comparing the subjects.
     pub warnings: Vec<String>,
 }
@@ -117,8 +120,10 @@ impl Cohort {
                 settings.len()
             ));
         }
+        let outcomes: Vec<&ExperimentOutcome> = members.iter().filter_map(|m| m.outcome.as_ref()).collect();
+        let median_samples = median_samples(&outcomes);
         let program = concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned();
-        Self { program, columns, subjects, median: median_of, mad: mad_of, warnings }
+        Self { program, columns, subjects, median: median_of, mad: mad_of, median_samples, warnings }
     }
 
     /// The table as BIDS writes one: tabs, `n/a` where there is no value, median and spread in the last lines.

@@ -1,6 +1,7 @@
 //! HTML page, figures, tables, VTK series.
 
 pub mod case;
+pub mod change_chart;
 pub mod chart;
 pub mod cohort;
 pub mod colour;
@@ -10,6 +11,7 @@ pub mod hand_off;
 pub mod html;
 pub mod lettering;
 pub mod material_figure;
+pub mod median_samples;
 pub mod mesh_figure;
 pub mod page;
 pub mod picture;

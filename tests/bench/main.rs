@@ -1,6 +1,7 @@
 //! `./run bench [ROOM ...]`: measures the bars of the issues and prints them side by side. Never part of a timed test.
 
 mod bar;
+mod bytes;
 #[path = "../it/cluster.rs"]
 mod cluster;
 mod cohort;
@@ -29,6 +30,7 @@ fn main() {
         ("experiment", experiment::bars),
         ("patients", patients::bars),
         ("kills", kills::bars),
+        ("bytes", bytes::bars),
         ("job", job::bars),
         ("cohort", cohort::bars),
     ];

@@ -73,6 +73,14 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     let page = text(&out.join("group.html"));
     assert!(page.contains("href=\"sub-01.html\"") && out.join("sub-01.html").exists());
     assert!(!page.contains("href=\"sub-00.html\"") && page.contains("sub-00: failed"));
+    // Nine samples of one tissue, from the published prior: both subjects have the same.
+    let medians = group["median_samples"].as_array().unwrap();
+    let margins: Vec<f64> = (1..=2).map(|n| subjects[n]["figures"]["rmse_margin_mm"].as_f64().unwrap()).collect();
+    let least = medians.iter().filter_map(|s| s["median_rmse_mm"]["margin"].as_f64()).fold(f64::MAX, f64::min);
+    assert_eq!((medians.len(), &medians[0]["subjects"]), (9, &2.into()));
+    assert!(least >= f64::midpoint(margins[0], margins[1]) - 1e-9, "no sample beats everybody's own best");
+    // For the tests of pages in a browser, which come after these.
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("group.html"), &page).unwrap();
 
     let sidecar = out.join("sub-02/ses-postop/anat/sub-02_ses-postop_space-MNI152NLin2009aSym_label-cavity_mask.json");
     let sidecar: Value = serde_json::from_str(&text(&sidecar)).unwrap();

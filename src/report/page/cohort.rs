@@ -1,8 +1,10 @@
 //! The page of a cohort.
 
+use super::super::change_chart::{Change, ChangeChart, ChangePanel, Middle};
 use super::super::cohort::{Cohort, Row, Status};
 use super::super::html::{escape, fixed, number};
-use super::results::table;
+use super::super::median_samples::as_outcome;
+use super::results::{figures, set_name, table};
 use super::{Frame, Section, notice};
 use std::collections::BTreeMap;
 
@@ -14,7 +16,13 @@ impl Cohort {
             kicker: "cohort",
             version: env!("CARGO_PKG_VERSION"),
         };
-        let sections = [Section { id: "subjects", heading: "Subjects", body: self.subjects_section() }];
+        let bodies = [
+            ("errors", "What deformation explains", self.errors_section()),
+            ("samples", "Samples over the subjects", self.samples_section()),
+            ("subjects", "Subjects", Some(self.subjects_section())),
+        ];
+        let sections: Vec<Section> =
+            bodies.into_iter().filter_map(|(id, heading, body)| Some(Section { id, heading, body: body? })).collect();
         let first = self.notices();
         let above = if first.is_empty() { String::new() } else { notice("warn", "Look here first", &first) };
         frame.html(&above, &sections, "The page makes no request to any other place.", "")
@@ -32,6 +40,59 @@ impl Cohort {
         };
         let all = self.subjects.iter();
         all.clone().filter_map(unwell).chain(all.filter_map(apart)).chain(self.warnings.iter().cloned()).collect()
+    }
+
+    /// RMSE at rest and of the best sample, subject by subject and in the median.
+    fn errors_section(&self) -> Option<String> {
+        let panel = |set: &str| {
+            let columns = [format!("rest_rmse_{set}_mm"), format!("rmse_{set}_mm")];
+            let middle =
+                |column: &String| Some(Middle { median: *self.median.get(column)?, mad: *self.mad.get(column)? });
+            let change = |row: &Row| {
+                let [before, after] = columns.each_ref().map(|column| row.figures.get(column).copied());
+                Some(Change { name: row.participant_id.clone(), before: before?, after: after? })
+            };
+            let changes: Vec<Change> = self.subjects.iter().filter_map(change).collect();
+            let middle = [middle(&columns[0])?, middle(&columns[1])?];
+            (!changes.is_empty()).then(|| ChangePanel { name: set_name(set), changes, middle })
+        };
+        let panels: Vec<ChangePanel> = ["ventricle", "margin"].into_iter().filter_map(panel).collect();
+        let said: Vec<String> = panels
+            .iter()
+            .map(|panel| {
+                let [rest, deformed] = panel.middle.map(|m| format!("{} ± {}", number(m.median, 3), number(m.mad, 2)));
+                let better = panel.changes.iter().filter(|c| c.after < c.before).count();
+                let all = panel.changes.len();
+                format!("{}: {rest} mm at rest, {deformed} mm deformed, smaller in {better} of {all}", panel.name)
+            })
+            .collect();
+        let chart = ChangeChart {
+            description: format!("RMSE of every subject at rest and of its best sample. {}", said.join("; ")),
+            y_label: "RMSE (mm)".to_owned(),
+            states: ["rest", "best sample"].map(str::to_owned),
+            panels,
+            floor: self.median.get("noise_floor_mm").copied(),
+        };
+        (!chart.panels.is_empty()).then(|| {
+            format!(
+                "<p>Median ± MAD. {}.</p>\n<div class=\"charts\"><figure>{}<figcaption>One line per subject; beside \
+                 them the median and its MAD. Differences below the measurement error (median over the subjects) mean \
+                 nothing.</figcaption></figure></div>",
+                escape(&said.join("; ")),
+                chart.to_svg()
+            )
+        })
+    }
+
+    /// RMSE over the samples that all subjects share, in the median.
+    fn samples_section(&self) -> Option<String> {
+        let first = self.median_samples.first()?;
+        let tissues: Vec<String> = first.shear_modulus_pa.keys().cloned().collect();
+        let figures = figures(&as_outcome(&self.median_samples, &tissues));
+        Some(format!(
+            "<p>The median over the subjects of the RMSE of every sample: the valley that all of them share, if there is \
+             one.</p>\n<div class=\"charts\">{figures}</div>"
+        ))
     }
 
     fn subjects_section(&self) -> String {

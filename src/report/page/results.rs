@@ -255,17 +255,7 @@ fn dihedral_chart(counts: &[usize]) -> String {
 
 /// Table and curves of the samples.
 pub fn samples(outcome: &ExperimentOutcome) -> String {
-    let mut html = String::from("<div class=\"charts\">");
-    let grid = Grid::of(outcome);
-    if let Some(grid) = &grid {
-        for set in outcome.rmse_sets() {
-            html += &grid.figure(outcome, &set);
-        }
-    } else {
-        let (curve, caption) = (curve(outcome), curve_caption(outcome));
-        let _ = write!(html, "<figure>{curve}<figcaption>{caption}</figcaption></figure>");
-    }
-    html += "</div>\n";
+    let mut html = format!("<div class=\"charts\">{}</div>\n", figures(outcome));
     let table = sample_table(outcome);
     if outcome.samples.len() > 20 {
         let _ = write!(html, "<details><summary>All {} samples</summary>{table}</details>", outcome.samples.len());
@@ -273,6 +263,15 @@ pub fn samples(outcome: &ExperimentOutcome) -> String {
         html += &table;
     }
     html
+}
+
+/// A curve, or a map for every set where two tissues form a grid.
+pub fn figures(outcome: &ExperimentOutcome) -> String {
+    if let Some(grid) = Grid::of(outcome) {
+        return outcome.rmse_sets().iter().map(|set| grid.figure(outcome, set)).collect();
+    }
+    let (curve, caption) = (curve(outcome), curve_caption(outcome));
+    format!("<figure>{curve}<figcaption>{caption}</figcaption></figure>")
 }
 
 fn curve_caption(outcome: &ExperimentOutcome) -> String {
