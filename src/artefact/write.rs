@@ -8,7 +8,7 @@ use thiserror::Error;
 
 /// A file could not be written; nothing is left under its name.
 #[derive(Debug, Error)]
-#[error("{}: cannot be written ({source}); check that the folder exists, is writable and has space", path.display())]
+#[error("{}: cannot be written; check that the folder exists, is writable and has space", path.display())]
 pub struct WriteError {
     /// The file meant.
     pub path: PathBuf,
@@ -39,9 +39,17 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);
-    let mut file = std::fs::File::create(&part).map_err(refuse)?;
-    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(refuse)?;
-    std::fs::rename(&part, path).map_err(refuse)
+    let written = || {
+        let mut file = std::fs::File::create(&part)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        std::fs::rename(&part, path)
+    };
+    written().map_err(|source| {
+        // A full disk stays full, and half a file is nobody's.
+        std::fs::remove_file(&part).ok();
+        refuse(source)
+    })
 }
 
 /// SHA-256 in lower-case hexadecimal.
@@ -63,6 +71,16 @@ mod tests {
         write_whole(&path, b"second").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"second");
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_no_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let taken = folder.path().join("a-folder");
+        std::fs::create_dir(&taken).unwrap();
+        let error = write_whole(&taken, b"bytes").unwrap_err();
+        assert!(error.to_string().contains("a-folder: cannot be written"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::phantom::PhantomSettings;
 use crate::experiment::resection::improvement;
 use crate::experiment::sweep::Reference;
+use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use anyhow::anyhow;
 use std::path::PathBuf;
@@ -58,18 +59,16 @@ fn of_phantom(
     let settings: PhantomSettings = case.settings_of("phantom", session)?;
     if tissues.is_some_and(|t| usize::from(t) != settings.tissues) {
         return Err(Failure::Rejected(anyhow!(
-            "--tissues: the phantom in this folder has {}; make another with `hgm phantom --tissues {}`",
-            settings.tissues,
-            tissues.unwrap_or_default()
+            "--tissues {0}: the phantom in this folder was made with --tissues {1}; make another with \
+             `hgm phantom --tissues {0}`",
+            tissues.unwrap_or_default(),
+            settings.tissues
         )));
     }
     let mesh_bytes = case.read(REST_MESH)?;
     let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
     let (made, _): (Manifest, SampleOutcome) = case.stage_facts("reference")?;
-    let reference = vtu::decode(&case.read(REFERENCE_STATE)?, REFERENCE_STATE).reject()?;
-    let displacement = reference.point_field("displacement").and_then(Field::vectors);
-    let displacement =
-        displacement.ok_or_else(|| anyhow!("{REFERENCE_STATE}: no array `displacement`; run with --force"))?;
+    let displacement = reference_state(case, &mesh)?;
     let input = EstimateInput {
         mesh: (&mesh, &mesh_bytes),
         scenario: &settings.scenario(),
@@ -81,6 +80,24 @@ fn of_phantom(
         noise_mm: options.phantom_noise_mm,
     };
     Ok(case::estimate(case, &input, options, session)?.1)
+}
+
+/// The displacement of a phantom's reference, mm, node by node of its mesh.
+///
+/// # Errors
+/// Rejected when the file is damaged or another mesh's.
+pub fn reference_state(case: &Case, mesh: &TetMesh) -> Result<Vec<[f64; 3]>, Failure> {
+    let state = vtu::decode(&case.read(REFERENCE_STATE)?, REFERENCE_STATE).reject()?;
+    let displacement = state.point_field("displacement").and_then(Field::vectors).unwrap_or_default();
+    let (found, nodes) = (displacement.len(), mesh.nodes_mm().len());
+    if found == nodes {
+        return Ok(displacement);
+    }
+    Err(Failure::Rejected(anyhow!(
+        "{0}: {REFERENCE_STATE} holds displacements of {found} nodes and {REST_MESH} has {nodes}: one of the two is not this \
+         phantom's; run `hgm phantom -o {0} --force` again",
+        case.folder.display()
+    )))
 }
 
 /// The outcome with the estimate as one more sample; it is the best one where no sweep has chosen another.

@@ -29,6 +29,17 @@ impl Failure {
         }
     }
 
+    /// The same failure, with what it is about before its text.
+    #[must_use]
+    pub fn about(self, what: &str) -> Self {
+        let what = what.to_owned();
+        match self {
+            Self::Failed(error) => Self::Failed(error.context(what)),
+            Self::Rejected(error) => Self::Rejected(error.context(what)),
+            Self::QualityGate(error) => Self::QualityGate(error.context(what)),
+        }
+    }
+
     /// What kind it is, and the error.
     pub fn parts(&self) -> (&'static str, &anyhow::Error) {
         match self {
@@ -41,12 +52,26 @@ impl Failure {
     /// One message on stderr; with `--json` also an object on stdout, unless the result is there already.
     pub fn report(&self, json: bool) {
         let (kind, error) = self.parts();
-        eprintln!("hgm: {kind}: {error:#}");
+        let message = in_one_line(error);
+        eprintln!("hgm: {kind}: {message}");
         if json && !has_emitted() {
-            let message = format!("{error:#}");
             println!("{}", serde_json::json!({"error": {"kind": kind, "message": message, "exit_code": self.code()}}));
         }
     }
+}
+
+/// An error and its causes, each said once: some texts hold their cause already.
+pub fn in_one_line(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |said, cause| {
+        let cause = cause.trim_end();
+        if said.contains(cause) {
+            said
+        } else if said.is_empty() {
+            cause.to_owned()
+        } else {
+            format!("{said}: {cause}")
+        }
+    })
 }
 
 impl<E: Into<anyhow::Error>> From<E> for Failure {
@@ -67,5 +92,18 @@ pub trait Reject<T> {
 impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
     fn reject(self) -> Result<T, Failure> {
         self.map_err(|error| Failure::Rejected(error.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::{Context, anyhow};
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let error = Err::<(), _>(anyhow!("no space left")).context("x.bin: cannot be written (no space left)");
+        let error = error.context("report").unwrap_err();
+        assert_eq!(in_one_line(&error), "report: x.bin: cannot be written (no space left)");
     }
 }

@@ -106,7 +106,9 @@ fn points(args: &FitArgs) -> Result<(String, Rheometry), Failure> {
     let studies = args.studies.read()?;
     let model = studies.models.iter().find(|model| model.id == id).ok_or_else(|| {
         let last = studies.models.iter().map(|model| model.id).max().unwrap_or(0);
-        Failure::Rejected(anyhow!("--literature {id}: there is no such model; ids go from 0 to {last}"))
+        Failure::Rejected(anyhow!(
+            "--literature {id}: there is no such model; ids go from 0 to {last}; `hgm gp studies` lists them"
+        ))
     })?;
     let curve = model.curve(studies.curves);
     let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();

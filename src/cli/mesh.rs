@@ -6,14 +6,14 @@ use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError, write_whole};
 use crate::geometry::Native;
 use crate::image::LabelMap;
-use crate::image::nifti::{self, ReadOptions};
+use crate::image::nifti;
 use crate::mesh::engine::{MeshSettings, mesh_labels};
 use crate::mesh::format::{feb, gifti, inp, msh, ply, stl, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::report::mesh_figure::preview;
 use crate::segment::label;
 use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -76,13 +76,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !FORMATS.contains(&extension.as_str()) {
         let name = args.output.display();
-        return Err(Failure::Rejected(anyhow!(
-            "{name}: no format `{extension}`; end the name in .vtu, .msh, .inp or .feb"
-        )));
+        return Err(Failure::Rejected(anyhow!("-o {name}: the name must end in .vtu, .msh, .inp or .feb")));
     }
     let name = args.labels.display().to_string();
     let bytes = read_input(&args.labels)?;
-    let (labels, odd) = nifti::decode_labels(&bytes, &name, &ReadOptions::default()).reject()?;
+    let (labels, odd) = nifti::decode_labels(&bytes, &name, &session.reading()?).reject()?;
     for warning in &odd {
         tracing::warn!("{name}: {warning}");
     }
@@ -116,14 +114,16 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             write_surfaces(&mesh, folder)?;
         }
         let facts = case::facts(&summary)?;
-        Ok(Produced { files: vec![(file.clone(), encode(&mesh, &extension)?)], warnings: summary.refused, facts })
+        let bytes = encode(&mesh, &extension).map_err(|e| e.about(&file))?;
+        Ok(Produced { files: vec![(file.clone(), bytes)], warnings: summary.refused, facts })
     });
     let outcome = outcome.map_err(|error| match error {
         StageError::Compute(failure) => failure,
         StageError::Write(error) => Failure::Failed(error.into()),
     })?;
-    let summary: Summary = serde_json::from_value(outcome.manifest.facts)
-        .context("the manifest's facts cannot be read; run again with --force")?;
+    let summary: Summary = serde_json::from_value(outcome.manifest.facts).map_err(|_| {
+        anyhow!("{file}: what an earlier version of hgm noted about it cannot be read; run again with --force")
+    })?;
     session.emit(&summary, &text(&args.output, &summary))?;
     if summary.refused.is_empty() {
         return Ok(());
@@ -139,7 +139,7 @@ fn make(
     name: &str,
 ) -> Result<(TetMesh, Summary), Failure> {
     let (mut mesh, record) =
-        mesh_labels(labels, settings, &case::programs()).with_context(|| name.to_owned()).reject()?;
+        mesh_labels(labels, settings, &case::programs()).map_err(|e| case::no_mesh(e).about(name))?;
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
         match tag_boundary_sets(&mut mesh, tags) {

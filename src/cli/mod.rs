@@ -25,6 +25,7 @@ mod run;
 mod schema;
 mod segment;
 mod session;
+mod settings_file;
 mod simulate;
 mod sweep;
 mod synth;

@@ -1,7 +1,8 @@
 //! A prepared patient's case: what `run`, `sweep`, `reduce` and `estimate` share.
 
 use super::case::{
-    self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, PriorOptions, REST_MESH, Sag, SampleMode, Sweep,
+    self, Anatomy, Case, EstimateFacts, EstimateInput, EstimateOptions, Kind, PriorOptions, REST_MESH, Sag, SampleMode,
+    Sweep,
 };
 use super::estimate::with_estimate;
 use super::prep::Prepared;
@@ -16,6 +17,7 @@ use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use anyhow::anyhow;
 use std::collections::BTreeMap;
 
 /// Settings by room, as `settings.toml` keeps them.
@@ -63,6 +65,13 @@ impl Patient {
     /// # Errors
     /// As [`Patient::new`]; also a folder that has not been prepared.
     pub fn open(case: &Case, tissues: Option<u8>, session: &Session) -> Result<Self, Failure> {
+        if case.kind() == Kind::Phantom {
+            return Err(Failure::Rejected(anyhow!(
+                "{}: this is a phantom: `hgm estimate`, `hgm report` and `hgm why` take one; give a folder that `hgm prep` or \
+                 `hgm run` has made",
+                case.folder.display()
+            )));
+        }
         let mut settings: ResectionSettings = case.settings_of("resection", session)?;
         settings.tissues = tissues.map_or(settings.tissues, usize::from);
         Self::new(case, Prepared::read(case)?, settings)

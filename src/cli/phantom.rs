@@ -1,6 +1,7 @@
 //! `hgm phantom`: known moduli go in and must come out.
 
 use super::case::{self, Case, MeshOptions, PriorOptions, SampleMode, Sweep};
+use super::estimate::reference_state;
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
@@ -9,7 +10,7 @@ use crate::experiment::prior::{samples_of_every_task, samples_of_prior};
 use crate::experiment::sweep::{Reference, best_sample, solve_sample};
 use crate::mesh::format::{Field, vtu};
 use crate::segment::atlas;
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -72,7 +73,8 @@ pub fn analyse(args: &Args, session: &Session) -> Result<(ExperimentOutcome, Str
     settings.include_reference |= args.include_reference;
     if args.every_task && settings.tissues != 1 {
         return Err(Failure::Rejected(anyhow!(
-            "--every-task: compares materials of the whole brain; drop it, or --tissues 2"
+            "--every-task compares materials of the whole brain: it does not go with two tissues; drop it, or use \
+             --tissues 1"
         )));
     }
     let prior = args.prior.over(&session.settings("prior")?);
@@ -90,17 +92,21 @@ pub fn analyse(args: &Args, session: &Session) -> Result<(ExperimentOutcome, Str
     let stage = Stage::new("reference", VERSION, &case.folder, &(&scenario, &truth)).after(&meshed);
     let (referenced, _): (_, SampleOutcome) = case.run(&stage, "reference", || {
         let rest = Reference::Nodes(vec![[0.0; 3]; mesh.nodes_mm().len()]);
-        let solved = solve_sample(&mesh, &scenario, &tissues, &truth, &rest, &|_| {}).reject()?;
+        let solved = solve_sample(&mesh, &scenario, &tissues, &truth, &rest, &|_| {})
+            .context("the table [phantom] of the settings asks for a simulation that cannot be done")
+            .reject()?;
+        let reason = solved.reason.unwrap_or_default();
         let (outcome, _) = solved.state.ok_or_else(|| {
-            anyhow!("the reference has no equilibrium; lower the force in [phantom] or raise its shear modulus")
+            anyhow!(
+                "the phantom's reference state has no equilibrium ({reason}); lower `one_tissue_force_n` or \
+                 `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings file"
+            )
         })?;
         let points = [Field::vector("displacement", &outcome.displacement_mm)];
         let files = vec![(REFERENCE.to_owned(), vtu::encode(&mesh, &points, &[])?)];
         Ok(Produced { files, facts: case::facts(&solved.record)?, ..Produced::default() })
     })?;
-    let reference = vtu::decode(&case.read(REFERENCE)?, REFERENCE).reject()?;
-    let displacement = reference.point_field("displacement").and_then(Field::vectors);
-    let displacement = displacement.ok_or_else(|| anyhow!("{REFERENCE}: no array `displacement`; run with --force"))?;
+    let displacement = reference_state(&case, &mesh)?;
 
     let (levels, poisson_ratio) = (&settings.sd_levels, settings.poisson_ratio);
     let mut list = if args.every_task {

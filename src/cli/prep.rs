@@ -111,6 +111,8 @@ pub struct Prepared {
 /// # Errors
 /// The first stage that is rejected or fails.
 pub fn prepare(case: &Case, args: &Args, session: &Session) -> Result<Prepared, Failure> {
+    // What would be refused after minutes is refused now.
+    case::mesh_settings(&args.mesh, &case::programs(), session)?;
     let Images { manifests: [registered, segmented], registration, anat } = Images::of(case, args, session)?;
     let anatomy = Anatomy::read(case)?;
     let landmarks = Some(&anatomy.template_from_patient);

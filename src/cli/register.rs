@@ -4,7 +4,7 @@ use super::session::read_input;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
 use crate::geometry::{Frame, Native, RigidTransform};
-use crate::image::nifti::{self, NiftiImage, ReadOptions};
+use crate::image::nifti::{self, NiftiImage};
 use crate::image::{Mask, Volume};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
 use crate::register::{
@@ -62,24 +62,26 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", args.output.display())));
     }
     let mut warnings = Vec::new();
-    let (moving, moving_bytes) = image(&args.moving, &mut warnings)?;
-    let moving_mask = args.moving_mask.as_deref().map(|path| mask(path, &moving, &mut warnings)).transpose()?;
+    let (moving, moving_bytes) = image(&args.moving, session, &mut warnings)?;
+    let moving_mask =
+        args.moving_mask.as_deref().map(|path| mask(path, &moving, session, &mut warnings)).transpose()?;
     let names = || format!("{} onto {}", args.moving.display(), args.fixed.display());
 
     let to_template = args.fixed.as_os_str().eq_ignore_ascii_case("mni") && !args.fixed.exists();
     let (found, quality, doubts) = if to_template {
         if args.fixed_mask.is_some() || args.moving_mask.is_some() {
             return Err(Failure::Rejected(anyhow!(
-                "masks do not go with MNI: the template's own brain is used; leave them out"
+                "--moving-mask and --fixed-mask do not go with MNI: the template's own brain is used; leave them out"
             )));
         }
         parts(register_to_template(&moving, &atlas::template().t1_f32(), &settings).with_context(names).reject()?)
     } else {
-        let (fixed, fixed_bytes) = image(&args.fixed, &mut warnings)?;
+        let (fixed, fixed_bytes) = image(&args.fixed, session, &mut warnings)?;
         if fixed_bytes == moving_bytes {
             warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
         }
-        let fixed_mask = args.fixed_mask.as_deref().map(|path| mask(path, &fixed, &mut warnings)).transpose()?;
+        let fixed_mask =
+            args.fixed_mask.as_deref().map(|path| mask(path, &fixed, session, &mut warnings)).transpose()?;
         let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
         parts(register_rigid(&moving, &fixed, masks, &settings).with_context(names).reject()?)
     };
@@ -87,13 +89,16 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let refused = doubts.iter().find(|w| matches!(w, FitWarning::LowSimilarity { .. })).cloned();
     warnings.extend(doubts.iter().map(ToString::to_string));
     write_whole(&text_path, to_matrix_text(&found).as_bytes())?;
-    write_whole(&itk_path, to_itk_text(&found).as_bytes())?;
+    write_whole(&itk_path, to_itk_text(&found).as_bytes()).inspect_err(|_| {
+        // Both or neither.
+        std::fs::remove_file(&text_path).ok();
+    })?;
     for warning in &warnings {
         tracing::warn!("{warning}");
     }
     let shown = format!("{}\n{}", text_path.display(), itk_path.display());
     session.emit(&Summary { transform: text_path, itk_transform: itk_path, quality, warnings }, &shown)?;
-    refused.map_or(Ok(()), |doubt| Err(Failure::QualityGate(anyhow!(doubt))))
+    refused.map_or(Ok(()), |doubt| Err(Failure::QualityGate(anyhow!("{}: {doubt} (outputs kept)", names()))))
 }
 
 /// The fit without its frames: on the command line an image is what it is.
@@ -101,23 +106,32 @@ fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Nat
     (fit.fixed_from_moving.relabelled(), fit.quality, fit.warnings)
 }
 
-fn image(path: &Path, warnings: &mut Vec<String>) -> Result<(Volume<f32, Native>, Vec<u8>), Failure> {
+fn image(
+    path: &Path,
+    session: &Session,
+    warnings: &mut Vec<String>,
+) -> Result<(Volume<f32, Native>, Vec<u8>), Failure> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
-    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &ReadOptions::default()).reject()?;
+    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &session.reading()?).reject()?;
     warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
     Ok((volume, bytes))
 }
 
-fn mask(path: &Path, image: &Volume<f32, Native>, warnings: &mut Vec<String>) -> Result<Mask<Native>, Failure> {
+fn mask(
+    path: &Path,
+    image: &Volume<f32, Native>,
+    session: &Session,
+    warnings: &mut Vec<String>,
+) -> Result<Mask<Native>, Failure> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
-    let (mask, odd) = nifti::decode_mask(&bytes, &name, &ReadOptions::default()).reject()?;
+    let (mask, odd) = nifti::decode_mask(&bytes, &name, &session.reading()?).reject()?;
     warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
     if !mask.grid.coincides(&image.grid, 1e-2) {
         let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
         return Err(Failure::Rejected(anyhow!(
-            "{name}: the mask's grid ({}) is not its image's ({}) or lies elsewhere: resample the mask onto the image first",
+            "{name}: the mask's grid ({} voxels) is not its image's ({}) or lies elsewhere; resample it onto the image",
             dims(mask.grid.dims),
             dims(image.grid.dims)
         )));

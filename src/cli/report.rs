@@ -1,20 +1,19 @@
 //! `hgm report CASE`: the page again from what is there.
 
-use super::{Failure, Reject, Session};
-use crate::report::case::write_report;
+use super::case::Case;
+use super::{Failure, Session};
 use std::path::PathBuf;
 
-/// Make CASE/report.html again from the files of a case directory
+/// Make CASE/report.html again from the files of a case folder
 ///
 /// Example: hgm report case-01
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Directory made by `hgm run`, `hgm prep` or `hgm phantom`
+    /// Folder made by `hgm run`, `hgm prep` or `hgm phantom`
     pub case: PathBuf,
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let report = write_report(&args.case).reject()?;
-    let shown = report.display().to_string();
+    let shown = Case::open(&args.case, session).write_page()?;
     session.emit(&serde_json::json!({ "report": shown }), &shown)
 }

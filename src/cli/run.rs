@@ -3,8 +3,9 @@
 use super::case::{Case, EstimateOptions, MeshOptions, Overrides, PriorOptions, SampleMode};
 use super::patient::Patient;
 use super::prep;
-use super::{Failure, Session};
+use super::{Failure, Reject, Session};
 use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::prior::samples_of_prior;
 use crate::experiment::resection::{ResectionSettings, improvement};
 use std::path::PathBuf;
 
@@ -81,11 +82,14 @@ pub struct Analysed {
 pub fn analyse(args: &Args, session: &Session) -> Result<Analysed, Failure> {
     let case = Case::open(&args.prep.output, session);
     let mesh = args.analysis.mesh(&args.prep.mesh, session);
-    let prepared = prep::prepare(&case, &prep::Args { mesh, ..args.prep.clone() }, session)?;
     let mut settings: ResectionSettings = session.settings("resection")?;
     if let Some(tissues) = args.analysis.tissues {
         settings.tissues = usize::from(tissues);
     }
+    // What would be refused after minutes is refused now.
+    let prior = args.analysis.prior.over(&session.settings("prior")?);
+    samples_of_prior(&settings.tissue_list(), &settings.sd_levels, settings.poisson_ratio, &prior).reject()?;
+    let prepared = prep::prepare(&case, &prep::Args { mesh, ..args.prep.clone() }, session)?;
     // The settings of an earlier run of this folder are not this run's.
     case.forget_settings();
     let patient = Patient::new(&case, prepared, settings)?;

@@ -4,7 +4,7 @@ use super::session::read_input;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
 use crate::geometry::Native;
-use crate::image::nifti::{self, ReadOptions, encode_mask, encode_u8};
+use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::image::{Mask, Volume};
 use crate::register::deformable::DeformableSettings;
 use crate::register::{RigidSettings, register_to_template};
@@ -50,15 +50,15 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for path in [Some(&args.output), args.write_brain_mask.as_ref()].into_iter().flatten() {
         if !path.to_string_lossy().ends_with(".nii.gz") {
             return Err(Failure::Rejected(anyhow!(
-                "{}: labels are written as .nii.gz; name such a file",
+                "{}: label maps and masks are written as .nii.gz; end the name (-o, --write-brain-mask) in .nii.gz",
                 path.display()
             )));
         }
     }
     let name = args.t1.display().to_string();
-    let read = nifti::decode(&read_input(&args.t1)?, &name, &session.settings::<ReadOptions>("image")?).reject()?;
+    let read = nifti::decode(&read_input(&args.t1)?, &name, &session.reading()?).reject()?;
     let t1 = read.volume;
-    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1)).transpose()?;
+    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1, session)).transpose()?;
 
     let bar = session.progress(2, "segment");
     bar.set_message("to MNI");
@@ -102,13 +102,19 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.emit(&Summary { labels, volumes: v, tissue_means: found.tissue_means, warnings }, &text)
 }
 
-fn brain_mask(path: &Path, t1: &Volume<f32, Native>) -> Result<Mask<Native>, Failure> {
+fn brain_mask(path: &Path, t1: &Volume<f32, Native>, session: &Session) -> Result<Mask<Native>, Failure> {
     let name = path.display().to_string();
-    let (mask, _) = nifti::decode_mask(&read_input(path)?, &name, &ReadOptions::default()).reject()?;
+    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, &session.reading()?).reject()?;
     if !mask.grid.coincides(&t1.grid, 0.1) {
+        let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
         return Err(Failure::Rejected(anyhow!(
-            "{name}: dim or affine are not the scan's; resample the mask to it first"
+            "{name}: the mask's grid ({} voxels) is not the scan's ({}) or lies elsewhere; resample it onto the scan",
+            dims(mask.grid.dims),
+            dims(t1.grid.dims)
         )));
+    }
+    for warning in odd {
+        tracing::warn!("{name}: {warning}");
     }
     Ok(mask)
 }

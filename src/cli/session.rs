@@ -1,7 +1,9 @@
 //! What every subcommand shares: global options, settings from a file, output, progress, input files.
 
 use super::failure::{Failure, Reject};
+use super::settings_file;
 use crate::artefact::no_more_writes;
+use crate::image::nifti::{Orientation, ReadOptions};
 use anyhow::{Context, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -35,6 +37,12 @@ pub struct GlobalOptions {
     /// Seed of everything random
     #[arg(long, global = true, value_name = "N")]
     pub seed: Option<u64>,
+    /// Which volume, from 0, of a NIfTI file that holds several [default: such a file is refused]
+    #[arg(long, global = true, value_name = "N")]
+    pub volume: Option<usize>,
+    /// Which affine to believe where a NIfTI file's two disagree: sform or qform [default: such a file is refused]
+    #[arg(long, global = true, value_name = "FORM", value_parser = orientation)]
+    pub prefer: Option<Orientation>,
     /// Compute again what is already there
     #[arg(long, global = true)]
     pub force: bool,
@@ -44,6 +52,10 @@ pub struct GlobalOptions {
     /// Only errors
     #[arg(short, long, global = true)]
     pub quiet: bool,
+}
+
+fn orientation(name: &str) -> Result<Orientation, String> {
+    serde_json::from_value(name.into()).map_err(|_| format!("`{name}` is neither sform nor qform"))
 }
 
 /// The global options, resolved: thread pool built, settings file parsed, logging on.
@@ -81,11 +93,7 @@ impl Session {
         rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build_global().ok();
         let config = match &options.config {
             None => toml::Table::new(),
-            Some(path) => {
-                let text = String::from_utf8(read_input(path)?);
-                let text = text.with_context(|| format!("{}: not UTF-8 text", path.display())).reject()?;
-                text.parse().with_context(|| format!("{}: not a TOML settings file", path.display())).reject()?
-            }
+            Some(path) => settings_file::tables(&read_text(path)?, &path.display().to_string())?,
         };
         Ok(Self { options, config })
     }
@@ -99,9 +107,21 @@ impl Session {
         match self.config.get(room) {
             None => Ok(T::default()),
             Some(table) => {
-                table.clone().try_into().with_context(|| format!("{}: table [{room}]", self.config_name())).reject()
+                settings_file::typed(table).map_err(|e| anyhow!("{}: table [{room}]: {e}", self.config_name())).reject()
             }
         }
+    }
+
+    /// How NIfTI files that leave a choice open are read: `--volume` and `--prefer` over the table `[image]`.
+    ///
+    /// # Errors
+    /// As [`Session::settings`].
+    pub fn reading(&self) -> Result<ReadOptions, Failure> {
+        let settings: ReadOptions = self.settings("image")?;
+        Ok(ReadOptions {
+            prefer: self.options.prefer.or(settings.prefer),
+            volume: self.options.volume.or(settings.volume),
+        })
     }
 
     /// Whether the settings file has a table of this room.
@@ -169,4 +189,13 @@ pub fn read_input(path: &Path) -> Result<Vec<u8>, Failure> {
         return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", path.display())));
     }
     std::fs::read(path).with_context(|| format!("{}: cannot be read; check the path", path.display())).reject()
+}
+
+/// A text file the user named.
+///
+/// # Errors
+/// As [`read_input`]; also when it is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    let said = |_| anyhow!("{}: not UTF-8 text; save the file as UTF-8", path.display());
+    String::from_utf8(read_input(path)?).map_err(said).reject()
 }

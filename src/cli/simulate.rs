@@ -1,7 +1,8 @@
 //! `hgm simulate MESH SCENARIO.toml -o OUT.vtu`: one deformation, or one motion.
 
 use super::case::shown;
-use super::session::read_input;
+use super::session::{read_input, read_text};
+use super::settings_file;
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
@@ -65,9 +66,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (folder, file) = destination(&args.output)?;
     let mesh_bytes = read_input(&args.mesh)?;
     let mesh = mesh(&args.mesh, &mesh_bytes)?;
-    let text = String::from_utf8(read_input(&args.scenario)?);
-    let text = text.with_context(|| format!("{}: not UTF-8 text", args.scenario.display())).reject()?;
-    let scenario = Scenario::from_toml(&text).with_context(|| args.scenario.display().to_string()).reject()?;
+    let scenario = Scenario::from_toml(&read_text(&args.scenario)?)
+        .map_err(|e| anyhow!("{}: {}", args.scenario.display(), settings_file::in_words(&e.to_string())))
+        .reject()?;
     let start = args.start.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
     if start.is_some() && scenario.solver.method == Method::BackwardEuler {
         return Err(Failure::Rejected(anyhow!("--start does not go with `method = \"backward-euler\"`: leave it out")));
@@ -112,8 +113,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for warning in &outcome.manifest.warnings {
         tracing::warn!("{warning}");
     }
-    let summary: Summary = serde_json::from_value(outcome.manifest.facts)
-        .map_err(|e| anyhow!("{file}: the manifest's facts cannot be read ({e}); run again with --force"))?;
+    let summary: Summary = serde_json::from_value(outcome.manifest.facts).map_err(|_| {
+        anyhow!("{file}: what an earlier version of hgm noted about it cannot be read; run again with --force")
+    })?;
     session.emit(&summary, &in_words(&summary, &args.output))
 }
 
@@ -134,7 +136,9 @@ fn mesh(path: &Path, bytes: &[u8]) -> Result<TetMesh, Failure> {
     match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
         Some("vtu") => Ok(vtu::decode(bytes, &name).reject()?.mesh),
         Some("msh") => msh::decode(bytes, &name).reject(),
-        _ => Err(Failure::Rejected(anyhow!("{name}: a mesh ends in .vtu or .msh; convert it, with meshio say"))),
+        _ => Err(Failure::Rejected(anyhow!(
+            "{name}: the name of a mesh ends in .vtu or .msh; convert the file first, for example with meshio"
+        ))),
     }
 }
 
@@ -144,7 +148,8 @@ fn displacement(path: &Path, mesh: &TetMesh) -> Result<Vec<[f64; 3]>, Failure> {
     let found = vtu::decode(&read_input(path)?, &name).reject()?;
     let refuse = |why: String| Failure::Rejected(anyhow!("{name}: {why}"));
     let vectors = found.point_field("displacement").and_then(Field::vectors);
-    let vectors = vectors.ok_or_else(|| refuse("no point array `displacement` of three components".to_owned()))?;
+    let none = "no point array `displacement` of three components; give a result of `hgm simulate`";
+    let vectors = vectors.ok_or_else(|| refuse(none.to_owned()))?;
     if vectors.len() != mesh.nodes_mm().len() {
         let (a, b) = (vectors.len(), mesh.nodes_mm().len());
         return Err(refuse(format!("has {a} nodes, the mesh {b}: give a result on the same mesh")));
@@ -178,7 +183,8 @@ fn produced(
         for (n, frame) in std::mem::take(&mut motion.frames).into_iter().enumerate() {
             let name = format!("{stem}-{:04}.vtu", n + 1);
             let field = [Field::vector("displacement", &frame.displacement_mm)];
-            files.push((name.clone(), vtu::encode(mesh, &field, &[])?));
+            let bytes = vtu::encode(mesh, &field, &[]).with_context(|| name.clone()).reject()?;
+            files.push((name.clone(), bytes));
             series.push((frame.time_s, name));
         }
     }
@@ -197,7 +203,8 @@ fn produced(
         motion: outcome.motion,
         warnings: outcome.warnings.clone(),
     };
-    files.push((output, vtu::encode(mesh, &points, &cells)?));
+    let bytes = vtu::encode(mesh, &points, &cells).with_context(|| output.clone()).reject()?;
+    files.push((output, bytes));
     if let Some(name) = &summary.series {
         let list: Vec<(f64, &str)> = series.iter().map(|(time, file)| (*time, file.as_str())).collect();
         files.push((name.clone(), pvd::encode(&list)));

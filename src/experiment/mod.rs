@@ -9,6 +9,7 @@ pub mod prior;
 pub mod resection;
 pub mod rmse;
 pub mod sample;
+pub mod setting;
 pub mod smooth_noise;
 pub mod sweep;
 pub mod synth;

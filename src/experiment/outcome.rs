@@ -244,7 +244,10 @@ pub struct MeshOutcome {
 
 /// Why a text is not an outcome.
 #[derive(Debug, Error)]
-#[error("{name}: not an outcome of this program ({reason}); run the experiment again")]
+#[error(
+    "{name}: not an outcome of this version of hgm ({reason}); make it again with `hgm run`, `hgm sweep` or \
+     `hgm phantom`"
+)]
 pub struct OutcomeError {
     name: String,
     reason: String,

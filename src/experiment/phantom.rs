@@ -1,8 +1,12 @@
 //! The synthetic validation: known moduli go in and must come out.
 
 use super::sample::{Sample, Tissue, TissueSample};
+use super::setting::{
+    LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
+};
 use crate::fem::{Loads, PatchLoad, Scenario, SolverSettings};
 use crate::material::law::Material;
+use crate::tag::SETS;
 use serde::{Deserialize, Serialize};
 
 /// What the phantom is made of and how it is loaded.
@@ -56,6 +60,30 @@ impl Default for PhantomSettings {
 }
 
 impl PhantomSettings {
+    /// Refuses what no phantom can be made with.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+        let (brain, grey, white) =
+            (self.brain_shear_modulus_pa, self.grey_matter_shear_modulus_pa, self.white_matter_shear_modulus_pa);
+        let (one, two) = (self.one_tissue_force_n, self.two_tissue_force_n);
+        first_broken(&[
+            ("tissues", &self.tissues, (1..=2).contains(&self.tissues), TISSUES_RULE),
+            ("brain_shear_modulus_pa", &brain, positive(brain), "above 0"),
+            ("grey_matter_shear_modulus_pa", &grey, positive(grey), "above 0"),
+            ("white_matter_shear_modulus_pa", &white, positive(white), "above 0"),
+            ("poisson_ratio", &self.poisson_ratio, (0.0..0.5).contains(&self.poisson_ratio), POISSON_RULE),
+            ("one_tissue_force_n", &one, finite(&one), "three numbers"),
+            ("two_tissue_force_n", &two, finite(&two), "three numbers"),
+            ("sd_levels", &self.sd_levels, levels_hold(&self.sd_levels), LEVELS_RULE),
+            ("fixed", &self.fixed, sets_hold(&self.fixed), SETS_RULE),
+            ("loaded_set", &self.loaded_set, SETS.contains(&self.loaded_set.as_str()), SETS_RULE),
+        ])
+    }
+
     /// The tissues varied.
     pub fn tissue_list(&self) -> Vec<Tissue> {
         if self.tissues == 1 { Tissue::whole_brain() } else { Tissue::grey_and_white() }

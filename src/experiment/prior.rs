@@ -42,7 +42,10 @@ pub enum PriorError {
         source: FitError,
     },
     /// No level.
-    #[error("sd_levels is empty: give at least one level, -2 to 2 in the paper")]
+    #[error(
+        "setting `sd_levels` of the table [resection] (of a phantom: [phantom]) is empty: give at least one level, \
+         such as [-2.0, 0.0, 2.0]"
+    )]
     NoLevels,
 }
 

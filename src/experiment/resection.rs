@@ -2,6 +2,9 @@
 
 use super::outcome::NoiseFloor;
 use super::sample::Tissue;
+use super::setting::{
+    LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
+};
 use crate::fem::{Loads, PressureLoad, Scenario, SolverSettings};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -66,6 +69,26 @@ impl Default for ResectionSettings {
 }
 
 impl ResectionSettings {
+    /// Refuses what no simulation can be posed with.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let (g, density) = (self.gravity_m_per_s2, self.density_kg_per_m3);
+        let pressures = self.pressure.iter().all(|load| load.pressure_pa.is_finite());
+        let registration = self.registration_error_mm;
+        first_broken(&[
+            ("tissues", &self.tissues, (1..=2).contains(&self.tissues), TISSUES_RULE),
+            ("gravity_m_per_s2", &g, g.iter().all(|x| x.is_finite()), "three numbers"),
+            ("density_kg_per_m3", &density, density >= 0.0 && density.is_finite(), "0 or more"),
+            ("pressure", &self.pressure, pressures, "pressures in Pa, each a number"),
+            ("poisson_ratio", &self.poisson_ratio, (0.0..0.5).contains(&self.poisson_ratio), POISSON_RULE),
+            ("sd_levels", &self.sd_levels, levels_hold(&self.sd_levels), LEVELS_RULE),
+            ("fixed", &self.fixed, sets_hold(&self.fixed), SETS_RULE),
+            ("registration_error_mm", &registration, (0.0..=20.0).contains(&registration), "0 to 20 mm"),
+        ])
+    }
+
     /// The tissues varied.
     pub fn tissue_list(&self) -> Vec<Tissue> {
         if self.tissues == 1 { Tissue::whole_brain() } else { Tissue::grey_and_white() }

@@ -50,13 +50,14 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     let mut numbers: Vec<(String, f64)> = vec![("loads.density_kg_per_m3".into(), loads.density_kg_per_m3)];
     numbers.extend(loads.gravity_m_per_s2.iter().map(|&v| ("loads.gravity_m_per_s2".into(), v)));
     for patch in &loads.patch {
-        numbers.extend(patch.force_n.iter().map(|&v| (format!("force_n of patch `{}`", patch.set), v)));
+        numbers.extend(patch.force_n.iter().map(|&v| (format!("loads.patch.force_n` of set `{}", patch.set), v)));
     }
     for p in &loads.pressure {
-        numbers.push((format!("pressure_pa of set `{}`", p.set), p.pressure_pa));
+        numbers.push((format!("loads.pressure.pressure_pa` of set `{}", p.set), p.pressure_pa));
     }
     for p in &scenario.prescribed {
-        numbers.extend(p.displacement_mm.iter().map(|&v| (format!("displacement_mm of set `{}`", p.set), v)));
+        let key = format!("prescribed.displacement_mm` of set `{}", p.set);
+        numbers.extend(p.displacement_mm.iter().map(|&v| (key.clone(), v)));
     }
     if let Some(csf) = loads.csf {
         numbers.push(("loads.csf.density_kg_per_m3".into(), csf.density_kg_per_m3));

@@ -9,28 +9,31 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum FemError {
-    #[error("there is no set `{set}` in the mesh; it has: {known}. Rename it in the scenario or tag the mesh")]
+    #[error("there is no set `{set}` in the mesh; it has: {known}. Write one of these, or tag the mesh")]
     UnknownSet { set: String, known: String },
     #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
     NothingHeld,
-    #[error("set `{set}` is empty: nothing can be held by it")]
+    #[error("set `{set}` is empty: nothing can be held by it; name another set, or tag the mesh again")]
     EmptySet { set: String },
-    #[error("every node is held: there is nothing to compute")]
+    #[error("every node is held: there is nothing to compute; take a set out of `fixed`")]
     AllHeld,
     #[error(
         "cell {cell} has label {label}, which has no name: give it one in the scenario's `[labels]` table \
          (`grey_matter = {label}`)"
     )]
     UnnamedLabel { cell: usize, label: u8 },
-    #[error("cell {cell} has label {label} (`{name}`), but the scenario has no `[materials.{name}]`")]
+    #[error("cell {cell} has label {label} (`{name}`), but the scenario has no `[materials.{name}]`; add it")]
     NoMaterial { cell: usize, label: u8, name: String },
     #[error("`[materials.{name}]`: `{name}` is no label: name its number in `[labels]` (`{name} = 1`)")]
     UnknownLabel { name: String },
-    #[error("labels `{first}` and `{second}` have the same number {number} in `[labels]`")]
+    #[error("labels `{first}` and `{second}` have the same number {number} in `[labels]`; give each its own")]
     SameLabel { first: String, second: String, number: u8 },
     #[error("`[materials.{name}]`: {source}")]
     Material { name: String, source: MaterialError },
-    #[error("set `{set}` has no boundary facet: a force or pressure needs an area")]
+    #[error(
+        "set `{set}` has no facet on the boundary: a force or pressure needs an area; name a facet set, or a node set \
+         that holds whole facets of the surface"
+    )]
     NoFacets { set: String },
     #[error("`{key}` is {value}: it must be {rule}")]
     Setting { key: String, value: f64, rule: &'static str },
@@ -43,8 +46,8 @@ pub enum FemError {
     #[error("there is no {what} to differentiate by: name a material of the scenario and a parameter of its law")]
     NoParameter { what: String },
     #[error(
-        "the tangent at this state is not positive definite: sensitivities exist at a stable equilibrium only; \
-         solve with the same materials first"
+        "the body is about to buckle at this state, so nothing can be said of how it depends on the moduli; lower the \
+         load or raise the shear modulus"
     )]
     UnstableState,
     #[error(

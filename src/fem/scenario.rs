@@ -221,8 +221,9 @@ impl Default for DynamicsSettings {
 
 /// Why a text is not a scenario.
 #[derive(Debug, Error)]
-#[error("not a scenario: {message}")]
+#[error("line {line}: {message}; correct the scenario")]
 pub struct ScenarioError {
+    line: usize,
     message: String,
 }
 
@@ -232,7 +233,11 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] with line, key and what was expected.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
-        toml::from_str(text).map_err(|e| ScenarioError { message: e.to_string() })
+        toml::from_str(text).map_err(|e: toml::de::Error| {
+            let before = e.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
+            let message = e.message().trim().replace('\n', " ");
+            ScenarioError { line: 1 + before.matches('\n').count(), message }
+        })
     }
 
     /// The number of a label name: from `labels`, else as in DSEG files.

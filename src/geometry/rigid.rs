@@ -30,7 +30,8 @@ pub struct RigidTransform<From: Frame, To: Frame> {
 /// The matrix given is not a rotation and a translation.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "the 4x4 matrix is not rigid: R^T R differs from the identity by {orthogonality_error:.3e}, determinant {determinant:.4}"
+    "the 4x4 matrix turns and shifts, but also stretches or mirrors (axes off by {orthogonality_error:.3}, determinant \
+     {determinant:.4})"
 )]
 pub struct NotRigid {
     /// Largest entry of R^T R - I.

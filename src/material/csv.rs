@@ -15,7 +15,7 @@ pub struct Row {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum CsvError {
     /// A quote that is never closed.
-    #[error("line {line}: the quote is never closed")]
+    #[error("line {line}: the quote is never closed; close it, or take it away")]
     OpenQuote {
         /// Line of the quote.
         line: usize,

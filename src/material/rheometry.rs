@@ -59,7 +59,10 @@ pub enum RheometryError {
         column: String,
     },
     /// A row of another width.
-    #[error("line {line}: {found} cells where the header has {expected}")]
+    #[error(
+        "line {line}: {found} cells where the header has {expected}; give one cell for each column (decimals with a \
+         point, not a comma)"
+    )]
     Cells {
         /// Line.
         line: usize,
@@ -87,7 +90,10 @@ pub enum RheometryError {
         stretch: f64,
     },
     /// An energy below zero.
-    #[error("line {line}: the energy is {energy_pa} Pa; a strain energy is zero at rest and positive elsewhere")]
+    #[error(
+        "line {line}: the energy is {energy_pa} Pa; a strain energy is zero at rest and positive elsewhere; correct \
+         the value, or name the column by what it is (`nominal stress (Pa)`)"
+    )]
     NegativeEnergy {
         /// Line.
         line: usize,

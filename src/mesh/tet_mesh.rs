@@ -30,13 +30,15 @@ pub struct TetMesh {
 #[derive(Debug, Error, PartialEq)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum MeshError {
-    #[error("the mesh has no tetrahedra")]
+    #[error("the mesh has no tetrahedra; export the volume cells too")]
     Empty,
     #[error("{labels} labels for {tets} tetrahedra: one each is needed")]
     LabelCount { tets: usize, labels: usize },
-    #[error("node {node} has a coordinate that is not a finite number")]
+    #[error("node {node} (counted from 0) has a coordinate that is not a finite number; repair the mesh")]
     NotFinite { node: usize },
-    #[error("tetrahedron {tet} names node {node}, but there are only {nodes} nodes")]
+    #[error(
+        "tetrahedron {tet} (counted from 0) names node {node}, but there are only {nodes} nodes; write the file again"
+    )]
     NoSuchNode { tet: usize, node: u32, nodes: usize },
     #[error("tetrahedron {tet} has volume {volume_mm3:e} mm3: inverted or flat; reorder its nodes or repair the mesh")]
     NotPositive { tet: usize, volume_mm3: f64 },

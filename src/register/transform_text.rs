@@ -29,7 +29,10 @@ pub enum TransformTextError {
         word: String,
     },
     /// The last row is not that of an affine map.
-    #[error("{name}: the last row is {row:?}, it must be 0 0 0 1")]
+    #[error(
+        "{name}: the last row is {} {} {} {}, it must be 0 0 0 1; make the file again with `hgm prep`",
+        row[0], row[1], row[2], row[3]
+    )]
     LastRow {
         /// The file.
         name: String,
@@ -73,7 +76,7 @@ pub enum TransformTextError {
         name: String,
     },
     /// A rigid transform was wanted.
-    #[error("{name}: {source}: give a rigid transform")]
+    #[error("{name}: not rigid: {source}; give a rotation and a shift only, or make the file again with `hgm prep`")]
     NotRigid {
         /// The file.
         name: String,

@@ -24,15 +24,27 @@ const PICTURE: [usize; 2] = [560, 460];
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ReportError {
-    #[error("{}: not a case directory: none of its files is there; name a folder made by `hgm run` or `hgm phantom`", folder.display())]
+    #[error(
+        "{}: not a case folder: none of its files is there; name a folder made by `hgm run`, `hgm prep` or \
+         `hgm phantom`",
+        folder.display()
+    )]
     NoCase { folder: PathBuf },
-    #[error("{}: cannot be read ({source}); check its permissions", path.display())]
+    #[error(
+        "{}: cannot be read; check that the case folder is a folder and that its files may be read", path.display()
+    )]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{file}: not UTF-8 text; the file is damaged: run the experiment again")]
+    #[error("{file}: not text, so the file is damaged; run `hgm run` or `hgm phantom` again")]
     Text { file: String },
-    #[error("{file}: point array `{array}` has {found} numbers for {nodes} nodes; write the file again")]
+    #[error(
+        "{file}: point array `{array}` has {found} numbers for {nodes} nodes: the file is not this case's; make it \
+         again with `hgm run` or `hgm phantom`"
+    )]
     Array { file: String, array: String, found: usize, nodes: usize },
-    #[error("{file}: its grid is not that of {other}; write both on one grid")]
+    #[error(
+        "{file}: its grid is not that of {other}: one of the two is not this case's; make them again with \
+         `hgm prep PRE POST -o CASE`"
+    )]
     Grid { file: String, other: String },
     #[error(transparent)]
     Image(#[from] NiftiError),

@@ -16,9 +16,9 @@ const BIDS_VERSION: &str = "1.10.0";
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum DerivativesError {
-    #[error("{file}: cannot be read ({source}); run the participant again")]
+    #[error("{file}: cannot be read; run this subject again (`hgm bids BIDS_DIR OUT participant --participant-label`)")]
     Read { file: String, source: std::io::Error },
-    #[error("{file}: not a manifest ({source}); run the participant again with --force")]
+    #[error("{file}: not a manifest of this version; run this subject again with --force")]
     Manifest { file: String, source: serde_json::Error },
 }
 

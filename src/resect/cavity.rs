@@ -114,7 +114,10 @@ pub enum ResectError {
         after_cc: f64,
     },
     /// A given cavity lies elsewhere.
-    #[error("the cavity lies outside the brain: only {percent:.0} % of it was tissue before; check the masks' grids")]
+    #[error(
+        "the cavity or resected mask lies outside the brain: only {percent:.0} % of it was tissue before; check the \
+         masks (--cavity-mask, --resected-mask) and their grids"
+    )]
     OutsideBrain {
         /// Share of the cavity that was tissue on the pre-operative scan.
         percent: f64,

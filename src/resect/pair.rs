@@ -31,6 +31,18 @@ pub struct PairSettings {
     pub cavity: CavitySettings,
 }
 
+impl PairSettings {
+    /// Refuses settings out of range, by name.
+    ///
+    /// # Errors
+    /// The first that is, in words.
+    pub fn check(&self) -> Result<(), String> {
+        self.deformable.check().map_err(|e| format!("[anat.deformable]: {e}"))?;
+        self.sag.check().map_err(|e| format!("[anat.sag]: {e}"))?;
+        self.segment.check().map_err(|e| format!("[anat.segment]: {e}"))
+    }
+}
+
 impl Default for PairSettings {
     fn default() -> Self {
         Self {
@@ -87,7 +99,7 @@ pub enum PairError {
     /// A scan cannot be taken apart, or the brain of one not be found in the other.
     #[error("{scan}: {source}")]
     Head {
-        /// `pre` or `post`.
+        /// Which of the two.
         scan: &'static str,
         /// The fit's or the segmentation's own words.
         source: HeadError,
@@ -96,7 +108,10 @@ pub enum PairError {
     #[error(transparent)]
     Resect(#[from] ResectError),
     /// Nothing was taken out.
-    #[error("the resected tissue is empty; give --resected-mask")]
+    #[error(
+        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain; check --cavity-mask, or \
+         give --resected-mask"
+    )]
     NothingResected,
     /// The operation's ventricle cannot be told from the cavity.
     #[error(
@@ -127,7 +142,7 @@ pub fn take_pair_apart(
     step("pre-operative tissue");
     let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
     let (before, pre_fit) = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment)
-        .map_err(|source| PairError::Head { scan: "pre", source })?;
+        .map_err(|source| PairError::Head { scan: "the pre-operative scan", source })?;
 
     step("cavity");
     let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
@@ -163,8 +178,8 @@ pub fn take_pair_apart(
         post_known: &post_on_mni.inside,
         cavity: &finding.cavity,
     };
-    let sag =
-        fit_sag(&scans, &settings.sag).map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
+    let sag = fit_sag(&scans, &settings.sag)
+        .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?;
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -192,7 +207,7 @@ pub fn take_pair_apart(
     let post_priors = carried_priors(|p| pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
     let after =
         segment_with_priors(post, &mni_from_post, &post_priors, &SegmentOverrides::default(), &settings.segment)
-            .map_err(|source| PairError::Head { scan: "post", source: source.into() })?;
+            .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?;
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);

@@ -149,8 +149,8 @@ pub enum SegmentError {
     NoTissueContrast,
     /// The mask found (or given) is no brain.
     #[error(
-        "the brain's volume is {found_cc:.0} cc, outside {smallest_cc:.0} to {largest_cc:.0} cc: check the registration \
-         and the voxel size, or give a brain mask"
+        "the brain's volume is {found_cc:.0} cc, outside {smallest_cc:.0} to {largest_cc:.0} cc: check the voxel size \
+         and the registration, or, for the pre-operative scan, give a brain mask (--brain-mask)"
     )]
     ImplausibleBrain {
         /// Volume found.
@@ -161,7 +161,7 @@ pub enum SegmentError {
         largest_cc: f64,
     },
     /// A setting has no meaning.
-    #[error("the segmentation setting `{name}` is {value}: it must be {rule}")]
+    #[error("`{name}` of the segmentation is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,
@@ -198,7 +198,7 @@ pub fn segment_with_priors<F: Frame>(
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    check(settings)?;
+    settings.check()?;
     let grid = priors.brain_mm.grid;
     let t1_from_mni = mni_from_t1.inverse();
     // The spline keeps the sharpness that a linear kernel would take from every sulcus.
@@ -290,24 +290,30 @@ pub fn segment_with_priors<F: Frame>(
     })
 }
 
-fn check(settings: &SegmentSettings) -> Result<(), SegmentError> {
-    let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 9] = [
-        ("brain.reach_mm", settings.brain.reach_mm, 0.0..=30.0, "0 to 30 mm"),
-        ("brain.opening_mm", settings.brain.opening_mm, 0.0..=10.0, "0 to 10 mm"),
-        ("brain.closing_mm", settings.brain.closing_mm, 0.0..=20.0, "0 to 20 mm"),
-        ("brain.trusted_depth_mm", settings.brain.trusted_depth_mm, 0.0..=30.0, "0 to 30 mm"),
-        ("ventricle.reach_mm", settings.ventricle.reach_mm, 0.0..=30.0, "0 to 30 mm"),
-        ("ventricle.closing_mm", settings.ventricle.closing_mm, 0.0..=5.0, "0 to 5 mm"),
-        ("bias_order", settings.bias_order as f64, 0.0..=3.0, "0 to 3"),
-        ("disbelief", settings.disbelief, 0.0..=1.0, "0 to 1"),
-        ("neighbour_weight", settings.neighbour_weight, 0.0..=5.0, "0 to 5"),
-    ];
-    for (name, value, range, rule) in rules {
-        if !range.contains(&value) {
-            return Err(SegmentError::Setting { name, value, rule });
+impl SegmentSettings {
+    /// Refuses settings out of range, by name.
+    ///
+    /// # Errors
+    /// [`SegmentError::Setting`].
+    pub fn check(&self) -> Result<(), SegmentError> {
+        let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 9] = [
+            ("brain.reach_mm", self.brain.reach_mm, 0.0..=30.0, "0 to 30 mm"),
+            ("brain.opening_mm", self.brain.opening_mm, 0.0..=10.0, "0 to 10 mm"),
+            ("brain.closing_mm", self.brain.closing_mm, 0.0..=20.0, "0 to 20 mm"),
+            ("brain.trusted_depth_mm", self.brain.trusted_depth_mm, 0.0..=30.0, "0 to 30 mm"),
+            ("ventricle.reach_mm", self.ventricle.reach_mm, 0.0..=30.0, "0 to 30 mm"),
+            ("ventricle.closing_mm", self.ventricle.closing_mm, 0.0..=5.0, "0 to 5 mm"),
+            ("bias_order", self.bias_order as f64, 0.0..=3.0, "0 to 3"),
+            ("disbelief", self.disbelief, 0.0..=1.0, "0 to 1"),
+            ("neighbour_weight", self.neighbour_weight, 0.0..=5.0, "0 to 5"),
+        ];
+        for (name, value, range, rule) in rules {
+            if !range.contains(&value) {
+                return Err(SegmentError::Setting { name, value, rule });
+            }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 fn mixture_settings(settings: &SegmentSettings, stride: usize) -> MixtureSettings {

@@ -30,6 +30,8 @@ pub const SUPERIOR: &str = "superior";
 pub const MARGIN: &str = "margin";
 /// Held, as an option: the tentorium cerebelli.
 pub const TENTORIUM: &str = "tentorium";
+/// All of them.
+pub const SETS: [&str; 6] = [BASE, FALX, VENTRICLE, SUPERIOR, MARGIN, TENTORIUM];
 /// A facet set that meshing leaves where labels were split: used up by tagging.
 pub use crate::mesh::engine::MIDSAGITTAL;
 
@@ -141,11 +143,16 @@ impl TagReport {
 #[derive(Debug, Error, PartialEq)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum TagError {
-    #[error("the mesh has no tissue: every cell is ventricle ({}) or resected ({})", label::VENTRICLE, label::RESECTED)]
+    #[error(
+        "the mesh has no tissue: every cell is ventricle ({}) or resected ({}); check the label map",
+        label::VENTRICLE,
+        label::RESECTED
+    )]
     NoTissue,
     #[error(
         "boundary set `{set}` is empty: {reason}. The mesh spans {low_mm:.0?} to {high_mm:.0?} mm; boundary sets need \
-         the MNI frame (rigid), RAS+, mm: register the image to the template first, or name your own sets"
+         the MNI frame (rigid), RAS+, mm: check the registration to the template and the segmentation, or do without \
+         them (`hgm mesh --sets none`)"
     )]
     Empty { set: String, reason: &'static str, low_mm: [f64; 3], high_mm: [f64; 3] },
 }

@@ -136,3 +136,77 @@ fn slow_a_mask_outside_the_brain_is_refused_and_no_mask_is_written() {
     assert!(message.contains("outside the brain") && message.contains("check the masks"), "{message:?}");
     assert!(!folder.path().join("case/anat").exists(), "masks were written");
 }
+
+#[test]
+fn settings_that_would_stop_a_later_stage_stop_the_job_before_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
+    let settings: [(&str, &[&str]); 7] = [
+        ("[registr]\n", &["no table [registr]", "[register]"]),
+        ("[resection]\npoisson_ratio = 0.6\n", &["[resection]", "poisson_ratio", "below 0.5"]),
+        ("[resection]\nfixed = [\"skull\"]\n", &["[resection]", "skull", "base, falx"]),
+        ("[resection]\ntissues = 7\n", &["tissues", "1 (the whole brain) or 2"]),
+        ("[prior]\nstudy = \"mri\"\n", &["[prior]", "mri", "mre"]),
+        ("[mesh]\nsize = { cells = 0 }\n", &["[mesh]", "size.cells"]),
+        ("[estimate]\nphantom_noise_mm = nan\n", &["[estimate]", "phantom_noise_mm"]),
+    ];
+    for (text, words) in settings {
+        std::fs::write(path("settings.toml"), text).unwrap();
+        let config = path("settings.toml");
+        let run = ["--config", &config, "run", pair[0], pair[1], "-o", &path("case")];
+        refuses(&run, "settings.toml", words, &path("case"));
+    }
+    let run = ["run", pair[0], pair[1], "--cells", "0", "-o", &path("case")];
+    refuses(&run, "--cells", &["1 or more"], &path("case"));
+}
+
+#[test]
+fn a_volume_or_an_affine_chosen_on_the_command_line_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let plain = unpacked(&std::fs::read(sample("pre.nii.gz")).unwrap());
+    let (three, voxels) = (sample("pre.nii.gz"), &plain[352..]);
+    let dims = [&4i16.to_le_bytes()[..], &plain[42..48], &2i16.to_le_bytes()].concat();
+    // A volume of noise before the scan itself; the sform lies 60 mm away from the qform.
+    let noise: Vec<u8> = (0..voxels.len() / 2).flat_map(|n| ((n * 7919 % 1000) as i16).to_le_bytes()).collect();
+    let four = [with(&plain, 40, &dims), noise].concat();
+    let four = [&four[..352], &four[plain.len()..], voxels].concat();
+    std::fs::write(path("four.nii"), four).unwrap();
+    let old = f32::from_le_bytes(plain[292..296].try_into().unwrap());
+    std::fs::write(path("forms.nii"), with(&plain, 292, &(old + 60.0).to_le_bytes())).unwrap();
+    let register = |moving: &str, more: &[&str]| {
+        let (moving, out) = (path(moving), path("xfm.txt"));
+        let all = [&["register", &moving, three.to_str().unwrap(), "-o", &out][..], more].concat();
+        let ended = output(&all);
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        let text = std::fs::read_to_string(out).unwrap();
+        text.split_whitespace().map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    // The single volume of the other file leaves nothing to choose.
+    let itself = register("four.nii", &["--volume", "1"]);
+    assert!((0..12).all(|n| (itself[n] - f64::from(u8::from(n % 5 == 0))).abs() < 0.02), "{itself:?}");
+    let by_qform = register("forms.nii", &["--prefer", "qform"]);
+    assert!((0..3).all(|row| by_qform[4 * row + 3].abs() < 0.05), "{by_qform:?}");
+    let by_sform = register("forms.nii", &["--prefer", "sform"]);
+    assert!((0..3).any(|row| by_sform[4 * row + 3].abs() > 50.0), "{by_sform:?}");
+}
+
+#[test]
+fn folders_of_another_kind_are_named_for_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::create_dir(path("empty")).unwrap();
+    for command in ["sweep", "reduce", "estimate"] {
+        let ended = output(&[command, &path("empty")]);
+        let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(3), "{message}");
+        assert!(message.contains(&path("empty")) && message.contains("not a case folder"), "{message}");
+    }
+    std::fs::create_dir_all(path("phantom/.stages")).unwrap();
+    std::fs::write(path("phantom/.stages/labels.manifest.json"), "{}").unwrap();
+    let ended = output(&["sweep", &path("phantom")]);
+    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(3) && message.contains("this is a phantom"), "{message}");
+}

@@ -7,7 +7,7 @@ use crate::artefact::{sha256_hex, write_whole};
 use crate::cli::{Failure, Reject, Session};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::report::cohort::{Cohort, Member, Status};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 
 /// The settings of a case, for telling whether subjects were run alike.
 const SETTINGS: &str = "settings.toml";
@@ -38,8 +38,8 @@ fn member(args: &Args, subject: &str) -> Result<Member, Failure> {
     let log: Option<Log> = match std::fs::read(&log) {
         Err(_) => None,
         Ok(bytes) => {
-            let shown = || format!("{}: not a log of hgm; take it away", log.display());
-            Some(serde_json::from_slice(&bytes).with_context(shown).reject()?)
+            let shown = || anyhow!("{}: not a log of hgm; delete it and run this subject again", log.display());
+            Some(serde_json::from_slice(&bytes).map_err(|_| shown()).reject()?)
         }
     };
     let status = match (&log, &outcome) {

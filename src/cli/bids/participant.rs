@@ -4,6 +4,7 @@ use super::dataset::{Dataset, NoPair, ScanPair};
 use super::{Args, case_folder, log_file};
 use crate::artefact::write_whole;
 use crate::cli::case::Overrides;
+use crate::cli::failure::in_one_line;
 use crate::cli::prep;
 use crate::cli::{Failure, Reject, Session, run};
 use crate::report::cohort::Status;
@@ -11,7 +12,7 @@ use crate::report::derivatives::{dataset_files, subject_files, way_up};
 use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a subject did not end well, as `logs/sub-X.json` keeps it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -67,8 +68,16 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    std::fs::create_dir_all(&args.out).with_context(|| format!("{}: cannot be made", args.out.display())).reject()?;
-    let (out, raw) = (args.out.canonicalize()?, dataset.folder.canonicalize()?);
+    let refused = || {
+        let out = args.out.display();
+        format!("{out}: the folder for the derivatives cannot be made; name a folder that you may write to")
+    };
+    std::fs::create_dir_all(&args.out).with_context(refused).reject()?;
+    let absolute = |folder: &Path| {
+        let lost = || format!("{}: the folder cannot be found; check the path", folder.display());
+        folder.canonicalize().with_context(lost).reject()
+    };
+    let (out, raw) = (absolute(&args.out)?, absolute(&dataset.folder)?);
     for (file, bytes) in dataset_files(way_up(&out, &raw).as_deref()) {
         write_whole(&args.out.join(file), &bytes)?;
     }
@@ -77,7 +86,7 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
     for subject in &dataset.subjects {
         // A defect of the program in one subject must not cost the others their night.
         let end = catch_unwind(AssertUnwindSafe(|| one(args, dataset, subject, session)));
-        let end = end.unwrap_or_else(|_| Err(anyhow!("the program broke (see the log); please report this").into()));
+        let end = end.unwrap_or_else(|_| Err(defect().into()));
         let page = args.out.join(format!("{subject}.html"));
         let log = log_file(&args.out, subject);
         let status = match &end {
@@ -88,7 +97,8 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
             Err(failure) => {
                 let log_bytes = serde_json::to_string_pretty(&record(failure, args))? + "\n";
                 write_whole(&log, log_bytes.as_bytes())?;
-                failure.report(false);
+                let (kind, error) = failure.parts();
+                eprintln!("hgm: {kind}: {subject}: {}", in_one_line(error));
                 if matches!(failure, Failure::QualityGate(_)) { Status::QualityGate } else { Status::Failed }
             }
         };
@@ -107,10 +117,11 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
     let left = dataset.subjects.len() - done.len();
     let stopped = if left > 0 { format!(", {left} not begun") } else { String::new() };
     let summary = anyhow!(
-        "{} of {} subjects did not end well: {}{stopped}; see logs/ in the derivatives",
+        "{} of {} subjects did not end well: {}{stopped}; see {}/logs",
         unwell.len(),
         dataset.subjects.len(),
-        unwell.join(", ")
+        unwell.join(", "),
+        args.out.display()
     );
     match worst {
         None => Ok(()),
@@ -146,11 +157,19 @@ fn one(args: &Args, dataset: &Dataset, subject: &str, session: &Session) -> Resu
 /// What is kept of a failure: without the folders of this machine.
 fn record(failure: &Failure, args: &Args) -> Log {
     let (kind, error) = failure.parts();
-    let mut message = format!("{error:#}");
+    let mut message = in_one_line(error);
     for folder in [&args.out, &args.bids_dir] {
         message = message.replace(&format!("{}/", folder.display()), "");
     }
     Log { kind: kind.to_owned(), message, exit_code: failure.code() }
+}
+
+/// What is said of a subject that met a panic.
+fn defect() -> anyhow::Error {
+    anyhow!(
+        "the program stopped by a defect of its own (its words are on standard error, above this line); the other \
+         subjects go on; please report it with those words"
+    )
 }
 
 /// A crash is worse than an input that was refused, and that worse than a gate.

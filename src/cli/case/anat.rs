@@ -2,7 +2,7 @@
 
 use super::registration::transforms;
 use super::scans::GivenMask;
-use super::{Case, Failure, OwnMasks, Reject, ScanSums, Scans, facts};
+use super::{Case, Failure, OwnMasks, Reject, ScanSums, Scans, WithReading, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::ResectionVolumes;
@@ -14,6 +14,7 @@ use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, take_pair_apart};
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
+use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
@@ -69,6 +70,15 @@ impl Anatomy {
             Ok(volume.relabelled::<Mni>().map(|l| l > 0))
         };
         let (cavity, resected, post_ventricle) = (mask(CAVITY)?, mask(RESECTED)?, mask(POST_VENTRICLE)?);
+        for (name, grid) in [(CAVITY, cavity.grid), (RESECTED, resected.grid), (POST_VENTRICLE, post_ventricle.grid)] {
+            if !grid.coincides(&labels.grid.relabelled(), 1e-3) {
+                return Err(Failure::Rejected(anyhow!(
+                    "{}: {name} is not on the grid of {PRE_DSEG}: one of the two is not this case's; run `hgm prep PRE \
+                     POST -o {0}` again (--cavity-mask and --resected-mask take masks of your own)",
+                    case.folder.display()
+                )));
+            }
+        }
         let field = |name: &str| -> Result<DisplacementField<Mni>, Failure> {
             let displacement = nifti::decode_vectors(&case.read(name)?, name).reject()?;
             Ok(DisplacementField::from_displacement(&displacement.relabelled()))
@@ -94,7 +104,8 @@ pub fn anat_stage(
     session: &Session,
 ) -> Result<(Stage, PairSettings), Failure> {
     let settings: PairSettings = session.settings("anat")?;
-    let stage = Stage::new("anat", VERSION, &case.folder, &settings)
+    let posed = WithReading { settings: &settings, image: session.reading()? };
+    let stage = Stage::new("anat", VERSION, &case.folder, &posed)
         .input_sha256("pre", &sums.pre)
         .input_sha256("post", &sums.post)
         .after(after)

@@ -4,8 +4,8 @@ use super::{Case, Failure, Reject, Sag, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::estimate::{
-    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
-    Turn, Unknown, moved_by, solve_problem,
+    BodyError, DisplacementSettings, Estimate, EstimateError, EstimateOutcome, EstimateSettings, Instrument, LogPrior,
+    Observation, Problem, ProblemError, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::phantom::neo_hookean;
@@ -16,6 +16,7 @@ use crate::fem::{ElementKind, Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
+use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
@@ -92,6 +93,46 @@ impl Default for EstimateOptions {
 }
 
 impl EstimateOptions {
+    /// Refuses what no estimate can be posed with.
+    ///
+    /// # Errors
+    /// The first setting out of its range, in words.
+    pub fn check(&self) -> Result<(), String> {
+        self.descent.check().map_err(|e| format!("[estimate.descent]: {e}"))?;
+        self.displacement.check().map_err(|e| format!("[estimate.displacement]: {e}"))?;
+        let above_zero = [
+            ("correlation_mm", self.correlation_mm),
+            ("density_log_sd", self.density_log_sd),
+            ("gravity_direction_sd_deg", self.gravity_direction_sd_deg),
+            ("pressure_log_sd", self.pressure_log_sd),
+            ("phantom_noise_mm", self.phantom_noise_mm),
+        ];
+        if let Some((name, value)) = above_zero.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            return Err(format!("`{name}` is {value}: it must be above 0"));
+        }
+        if !(self.model_log_sd >= 0.0 && self.model_log_sd.is_finite()) {
+            return Err(format!("`model_log_sd` is {}: it must be 0 or more", self.model_log_sd));
+        }
+        Ok(())
+    }
+
+    /// Refuses to estimate loads that are not there.
+    fn suits(&self, loads: &Loads) -> Result<(), &'static str> {
+        let weightless = loads.gravity_m_per_s2 == [0.0; 3] || loads.density_kg_per_m3 == 0.0;
+        if (self.density || self.gravity_direction) && weightless {
+            return Err(
+                "`density` and `gravity_direction` need gravity, and this body is loaded without it (a phantom is \
+                        pushed by a force); take them away",
+            );
+        }
+        if self.pressure && loads.pressure.is_empty() {
+            return Err(
+                "`pressure` needs a pressure to begin with: give one in [[resection.pressure]], or take it away",
+            );
+        }
+        Ok(())
+    }
+
     /// The loads that are estimated, with what is known of them beforehand.
     fn unknown_loads(&self, loads: &Loads) -> Vec<(Unknown, LogPrior)> {
         let mut unknowns = Vec::new();
@@ -155,6 +196,7 @@ pub fn estimate(
     options: &EstimateOptions,
     session: &Session,
 ) -> Result<(Manifest, EstimateFacts), Failure> {
+    options.suits(&input.scenario.loads).map_err(|e| anyhow!("table [estimate]: {e}")).reject()?;
     let prior: PriorSettings = session.settings("prior")?;
     let posed = serde_json::json!({
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
@@ -198,10 +240,19 @@ pub fn estimate(
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let found = solve_problem(problem, &settings).reject()?;
+        let found = solve_problem(problem, &settings).map_err(no_estimate)?;
         bar.finish_and_clear();
         produced(input, found)
     })
+}
+
+/// Why there is no estimate: a body without an equilibrium has failed, everything else is the input's.
+fn no_estimate(error: ProblemError) -> Failure {
+    match error {
+        ProblemError::Estimate(EstimateError::Start(_)) | ProblemError::Instrument(_) => Failure::Failed(error.into()),
+        ProblemError::Body(BodyError::Fem(ref fem)) if !fem.is_input() => Failure::Failed(error.into()),
+        refused => Failure::Rejected(refused.into()),
+    }
 }
 
 /// What is observed, the share of it that is independent, and the standard deviation of one observation in mm.

@@ -6,7 +6,9 @@ use crate::cli::Session;
 use crate::experiment::outcome::{MeshOutcome, SetOutcome};
 use crate::geometry::{Frame, Mni, Position};
 use crate::image::LabelMap;
-use crate::mesh::engine::{Engine, EnginePrograms, LabelEdge, MeshSettings, MeshSize, WallEdge, mesh_labels};
+use crate::mesh::engine::{
+    Engine, EngineError, EnginePrograms, LabelEdge, MeshSettings, MeshSize, WallEdge, mesh_labels,
+};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
@@ -14,7 +16,7 @@ use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
 use crate::segment::{label, with_closed_sulci};
 use crate::tag::{TagError, TagSettings, falx_sheet, tag_boundary_sets_with};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -63,7 +65,9 @@ fn wall_edge(text: &str) -> Result<WallEdge, String> {
 }
 
 fn engine(name: &str) -> Result<Engine, String> {
-    serde_json::from_value(name.into()).map_err(|_| format!("no engine `{name}`; `hgm doctor` lists what there is"))
+    serde_json::from_value(name.into()).map_err(|_| {
+        format!("no engine `{name}`: say cgal, lattice, gmsh or tetgen (`hgm doctor` tells which are installed)")
+    })
 }
 
 /// What the report says of the mesh.
@@ -119,7 +123,8 @@ pub fn mesh(
     let (stage, settings, tag_settings) = mesh_stage(case, options, after, session)?;
     case.run(&stage, "mesh", || {
         let body = with_closed_sulci(labels, SULCUS_MM);
-        let (mut whole, record) = mesh_labels(&body, &settings, &programs()).reject()?;
+        let source = template_from_labels.map_or("the template's labels", |_| "anat/pre_space-MNI_dseg.nii.gz");
+        let (mut whole, record) = mesh_labels(&body, &settings, &programs()).map_err(|e| no_mesh(e).about(source))?;
         let in_template = |p: [f64; 3]| match template_from_labels {
             Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
             None => p,
@@ -129,8 +134,14 @@ pub fn mesh(
             TagError::NoTissue => Failure::Rejected(error.into()),
         })?;
         let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
-        let (rest, _) = whole.restricted(tissue).context("the mesh holds no grey or white matter").reject()?;
-        let (rest, _) = rest.largest_face_connected_part().context("the mesh holds no tetrahedra").reject()?;
+        let tissue_of = whole.restricted(tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
+        let no_tissue = || {
+            format!(
+                "{source}: the mesh of these labels holds no grey or white matter; look at the labels, or give a brain \
+                 mask (--brain-mask)"
+            )
+        };
+        let (rest, _) = tissue_of.with_context(no_tissue).reject()?;
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
         produced.files.push(("mesh/rest.msh".to_owned(), msh::encode(&rest)?));
@@ -161,6 +172,14 @@ pub fn mesh(
     })
 }
 
+/// Why there is no mesh: an engine that broke down has failed, everything else is the input's.
+pub fn no_mesh(error: EngineError) -> Failure {
+    match error {
+        EngineError::Program { .. } | EngineError::Invalid { .. } => Failure::Failed(error.into()),
+        refused => Failure::Rejected(refused.into()),
+    }
+}
+
 /// The settings of room `mesh` with the command line over them.
 ///
 /// # Errors
@@ -185,6 +204,8 @@ pub fn mesh_settings(
     }
     settings.sizing.labels.extend(&options.edge_in);
     settings.sizing.walls.extend(&options.edge_near);
+    settings.check().map_err(|e| anyhow!("the mesh asked for (--cells, --edge-mm, table [mesh]): {e}")).reject()?;
+    programs.check(settings.engine).reject()?;
     Ok(settings)
 }
 

@@ -14,7 +14,7 @@ mod scans;
 
 pub use anat::{AnatFacts, Anatomy, anat, anat_stage};
 pub use estimate::{ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, estimate};
-pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_stage, programs};
+pub use mesh::{MeshFacts, MeshOptions, mesh, mesh_outcome, mesh_settings, mesh_stage, no_mesh, programs};
 pub use observed::{observed_surfaces, reference, reference_stage};
 pub use registration::{RegistrationFacts, mni_from_gravity_frame, registration, registration_stage};
 pub use sag::Sag;
@@ -23,10 +23,12 @@ pub use scans::{Overrides, OwnMasks, ScanSums, Scans};
 
 use super::Session;
 use super::failure::{Failure, Reject};
+use super::settings_file;
 use crate::artefact::{Manifest, Produced, Stage, StageError, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
-use crate::report::case::write_report;
-use anyhow::{Context, anyhow};
+use crate::image::nifti::ReadOptions;
+use crate::report::case::{ReportError, write_report};
+use anyhow::anyhow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -45,6 +47,25 @@ pub const OUTCOME: &str = "sim/outcome.json";
 const SETTINGS: &str = "settings.toml";
 /// A phantom's reference state.
 pub const REFERENCE_STATE: &str = "sim/reference.vtu";
+
+/// A stage's settings with how the user's files are read: another volume of the same file is another scan.
+#[derive(Serialize)]
+struct WithReading<'a, S> {
+    #[serde(flatten)]
+    settings: &'a S,
+    image: ReadOptions,
+}
+
+/// What a case folder holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A pair of scans.
+    Patient,
+    /// The template with known moduli.
+    Phantom,
+    /// Nothing of hgm's.
+    Other,
+}
 
 /// A case folder.
 #[derive(Clone, Debug)]
@@ -94,11 +115,10 @@ impl Case {
         if session.has_table(room) || !self.path(SETTINGS).exists() {
             return session.settings(room);
         }
-        let table: toml::Table =
-            self.read_text(SETTINGS)?.parse().context("settings.toml: not a TOML file").reject()?;
-        match table.get(room) {
+        let (text, file) = (self.read_text(SETTINGS)?, self.path(SETTINGS).display().to_string());
+        match settings_file::tables(&text, &file)?.get(room) {
             None => session.settings(room),
-            Some(table) => table.clone().try_into().with_context(|| format!("settings.toml: table [{room}]")).reject(),
+            Some(table) => settings_file::typed(table).map_err(|e| anyhow!("{file}: table [{room}]: {e}")).reject(),
         }
     }
 
@@ -114,11 +134,10 @@ impl Case {
     pub fn stage_facts<T: DeserializeOwned>(&self, stage: &str) -> Result<(Manifest, T), Failure> {
         let name = format!(".stages/{stage}.manifest.json");
         self.read(&name)?;
-        let manifest = Manifest::of_stage(&self.folder, stage)
-            .ok_or_else(|| anyhow!("{name}: not a manifest of this version; run again with --force"))
-            .reject()?;
-        let facts = serde_json::from_value(manifest.facts.clone());
-        Ok((manifest, facts.with_context(|| format!("{name}: facts of another version; run again")).reject()?))
+        let other = || anyhow!("{}: {name} is damaged or another version's; {}", self.folder.display(), self.remedy());
+        let manifest = Manifest::of_stage(&self.folder, stage).ok_or_else(other).reject()?;
+        let facts = serde_json::from_value(manifest.facts.clone()).map_err(|_| other()).reject()?;
+        Ok((manifest, facts))
     }
 
     /// `settings.toml`: every setting that was used, by room.
@@ -151,7 +170,11 @@ impl Case {
     /// # Errors
     /// A file of the case that cannot be used.
     pub fn write_page(&self) -> Result<String, Failure> {
-        Ok(write_report(&self.folder)?.display().to_string())
+        let page = write_report(&self.folder).map_err(|error| match error {
+            ReportError::Write(error) => Failure::Failed(error.into()),
+            damaged => Failure::Rejected(damaged.into()),
+        })?;
+        Ok(page.display().to_string())
     }
 
     /// A file of the case.
@@ -164,8 +187,38 @@ impl Case {
     /// # Errors
     /// Rejected with the command that makes the file.
     pub fn read(&self, name: &str) -> Result<Vec<u8>, Failure> {
-        let remedy = || format!("{name}: not in this case folder; run `hgm prep PRE POST -o CASE` first");
-        std::fs::read(self.path(name)).with_context(remedy).reject()
+        let said = |error: std::io::Error| {
+            let folder = self.folder.display();
+            if self.kind() == Kind::Other {
+                anyhow!("{folder}: not a case folder; name one that `hgm prep`, `hgm run` or `hgm phantom` has made")
+            } else if error.kind() == std::io::ErrorKind::NotFound {
+                anyhow!("{folder}: {name} is not there; {}", self.remedy())
+            } else {
+                anyhow!("{folder}: {name} cannot be read ({error}); check its permissions")
+            }
+        };
+        std::fs::read(self.path(name)).map_err(said).reject()
+    }
+
+    /// What the folder is by the manifests in it.
+    pub fn kind(&self) -> Kind {
+        let has = |stage: &str| self.path(&format!(".stages/{stage}.manifest.json")).exists();
+        if has("registration") {
+            Kind::Patient
+        } else if has("labels") {
+            Kind::Phantom
+        } else {
+            Kind::Other
+        }
+    }
+
+    /// The command that makes this folder's files again.
+    fn remedy(&self) -> String {
+        let folder = self.folder.display();
+        match self.kind() {
+            Kind::Phantom => format!("run `hgm phantom -o {folder} --force` again"),
+            _ => format!("run `hgm prep PRE POST -o {folder}` again"),
+        }
     }
 
     /// A text file of the case.
@@ -173,7 +226,8 @@ impl Case {
     /// # Errors
     /// As [`Case::read`]; also when it is not UTF-8.
     pub fn read_text(&self, name: &str) -> Result<String, Failure> {
-        String::from_utf8(self.read(name)?).with_context(|| format!("{name}: not UTF-8 text")).reject()
+        let said = |_| anyhow!("{}: {name} is not text, so it is damaged; {}", self.folder.display(), self.remedy());
+        String::from_utf8(self.read(name)?).map_err(said).reject()
     }
 
     /// Runs a stage, saying on stderr whether it was skipped; returns its manifest and typed facts.
@@ -198,7 +252,7 @@ impl Case {
             tracing::warn!("{name}: {warning}");
         }
         let facts = serde_json::from_value(outcome.manifest.facts.clone())
-            .map_err(|e| anyhow!("{name}: the manifest's facts cannot be read ({e}); run again with --force"))?;
+            .map_err(|_| anyhow!("{name}: what another version of hgm noted cannot be read; run again with --force"))?;
         Ok((outcome.manifest, facts))
     }
 }

@@ -1,6 +1,6 @@
 //! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
 
-use super::{Case, Failure, MNI_FROM_PRE, PRE_FROM_POST, Reject, ScanSums, Scans, facts};
+use super::{Case, Failure, MNI_FROM_PRE, PRE_FROM_POST, Reject, ScanSums, Scans, WithReading, facts};
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::cli::Session;
 use crate::experiment::outcome::RegistrationOutcome;
@@ -10,6 +10,7 @@ use crate::image::Grid;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
 use crate::register::{RigidFit, RigidMasks, RigidSettings, register_rigid, register_to_template};
 use crate::segment::atlas;
+use anyhow::Context;
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +30,8 @@ pub struct RegistrationFacts {
 /// A settings table that does not fit.
 pub fn registration_stage(case: &Case, sums: &ScanSums, session: &Session) -> Result<(Stage, RigidSettings), Failure> {
     let settings: RigidSettings = session.settings("register")?;
-    let stage = Stage::new("registration", VERSION, &case.folder, &settings)
+    let posed = WithReading { settings: &settings, image: session.reading()? };
+    let stage = Stage::new("registration", VERSION, &case.folder, &posed)
         .input_sha256("pre", &sums.pre)
         .input_sha256("post", &sums.post)
         .frame(Mni::NAME);
@@ -45,10 +47,14 @@ pub fn registration(case: &Case, scans: &Scans, session: &Session) -> Result<(Ma
     case.run(&stage, "registration", || {
         let bar = session.progress(2, "registration");
         bar.set_message("post to pre");
-        let pre_from_post = register_rigid(&scans.post, &scans.pre, RigidMasks::default(), &settings).reject()?;
+        let pre_from_post = register_rigid(&scans.post, &scans.pre, RigidMasks::default(), &settings)
+            .context("registering the post-operative scan (moving) onto the pre-operative one (fixed)")
+            .reject()?;
         bar.inc(1);
         bar.set_message("pre to MNI");
-        let mni_from_pre = register_to_template(&scans.pre, &atlas::template().t1_f32(), &settings).reject()?;
+        let mni_from_pre = register_to_template(&scans.pre, &atlas::template().t1_f32(), &settings)
+            .context("registering the pre-operative scan (moving) onto the MNI template (fixed)")
+            .reject()?;
         bar.finish_and_clear();
         let mut produced = Produced::default();
         produced.warnings.extend(scans.warnings.iter().cloned());
@@ -71,8 +77,8 @@ type Poses = (RigidTransform<Post, Pre>, RigidTransform<Pre, Mni>);
 /// Rejected when a file is missing or not a rigid matrix.
 pub fn transforms(case: &Case) -> Result<Poses, Failure> {
     let text = |name: &str| case.read_text(&format!("{name}.txt"));
-    let pre_from_post = rigid_from_text(&text(PRE_FROM_POST)?, PRE_FROM_POST).reject()?;
-    let mni_from_pre = rigid_from_text(&text(MNI_FROM_PRE)?, MNI_FROM_PRE).reject()?;
+    let pre_from_post = rigid_from_text(&text(PRE_FROM_POST)?, &format!("{PRE_FROM_POST}.txt")).reject()?;
+    let mni_from_pre = rigid_from_text(&text(MNI_FROM_PRE)?, &format!("{MNI_FROM_PRE}.txt")).reject()?;
     Ok((pre_from_post, mni_from_pre))
 }
 

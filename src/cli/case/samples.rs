@@ -13,8 +13,7 @@ use crate::material::StudyKind;
 use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
-use anyhow::anyhow;
-use serde::de::DeserializeOwned;
+use anyhow::{Context, anyhow};
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 2;
@@ -23,10 +22,10 @@ const VERSION: u32 = 2;
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct PriorOptions {
     /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
-    #[arg(long, value_name = "KIND", value_parser = named::<StudyKind>)]
+    #[arg(long, value_name = "KIND")]
     study: Option<StudyKind>,
     /// The law fitted to every sample: neo-hookean, mooney-rivlin, ogden or ogden-high [default: neo-hookean]
-    #[arg(long, value_name = "LAW", value_parser = named::<MetaModel>)]
+    #[arg(long, value_name = "LAW")]
     law: Option<MetaModel>,
 }
 
@@ -39,10 +38,6 @@ impl PriorOptions {
             ..settings.clone()
         }
     }
-}
-
-fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
-    serde_json::from_value(name.into()).map_err(|e| e.to_string())
 }
 
 /// What every sample of a sweep shares.
@@ -101,8 +96,11 @@ pub fn samples(
         if mode == SampleMode::Gather
             && let Some(reason) = stage.why().first()
         {
+            // The values are this program's data; the user's own are in the settings file.
+            let reason = reason.split(" changed from ").next().unwrap_or(reason);
             return Err(Failure::Rejected(anyhow!(
-                "{} is not done ({reason}); run `hgm sweep` on the shard it belongs to, with the same settings",
+                "{} is not done with these settings ({reason}); run `hgm sweep CASE` on the shard it belongs to with \
+                 the settings of the other shards (`hgm why CASE` tells what differs)",
                 sample.id
             )));
         }
@@ -110,8 +108,9 @@ pub fn samples(
             let show = |p: &crate::fem::Progress| {
                 bar.set_message(format!("{} residual {:.1e}", sample.id, p.relative_residual));
             };
-            let solved =
-                solve_sample(sweep.mesh, sweep.template, sweep.tissues, sample, sweep.reference, &show).reject()?;
+            let solved = solve_sample(sweep.mesh, sweep.template, sweep.tissues, sample, sweep.reference, &show)
+                .context("the table [resection] (of a phantom: [phantom]) asks for a simulation that cannot be done")
+                .reject()?;
             produced(sweep.mesh, solved)
         })?;
         records.push((record, manifest));
@@ -125,10 +124,9 @@ fn produced(mesh: &TetMesh, solved: SolvedSample) -> Result<Produced, Failure> {
     let mut produced = Produced::default();
     let mut record = solved.record;
     match solved.state {
-        None => {
-            let reason = solved.reason.unwrap_or_default();
-            produced.warnings.push(format!("{} is left out: {reason}", record.id));
-        }
+        None => produced
+            .warnings
+            .push(format!("{} is left out: its body finds no equilibrium under this load (too soft)", record.id)),
         Some((outcome, errors)) => {
             let file = format!("sim/{}.vtu", record.id);
             let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();

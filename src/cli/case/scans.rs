@@ -5,7 +5,7 @@ use crate::artefact::sha256_hex;
 use crate::cli::Session;
 use crate::cli::session::read_input;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
-use crate::image::nifti::{self, ReadOptions};
+use crate::image::nifti;
 use crate::image::{Grid, Mask, Volume};
 use crate::segment::native::mask_on;
 use anyhow::anyhow;
@@ -57,22 +57,23 @@ impl Scans {
     /// # Errors
     /// Rejected with file, field and remedy; also when both files are the same.
     pub fn read(pre: &Path, post: &Path, session: &Session) -> Result<Self, Failure> {
-        let options: ReadOptions = session.settings("image")?;
+        let options = session.reading()?;
         let (pre_bytes, post_bytes) = (read_input(pre)?, read_input(post)?);
         if pre_bytes == post_bytes {
             return Err(Failure::Rejected(anyhow!(
                 "{} and {}: the two files are the same; give the pre-operative scan first, the post-operative second",
-                shown(pre),
-                shown(post)
+                pre.display(),
+                post.display()
             )));
         }
-        let before = nifti::decode(&pre_bytes, &shown(pre), &options).reject()?;
-        let after = nifti::decode(&post_bytes, &shown(post), &options).reject()?;
+        let before = nifti::decode(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), &options).reject()?;
+        let after = nifti::decode(&post_bytes, &format!("post-operative scan {}", shown(post)), &options).reject()?;
         if before.volume == after.volume {
             return Err(Failure::Rejected(anyhow!(
-                "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery",
-                shown(pre),
-                shown(post)
+                "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery: give \
+                 another file",
+                pre.display(),
+                post.display()
             )));
         }
         let mut warnings: Vec<String> = before.warnings.iter().map(|w| format!("pre: {w}")).collect();
@@ -102,12 +103,14 @@ impl OwnMasks {
     /// # Errors
     /// Rejected when one is on neither scan's grid, empty, or not a mask.
     pub fn read(overrides: &Overrides, scans: &Scans, session: &Session) -> Result<Self, Failure> {
-        let read = |path: &Option<PathBuf>| path.as_deref().map(|path| given_mask(path, scans, session)).transpose();
+        let read = |option: &str, path: &Option<PathBuf>| {
+            path.as_deref().map(|path| given_mask(option, path, scans, session)).transpose()
+        };
         Ok(Self {
-            brain: read(&overrides.brain_mask)?,
-            ventricle: read(&overrides.ventricle_mask)?,
-            cavity: read(&overrides.cavity_mask)?,
-            resected: read(&overrides.resected_mask)?,
+            brain: read("--brain-mask", &overrides.brain_mask)?,
+            ventricle: read("--ventricle-mask", &overrides.ventricle_mask)?,
+            cavity: read("--cavity-mask", &overrides.cavity_mask)?,
+            resected: read("--resected-mask", &overrides.resected_mask)?,
         })
     }
 }
@@ -122,27 +125,35 @@ pub enum GivenMask {
 }
 
 /// Reads a mask and finds whose grid it is on.
-fn given_mask(path: &Path, scans: &Scans, session: &Session) -> Result<(GivenMask, Vec<u8>), Failure> {
+fn given_mask(option: &str, path: &Path, scans: &Scans, session: &Session) -> Result<(GivenMask, Vec<u8>), Failure> {
     // Half a voxel is what two programs may disagree about an origin; more is another grid.
     const TOLERANCE_MM: f64 = 0.1;
-    let options: ReadOptions = session.settings("image")?;
+    let options = session.reading()?;
     let bytes = read_input(path)?;
-    let (mask, _): (Mask<Native>, _) = nifti::decode_mask(&bytes, &shown(path), &options).reject()?;
+    let name = format!("{option} {}", shown(path));
+    let (mask, odd): (Mask<Native>, _) = nifti::decode_mask(&bytes, &name, &options).reject()?;
     let pre: Grid<Native> = scans.pre.grid.relabelled();
     let post: Grid<Native> = scans.post.grid.relabelled();
-    if mask.grid.coincides(&pre, TOLERANCE_MM) {
-        Ok((GivenMask::Pre(mask.relabelled()), bytes))
+    let given = if mask.grid.coincides(&pre, TOLERANCE_MM) {
+        GivenMask::Pre(mask.relabelled())
     } else if mask.grid.coincides(&post, TOLERANCE_MM) {
-        Ok((GivenMask::Post(mask.relabelled()), bytes))
+        GivenMask::Post(mask.relabelled())
     } else {
-        Err(Failure::Rejected(anyhow!(
-            "{}: dim {:?} and its affine are those of neither scan (pre {:?}, post {:?}); resample the mask to one of them",
-            shown(path),
-            mask.grid.dims,
-            pre.dims,
-            post.dims
-        )))
+        let size = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
+        let same = [pre.dims, post.dims].contains(&mask.grid.dims);
+        return Err(Failure::Rejected(anyhow!(
+            "{name}: its grid ({} voxels) is that of neither scan (pre-operative {}, post-operative {}){}; resample \
+             the mask onto one of them",
+            size(mask.grid.dims),
+            size(pre.dims),
+            size(post.dims),
+            if same { ": it lies elsewhere" } else { "" }
+        )));
+    };
+    for warning in odd {
+        tracing::warn!("{name}: {warning}");
     }
+    Ok((given, bytes))
 }
 
 impl GivenMask {

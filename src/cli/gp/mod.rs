@@ -5,7 +5,7 @@ mod sample;
 mod show;
 mod studies;
 
-use super::session::read_input;
+use super::session::{read_input, read_text};
 use super::{Failure, Reject, Session};
 use crate::artefact::{Stage, StageError, StageOutcome};
 use crate::material::gp::Hyperparameters;
@@ -95,8 +95,7 @@ impl HyperparameterOptions {
     pub fn read(&self) -> Result<Hyperparameters, Failure> {
         let Some(path) = &self.hyperparameters else { return Ok(Hyperparameters::published()) };
         let name = path.display().to_string();
-        let text = String::from_utf8(read_input(path)?).with_context(|| format!("{name}: not UTF-8 text")).reject()?;
-        Hyperparameters::from_toml(&text).with_context(|| name).reject()
+        Hyperparameters::from_toml(&read_text(path)?).with_context(|| name).reject()
     }
 }
 

@@ -72,10 +72,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let hyperparameters = args.hyperparameters.read()?;
     let levels = if args.levels.is_empty() { nine_levels().to_vec() } else { args.levels.clone() };
     if let Some(bad) = levels.iter().find(|level| level.is_nan() || level.abs() > 6.0) {
-        return Err(Failure::Rejected(anyhow!("--levels: {bad} is not a number of standard deviations from -6 to 6")));
+        return Err(Failure::Rejected(anyhow!("--levels {bad}: give standard deviations from -6 to 6")));
     }
-    if args.draws.is_some_and(|draws| draws == 0 || draws > 1_000_000) {
-        return Err(Failure::Rejected(anyhow!("--draws: give 1 to 1000000")));
+    if let Some(draws) = args.draws.filter(|draws| *draws == 0 || *draws > 1_000_000) {
+        return Err(Failure::Rejected(anyhow!("--draws {draws}: give 1 to 1000000")));
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };

@@ -105,7 +105,9 @@ fn chosen(ids: &[u32], studies: &Studies) -> Result<Vec<LiteratureModel>, Failur
     let find = |id: &u32| {
         studies.models.iter().find(|model| model.id == *id).cloned().ok_or_else(|| {
             let last = studies.models.iter().map(|model| model.id).max().unwrap_or(0);
-            Failure::Rejected(anyhow!("--models: there is no literature model {id}; ids go from 0 to {last}"))
+            Failure::Rejected(anyhow!(
+                "--models: there is no literature model {id}; ids go from 0 to {last}; `hgm gp studies` lists them"
+            ))
         })
     };
     ids.iter().map(find).collect()

@@ -4,6 +4,7 @@
 //! the skull, where tissue slides past bone, and at the cavity, where there is no tissue to be found again, its
 //! smoothness ties what moves to what does not.
 
+use crate::experiment::setting::{SettingError, first_broken};
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,19 @@ impl Default for DisplacementSettings {
 }
 
 impl DisplacementSettings {
+    /// Refuses what nothing can be observed with.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        first_broken(&[
+            ("depth_mm", &self.depth_mm, self.depth_mm >= 0.0, "0 or more"),
+            ("noise_mm", &self.noise_mm, positive(self.noise_mm), "above 0"),
+            ("correlation_mm", &self.correlation_mm, positive(self.correlation_mm), "above 0"),
+        ])
+    }
+
     /// The nodes deep enough, each with its displacement (mm) by `seen`, a map from the rest position (mm).
     pub fn observed(&self, mesh: &TetMesh, seen: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Vec<(u32, [f64; 3])> {
         // The ventricles' wall is seen well and moves with the tissue.

@@ -1,6 +1,7 @@
 //! Levenberg-Marquardt on residuals in mm with a Gaussian prior on the log-parameters.
 
 use super::LogPrior;
+use crate::experiment::setting::{SettingError, first_broken};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -43,6 +44,23 @@ pub struct EstimateSettings {
     pub longest_step: f64,
 }
 
+impl EstimateSettings {
+    /// Refuses what no descent can be made with.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        first_broken(&[
+            ("noise_mm", &self.noise_mm, positive(self.noise_mm), "above 0"),
+            ("step_tolerance", &self.step_tolerance, self.step_tolerance >= 0.0, "0 or more"),
+            ("decrement_tolerance", &self.decrement_tolerance, self.decrement_tolerance >= 0.0, "0 or more"),
+            ("iterations", &self.iterations, self.iterations >= 1, "1 or more"),
+            ("longest_step", &self.longest_step, positive(self.longest_step), "above 0"),
+        ])
+    }
+}
+
 impl Default for EstimateSettings {
     fn default() -> Self {
         Self { noise_mm: 0.5, step_tolerance: 1e-6, decrement_tolerance: 1e-4, iterations: 30, longest_step: 1.0 }
@@ -80,10 +98,13 @@ pub struct Descent {
 #[derive(Debug, Error, PartialEq)]
 pub enum EstimateError {
     /// The model failed at the start.
-    #[error("the model cannot be evaluated at the start: {0}")]
+    #[error("the estimate cannot begin at the prior's mean: {0}")]
     Start(String),
     /// Nothing to fit.
-    #[error("there are {observations} observations for {parameters} parameters: give more, or fix a parameter")]
+    #[error(
+        "only {observations} observed components for {parameters} unknowns: no node lies deep enough in the brain, or \
+         a surface is empty; lower `depth_mm` in the table [estimate.displacement] or use a finer mesh (--cells)"
+    )]
     TooFewObservations {
         /// Residuals.
         observations: usize,
@@ -91,7 +112,10 @@ pub enum EstimateError {
         parameters: usize,
     },
     /// A residual is NaN or infinite.
-    #[error("residual {0} is not a finite number")]
+    #[error(
+        "the displacement of observation {0} is not a finite number: a file of the case is damaged; make the case \
+         again with `hgm prep` or `hgm phantom`"
+    )]
     NotFinite(usize),
 }
 
@@ -134,6 +158,11 @@ pub fn estimate<M: Forward>(
             let damped = &hessian + DMatrix::from_diagonal(&scale);
             let Some(factor) = damped.cholesky() else {
                 damping *= 10.0;
+                // Numbers that are none (a noise of 0) have no factor, however damped.
+                if damping > 1e8 {
+                    convergence = Convergence::NoDescent;
+                    break 'descent;
+                }
                 continue;
             };
             let mut step = -factor.solve(&gradient);

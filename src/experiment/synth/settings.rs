@@ -120,7 +120,11 @@ impl Default for SynthSettings {
 #[derive(Debug, Error, PartialEq)]
 pub enum SynthError {
     /// A setting outside of what makes sense.
-    #[error("{name} is {value}; it must lie between {low} and {high}")]
+    #[error(
+        "`{name}` is {value}; it must lie between {low} and {high}{}: change its option or the table [synth] of the \
+         settings file",
+        if *name == "post_slice_mm" { " (no thinner than the voxels)" } else { "" }
+    )]
     Setting {
         /// The field of [`SynthSettings`].
         name: &'static str,
@@ -133,7 +137,9 @@ pub enum SynthError {
     },
     /// The lobe is smaller than what is to be taken from it.
     #[error(
-        "resection_cc is {wanted_cc:.1}; this patient's {side} temporal lobe has {lobe_cc:.1} cc, ask for at most 80 % of it"
+        "--resection-cc {wanted_cc:.1}: this patient's {side} temporal lobe has {lobe_cc:.1} cc; ask for at most {:.1} \
+         cc (80 % of it)",
+        0.8 * lobe_cc
     )]
     LobeTooSmall {
         /// What was asked for.

@@ -73,7 +73,7 @@ pub enum NiftiProblem {
         found: u64,
     },
     /// Dimensions that no volume has.
-    #[error("dim is {dim:?}: {rule}; export the scan again as one three-dimensional volume")]
+    #[error("dim is {dim:?}: {rule}; export the file again as one three-dimensional volume")]
     Dimensions {
         /// `dim[0..8]`.
         dim: [i64; 8],
@@ -87,7 +87,7 @@ pub enum NiftiProblem {
         volumes: u64,
     },
     /// The chosen volume does not exist.
-    #[error("dim: volume {chosen} was asked for and the file holds {volumes}; choose --volume N from 0 to {}", .volumes - 1)]
+    #[error("dim: volume {chosen} was asked for and the file holds {volumes}, counted from 0; choose --volume N from 0 to {}", .volumes - 1)]
     NoSuchVolume {
         /// The volume asked for.
         chosen: u64,
@@ -142,14 +142,17 @@ pub enum NiftiProblem {
     )]
     NoOrientation,
     /// The preferred one of two affines is not there.
-    #[error("{wanted}_code is 0: {wanted} was asked for and the file has none; leave the choice out")]
+    #[error(
+        "{wanted}_code is 0: {wanted} was asked for (--prefer, or [image] prefer of the settings file) and the file has \
+         none; leave the choice out"
+    )]
     NoSuchOrientation {
         /// The orientation asked for.
         wanted: Orientation,
     },
     /// sform and qform put the voxels at different places.
     #[error(
-        "sform and qform disagree by up to {difference_mm:.3} mm (allowed: {allowed_mm:.3}): choose the one you trust \
+        "sform and qform disagree by up to {difference_mm:.3} mm (allowed: {allowed_mm:.3} mm): choose the one you trust \
          with --prefer sform or --prefer qform"
     )]
     OrientationsDisagree {
@@ -181,6 +184,6 @@ pub enum NiftiProblem {
         first: f32,
     },
     /// A mask without a voxel inside.
-    #[error("voxels: the mask is empty (every voxel is 0); draw it, or leave the option out to have it computed")]
+    #[error("voxels: the mask is empty (every voxel is 0); draw it, or leave the option out")]
     EmptyMask,
 }

@@ -202,6 +202,8 @@ impl Header {
         let chosen = match volume {
             None if volumes > 1 => return Err(NiftiProblem::SeveralVolumes { volumes }),
             None => 0,
+            // Beside a file of several, one of a single volume leaves nothing to choose.
+            Some(_) if volumes == 1 => 0,
             Some(n) if n as u64 >= volumes => return Err(NiftiProblem::NoSuchVolume { chosen: n as u64, volumes }),
             Some(n) => n as u64,
         };

@@ -26,7 +26,8 @@ use serde::{Deserialize, Serialize};
 pub struct ReadOptions {
     /// Which affine to believe when sform and qform disagree; `None` refuses such a file.
     pub prefer: Option<Orientation>,
-    /// Which volume (from 0) of a 4-D file; `None` refuses a file of several.
+    /// Which volume (from 0) of a file that holds several; `None` refuses such a file. One that holds a single volume is
+    /// read whatever is chosen.
     pub volume: Option<usize>,
 }
 
@@ -112,6 +113,9 @@ pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(M
 /// # Errors
 /// [`NiftiError`], also for a file with fewer than three volumes.
 pub fn decode_vectors(bytes: &[u8], name: &str) -> Result<Volume<[f32; 3], Native>, NiftiError> {
+    if read(bytes, name, &ReadOptions::default()).is_ok() {
+        return Err(refused(name, NiftiProblem::NoSuchVolume { chosen: 1, volumes: 1 }));
+    }
     let component = |n: usize| {
         let options = ReadOptions { volume: Some(n), ..ReadOptions::default() };
         read(bytes, name, &options).map(|image| image.volume)

@@ -34,7 +34,10 @@ pub enum FormError {
         known: String,
     },
     /// A parameter of the form is not there.
-    #[error("form `{form}` needs `{parameter}`, which is missing: write for example `{parameter}=1000`")]
+    #[error(
+        "form `{form}` needs `{parameter}`, which is missing: add `{parameter}=VALUE` to the parameters, with a \
+         semicolon between"
+    )]
     MissingParameter {
         /// The form.
         form: String,
@@ -63,7 +66,7 @@ pub enum FormError {
         value: String,
     },
     /// A list where one number is meant, or two lists of different lengths.
-    #[error("parameter `{parameter}` has {found} values where the form takes {expected}")]
+    #[error("parameter `{parameter}` has {found} values where the form takes {expected} (several stand as `1|2|3`)")]
     Count {
         /// The parameter.
         parameter: String,

@@ -46,7 +46,7 @@ impl Default for FitSettings {
 #[derive(Clone, Debug, PartialEq, ThisError)]
 pub enum FitRefusal {
     /// A setting out of range.
-    #[error("`{field}` is {value}; it must be {rule}")]
+    #[error("`{field}` is {value}; it must be {rule}: change its option or the table [gp] of the settings file")]
     Setting {
         /// The setting.
         field: &'static str,
@@ -56,7 +56,10 @@ pub enum FitRefusal {
         rule: &'static str,
     },
     /// No start got anywhere.
-    #[error("the likelihood is not finite from any of {starts} starts: raise noise_floor (it is {noise_floor})")]
+    #[error(
+        "the likelihood is not finite from any of {starts} starts: raise `noise_floor` in the table [gp] of the \
+         settings file (it is {noise_floor})"
+    )]
     NoStart {
         /// Starts tried.
         starts: usize,

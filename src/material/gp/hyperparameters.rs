@@ -39,7 +39,10 @@ pub enum HyperparametersError {
     #[error("task `{0}` is missing, unknown or stands twice: give each of the twelve tasks one table")]
     Tasks(String),
     /// Ranks that differ.
-    #[error("task `{task}` has {found} weights and the first task {expected}: the rank is one for all, 1 or more")]
+    #[error(
+        "task `{task}` has {found} weights and the first task {expected}: every task needs the same number (the rank), \
+         1 or more"
+    )]
     Rank {
         /// The task.
         task: String,

@@ -91,7 +91,7 @@ pub enum Parameter {
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum MaterialError {
     #[error("`{key}` is {value}: it must be a finite number")]
-    NotFinite { key: &'static str, value: f64 },
+    NotFinite { key: String, value: f64 },
     #[error("the shear modulus is {value} Pa: it must be positive ({rule})")]
     Modulus { value: f64, rule: &'static str },
     #[error("`poisson_ratio` is {value}: it must be at least 0 and below 0.5 (0.49 is nearly incompressible)")]
@@ -241,8 +241,8 @@ impl Material {
     /// # Errors
     /// [`MaterialError`] names the first key that breaks a rule.
     pub fn check(&self) -> Result<(), MaterialError> {
-        let finite = |key, value: f64| {
-            if value.is_finite() { Ok(()) } else { Err(MaterialError::NotFinite { key, value }) }
+        let finite = |key: &str, value: f64| {
+            if value.is_finite() { Ok(()) } else { Err(MaterialError::NotFinite { key: key.to_owned(), value }) }
         };
         let rule = match self {
             Self::NeoHookean { shear_modulus_pa, .. } | Self::StableNeoHookean { shear_modulus_pa, .. } => {
@@ -255,9 +255,9 @@ impl Material {
                 "2 (`c1_pa` + `c2_pa`)"
             }
             Self::Ogden { terms, .. } => {
-                for term in terms {
-                    finite("alpha", term.alpha)?;
-                    finite("mu_pa", term.mu_pa)?;
+                for (n, term) in terms.iter().enumerate() {
+                    finite(&format!("alpha` of term `{}", n + 1), term.alpha)?;
+                    finite(&format!("mu_pa` of term `{}", n + 1), term.mu_pa)?;
                 }
                 if terms.is_empty() || terms.iter().any(|t| t.alpha == 0.0) {
                     return Err(MaterialError::OgdenTerms);

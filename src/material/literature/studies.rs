@@ -21,7 +21,10 @@ pub enum StudyError {
     #[error("the table has no rows: give a header line and at least one study")]
     Empty,
     /// A needed column is not in the header.
-    #[error("line {line}: the column `{column}` is missing from the header")]
+    #[error(
+        "line {line}: the column `{column}` is missing from the header; add it (`hgm gp studies` prints a table with \
+         all columns)"
+    )]
     MissingColumn {
         /// Line of the header.
         line: usize,
@@ -106,7 +109,7 @@ pub enum Refusal {
         energy_pa: f64,
     },
     /// The energy is zero everywhere.
-    #[error("the energy is zero over the whole window: the parameters describe no solid")]
+    #[error("the energy is zero over the whole window: the parameters describe no solid; correct them")]
     NoEnergy,
     /// An id twice in one table.
     #[error("id {0} stands twice in this table")]

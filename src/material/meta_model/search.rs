@@ -31,6 +31,19 @@ pub struct MetaModelSettings {
     pub log_offset_pa: f64,
 }
 
+impl MetaModelSettings {
+    /// Refuses an offset that leaves energies without a logarithm.
+    ///
+    /// # Errors
+    /// The setting and its rule, in words.
+    pub fn check(&self) -> Result<(), String> {
+        if self.log_offset_pa > 0.0 && self.log_offset_pa.is_finite() {
+            return Ok(());
+        }
+        Err(format!("`log_offset_pa` is {:?}: it must be above 0", self.log_offset_pa))
+    }
+}
+
 impl Default for MetaModelSettings {
     fn default() -> Self {
         Self { search: Search::Exact, log_offset_pa: META_MODEL_LOG_OFFSET_PA }
@@ -84,7 +97,7 @@ impl Fit {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FitError {
     /// Too few points.
-    #[error("{found} points are too few to fit {model}: give at least {needed}")]
+    #[error("too few points to fit {model}: {found}; give at least {needed}")]
     TooFew {
         /// Points found.
         found: usize,
@@ -94,7 +107,11 @@ pub enum FitError {
         needed: usize,
     },
     /// Stretches and targets of different lengths, or one that is no number.
-    #[error("point {index} (stretch {stretch}, target {target}) is not a positive stretch with a finite target")]
+    #[error(
+        "point {} (stretch {stretch}) has no finite stress or logarithm of the energy ({target}), or a stretch that is \
+         not above 0; correct the data",
+        index + 1
+    )]
     Point {
         /// Index of the point.
         index: usize,
@@ -104,10 +121,10 @@ pub enum FitError {
         target: f64,
     },
     /// All at rest.
-    #[error("all stretches are 1: nothing is deformed, so no modulus can be found")]
+    #[error("all stretches are 1: nothing is deformed, so no modulus can be found; give rows of a deformed sample")]
     AllAtRest,
     /// All stresses zero.
-    #[error("all stresses are 0: no modulus can be found")]
+    #[error("all stresses are 0: no modulus can be found; give rows with load")]
     NoStress,
 }
 

@@ -95,6 +95,20 @@ impl EnginePrograms {
     pub fn preferred(&self) -> Engine {
         if self.cgal.is_some() { Engine::Cgal } else { Engine::Lattice }
     }
+
+    /// Refuses an engine whose program is not there.
+    ///
+    /// # Errors
+    /// [`EngineError::Missing`].
+    pub fn check(&self, engine: Engine) -> Result<(), EngineError> {
+        let (program, found) = match engine {
+            Engine::Lattice => return Ok(()),
+            Engine::Cgal => ("hgm-cgal-mesher", &self.cgal),
+            Engine::Gmsh => ("gmsh", &self.gmsh),
+            Engine::Tetgen => ("tetgen", &self.tetgen),
+        };
+        found.is_some().then_some(()).ok_or(EngineError::Missing { engine: engine.name(), program })
+    }
 }
 
 /// The facet set of a mesh with a [`MidplaneSplit`]: the facets of the sheet (and a few mm below it), seen from the right.
@@ -135,6 +149,31 @@ pub struct MeshSettings {
     pub limits: Limits,
 }
 
+impl MeshSettings {
+    /// Refuses sizes and limits that no mesh can be made with, before there is anything to mesh.
+    ///
+    /// # Errors
+    /// The first setting out of its range, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let size = match self.size {
+            MeshSize::Cells(cells) => ("size.cells", cells as f64, cells >= 1, "1 or more"),
+            MeshSize::EdgeMm(edge) => ("size.edge_mm", edge, edge > 0.0 && edge.is_finite(), "above 0"),
+        };
+        let unit = |x: f64| (0.0..1.0).contains(&x);
+        let rules = [
+            size,
+            ("smoothing_voxels", self.smoothing_voxels, (0.0..=5.0).contains(&self.smoothing_voxels), "0 to 5"),
+            ("smallest_part", self.smallest_part, unit(self.smallest_part), "at least 0 and below 1"),
+            ("limits.time_s", self.limits.time_s, (0.0..=1e9).contains(&self.limits.time_s), "0 or more seconds"),
+            ("limits.memory_mb", self.limits.memory_mb as f64, self.limits.memory_mb >= 1, "1 or more"),
+        ];
+        match rules.into_iter().find(|(_, _, holds, _)| !holds) {
+            None => Ok(()),
+            Some((name, value, _, rule)) => Err(format!("`{name}` is {value:?}: it must be {rule}")),
+        }
+    }
+}
+
 impl Default for MeshSettings {
     fn default() -> Self {
         Self {
@@ -155,30 +194,53 @@ impl Default for MeshSettings {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum EngineError {
-    #[error("no voxel carries a label to mesh (labels left out: {without:?}); check the label map")]
+    #[error("no voxel carries a label to mesh{}; check the label map", besides(without))]
     NoLabels { without: Vec<u8> },
-    #[error("{what} must be a positive finite number, got {value}")]
+    #[error("{what} is {value}: it must be a number above 0")]
     Setting { what: &'static str, value: f64 },
-    #[error("edges are asked for at label {label}, which is not meshed; name one of {present:?} or drop that size")]
+    #[error("setting `{name}` of the table [mesh] is {value}: it must be 0 or more")]
+    Negative { name: &'static str, value: f64 },
+    #[error(
+        "--edge-in or --edge-near (or [mesh.sizing]) names label {label}, which is not meshed; name one of {present:?} \
+         or drop it"
+    )]
     NoSuchLabel { label: u8, present: Vec<u8> },
-    #[error("the factor on edges at {place} {label} must be between {least} and {most}, got {factor}")]
+    #[error(
+        "--edge-in or --edge-near (or [mesh.sizing]): the factor at {place} {label} must be between {least} and \
+         {most}, got {factor}"
+    )]
     Factor { place: &'static str, label: u8, factor: f64, least: f64, most: f64 },
     #[error(
-        "a target edge of {edge_mm:.2} mm would give about {cells:.1e} tets; the most is {most:.0e}; ask for a larger edge"
+        "a target edge of {} mm would give about {cells:.1e} tetrahedra; the most is {most:.0e}; ask for a larger edge \
+         (--edge-mm) or fewer cells (--cells)",
+        three_digits(*edge_mm)
     )]
     TooFine { edge_mm: f64, cells: f64, most: f64 },
     #[error(
-        "engine `{engine}`: the labelled region near {centre_mm:.1?} mm ({volume_mm3:.1} mm3) is too small for tets of {edge_mm:.2} mm; ask for more cells or a smaller edge"
+        "engine `{engine}`: the labelled region near {centre_mm:.1?} mm ({volume_mm3:.1} mm3) is too small for \
+         tetrahedra of {edge_mm:.2} mm; ask for more of them (--cells) or a smaller edge (--edge-mm)"
     )]
     TooSmall { engine: &'static str, centre_mm: [f64; 3], volume_mm3: f64, edge_mm: f64 },
     #[error(
-        "engine `{engine}` is not installed ({program}); install it (see `hgm doctor`) or use the engine `lattice`"
+        "engine `{engine}` is not installed (no program {program} was found); install it (`hgm doctor` tells how) or \
+         use --mesher lattice"
     )]
     Missing { engine: &'static str, program: &'static str },
     #[error("engine `{engine}`: {source}")]
     Program { engine: &'static str, source: ProcessError },
-    #[error("engine `{engine}`: the result is not a valid mesh: {source}; use the engine `lattice`")]
+    #[error("engine `{engine}`: the result is not a valid mesh: {source}; use --mesher lattice")]
     Invalid { engine: &'static str, source: MeshError },
+}
+
+/// What the settings take from the labels, in words; nothing where they take nothing.
+fn besides(without: &[u8]) -> String {
+    let labels: Vec<String> = without.iter().map(u8::to_string).collect();
+    if labels.is_empty() { String::new() } else { format!(" besides those left out ({})", labels.join(", ")) }
+}
+
+/// A number with the digits that a reader wants.
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// What was done on the way to a mesh.
@@ -205,10 +267,10 @@ pub fn mesh_labels<F: Frame>(
     programs: &EnginePrograms,
 ) -> Result<(TetMesh, MeshingRecord), EngineError> {
     let name = settings.engine.name();
-    for (what, value) in
-        [("the smoothing", settings.smoothing_voxels + 1e-9), ("the smallest part", settings.smallest_part + 1e-9)]
-    {
-        positive(what, value)?;
+    for (name, value) in [("smoothing_voxels", settings.smoothing_voxels), ("smallest_part", settings.smallest_part)] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(EngineError::Negative { name, value });
+        }
     }
     let no_labels = || EngineError::NoLabels { without: settings.without.clone() };
     let mut map = map.map(|l| if settings.without.contains(&l) { 0 } else { l });
@@ -219,8 +281,11 @@ pub fn mesh_labels<F: Frame>(
     }
     // A first guess: tets of a fair mesh of edge h have about 0.17 h^3.
     let mut edge_mm = match settings.size {
-        MeshSize::EdgeMm(edge) => positive("the target edge", edge)?,
-        MeshSize::Cells(cells) => (volume_mm3 / (TET_SHARE * positive("the number of cells", cells as f64)?)).cbrt(),
+        MeshSize::EdgeMm(edge) => positive("the target edge in mm (--edge-mm, or `size` in the table [mesh])", edge)?,
+        MeshSize::Cells(cells) => {
+            let cells = positive("the number of cells (--cells, or `size` in the table [mesh])", cells as f64)?;
+            (volume_mm3 / (TET_SHARE * cells)).cbrt()
+        }
     };
     let cells = volume_mm3 / (TET_SHARE * edge_mm.powi(3));
     if cells > MOST_CELLS {

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 /// What a program may use.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Wall clock in seconds.
     pub time_s: f64,
@@ -25,13 +25,21 @@ impl Default for Limits {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ProcessError {
-    #[error("it cannot be started ({0}); install it, or choose another engine")]
+    #[error("it cannot be started ({0}); install it (`hgm doctor` tells how), or use --mesher lattice")]
     Start(std::io::Error),
-    #[error("it was stopped after {time_s} s; raise the time limit, ask for fewer cells, or choose another engine")]
+    #[error(
+        "it was stopped after {time_s} s; raise `time_s` in the table [mesh.limits], ask for fewer cells, or use \
+         --mesher lattice"
+    )]
     TimedOut { time_s: f64 },
-    #[error("it failed ({status}): {last_words}")]
+    #[error(
+        "it failed ({status}): {last_words}; use --mesher lattice, or give it more memory (`memory_mb` in the table \
+         [mesh.limits])"
+    )]
     Failed { status: String, last_words: String },
-    #[error("its answer is not a mesh")]
+    #[error("`time_s` in the table [mesh.limits] is {time_s}: it must be a number of seconds, 0 or more")]
+    Limit { time_s: f64 },
+    #[error("its answer is not a mesh; use --mesher lattice")]
     Answer,
 }
 
@@ -44,8 +52,15 @@ fn drain(pipe: Option<impl Read>) -> Vec<u8> {
     bytes
 }
 
+/// The moment when a program is stopped.
+fn deadline(time_s: f64) -> Result<Instant, ProcessError> {
+    let after = Duration::try_from_secs_f64(time_s).ok();
+    after.and_then(|after| Instant::now().checked_add(after)).ok_or(ProcessError::Limit { time_s })
+}
+
 /// Runs `command` under `limits` with `input` on its stdin; returns its stdout.
 pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<Vec<u8>, ProcessError> {
+    let deadline = deadline(limits.time_s)?;
     let mut child = capped(command, limits.memory_mb)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -53,7 +68,6 @@ pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<
         .spawn()
         .map_err(ProcessError::Start)?;
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-    let deadline = Instant::now() + Duration::from_secs_f64(limits.time_s);
     // One thread per pipe: none can block another. A program that stops reading has failed and says so by its status.
     let _ = std::thread::spawn(move || stdin.map(|mut pipe| pipe.write_all(&input)));
     let out = std::thread::spawn(move || drain(stdout));

@@ -58,7 +58,7 @@ impl Sizing {
             if !(factor >= least && factor <= most) {
                 return Err(EngineError::Factor { place, label, factor, least, most });
             }
-            super::positive("the reach of a wall's edges", reach_mm)?;
+            super::positive("the reach in mm (--edge-near LABEL=FACTOR@MM, or [mesh.sizing])", reach_mm)?;
         }
         Ok(())
     }

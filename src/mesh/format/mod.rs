@@ -87,9 +87,9 @@ pub enum ReadError {
 pub enum WriteError {
     #[error("field `{field}` has {found} numbers, but {expected} are needed ({components} for each of {places})")]
     FieldLength { field: String, components: usize, places: usize, expected: usize, found: usize },
-    #[error("two arrays would be named `{name}`: rename the field or the set")]
+    #[error("two arrays would be named `{name}`: rename the mesh's set of that name")]
     Duplicate { name: String },
-    #[error("{what}: {count} is more than the format can number")]
+    #[error("{what}: {count} is more than the format can number; mesh it coarser (--cells)")]
     TooMany { what: String, count: usize },
 }
 

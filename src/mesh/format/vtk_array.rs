@@ -165,7 +165,7 @@ pub(super) fn numbers_from_bytes(
         source.take(first)?
     };
     if bytes.len() % number.bytes() != 0 {
-        return Err(format!("{} bytes are no whole number of {number:?}", bytes.len()));
+        return Err(format!("{} bytes are no whole number of values of {} bytes", bytes.len(), number.bytes()));
     }
     Ok(bytes.chunks_exact(number.bytes()).map(|b| number.read(b, storage.big_endian)).collect())
 }

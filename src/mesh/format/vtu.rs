@@ -309,7 +309,10 @@ impl<'a> File<'a> {
                 let source = if base64 { Source::base64(payload) } else { Source::Raw(payload) };
                 numbers_from_bytes(source, self.storage, number)
             }
-            other => return Err(self.unsupported(&raw.name, format!("format `{other}` is not one of VTK's"))),
+            other => {
+                let problem = format!("format `{other}` is not ascii, binary or appended; write the file again");
+                return Err(self.unsupported(&raw.name, problem));
+            }
         };
         decoded.map_err(|problem| self.damaged(&raw.name, problem))
     }
@@ -370,7 +373,9 @@ impl<'a> File<'a> {
                     _ => return Err(self.damaged("offsets", format!("tetrahedron {cell} has {} nodes", nodes.len()))),
                 };
                 let [Some(a), Some(b), Some(c), Some(d)] = tet else {
-                    return Err(self.damaged("connectivity", format!("cell {cell} names nodes {nodes:?}")));
+                    let named = nodes.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+                    let problem = format!("cell {cell} names a node that is no whole number or below 0: {named}");
+                    return Err(self.damaged("connectivity", problem));
                 };
                 tets.push([a, b, c, d]);
                 cell_numbers.push(cell);

@@ -84,18 +84,20 @@ pub struct DeformableQuality {
 #[derive(Debug, Error, PartialEq)]
 pub enum DeformableError {
     /// The atlas is zero everywhere.
-    #[error("the atlas has no voxel above zero: give a skull-stripped template")]
+    #[error("there is no brain to fit: every voxel of the brain or template image is 0; check the brain mask")]
     EmptyAtlas,
     /// Too little is known.
     #[error(
-        "only {:.0} % of the atlas's brain lies in known parts of the image: the field of view or the mask leaves too little to fit", known * 100.0
+        "only {:.0} % of the template's brain lies in known parts of the image: give a scan of the whole head, or a \
+         smaller cavity mask",
+        known * 100.0
     )]
     TooLittleKnown {
         /// Fraction known.
         known: f64,
     },
     /// A setting has no meaning.
-    #[error("the deformable registration setting `{name}` is {value}: it must be {rule}")]
+    #[error("`{name}` of the deformable registration is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,
@@ -104,6 +106,9 @@ pub enum DeformableError {
         /// What it must be.
         rule: &'static str,
     },
+    /// No resolution to fit at.
+    #[error("`levels_mm` of the deformable registration is empty: give one or more resolutions of 0.5 to 16 mm")]
+    NoLevels,
 }
 
 /// Deforms a skull-stripped atlas onto a head with its skull.
@@ -122,7 +127,7 @@ pub fn fit_atlas<F: Frame>(
     left_out: Option<&Mask<F>>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<F>, DeformableError> {
-    check_settings(settings)?;
+    settings.check()?;
     let brain = atlas.map(|x| x > 0.0);
     let brain_box = brain.bounding_box().ok_or(DeformableError::EmptyAtlas)?;
     // Room for the rim and for the velocity to fade.
@@ -259,27 +264,36 @@ fn near_brain(
     out
 }
 
-fn check_settings(s: &DeformableSettings) -> Result<(), DeformableError> {
-    let refuse = |name, value, rule| Err(DeformableError::Setting { name, value, rule });
-    if s.levels_mm.is_empty() || s.levels_mm.iter().any(|&l| !(0.5..=16.0).contains(&l)) {
-        return refuse("levels_mm", s.levels_mm.first().copied().unwrap_or(0.0), "one or more of 0.5 to 16 mm");
+impl DeformableSettings {
+    /// Refuses settings out of range, by name.
+    ///
+    /// # Errors
+    /// [`DeformableError::Setting`] or [`DeformableError::NoLevels`].
+    pub fn check(&self) -> Result<(), DeformableError> {
+        let refuse = |name, value, rule| Err(DeformableError::Setting { name, value, rule });
+        if self.levels_mm.is_empty() {
+            return Err(DeformableError::NoLevels);
+        }
+        if let Some(&bad) = self.levels_mm.iter().find(|&l| !(0.5..=16.0).contains(l)) {
+            return refuse("levels_mm", bad, "one or more of 0.5 to 16 mm");
+        }
+        if self.iterations.len() != self.levels_mm.len() {
+            return refuse("iterations", self.iterations.len() as f64, "one number for each of levels_mm");
+        }
+        if !(0.5..=5.0).contains(&self.update_sigma_voxels) {
+            return refuse("update_sigma_voxels", self.update_sigma_voxels, "0.5 to 5 voxels");
+        }
+        if !(0.0..=5.0).contains(&self.velocity_sigma_voxels) {
+            return refuse("velocity_sigma_voxels", self.velocity_sigma_voxels, "0 to 5 voxels");
+        }
+        if !(0.0..=20.0).contains(&self.margin_mm) {
+            return refuse("margin_mm", self.margin_mm, "0 to 20 mm");
+        }
+        if !(0.0..=1.0).contains(&self.least_gain) {
+            return refuse("least_gain", self.least_gain, "0 to 1");
+        }
+        Ok(())
     }
-    if s.iterations.len() != s.levels_mm.len() {
-        return refuse("iterations", s.iterations.len() as f64, "one number for each of levels_mm");
-    }
-    if !(0.5..=5.0).contains(&s.update_sigma_voxels) {
-        return refuse("update_sigma_voxels", s.update_sigma_voxels, "0.5 to 5 voxels");
-    }
-    if !(0.0..=5.0).contains(&s.velocity_sigma_voxels) {
-        return refuse("velocity_sigma_voxels", s.velocity_sigma_voxels, "0 to 5 voxels");
-    }
-    if !(0.0..=20.0).contains(&s.margin_mm) {
-        return refuse("margin_mm", s.margin_mm, "0 to 20 mm");
-    }
-    if !(0.0..=1.0).contains(&s.least_gain) {
-        return refuse("least_gain", s.least_gain, "0 to 1");
-    }
-    Ok(())
 }
 
 /// Contrast below which a window is taken for noise: 3 % of each image's range over the brain.

@@ -38,7 +38,7 @@ pub enum RegisterError {
         which: &'static str,
     },
     /// A setting has no meaning.
-    #[error("the registration setting `{name}` is {value}: it must be {rule}")]
+    #[error("`{name}` of the rigid registration is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,
@@ -47,6 +47,12 @@ pub enum RegisterError {
         /// What it must be.
         rule: &'static str,
     },
+    /// No resolution to register at.
+    #[error(
+        "`levels_mm` of the rigid registration is empty: give one or more resolutions between 0 and 16 mm, such as \
+         [4.0, 2.0, 1.0]"
+    )]
+    NoLevels,
     /// The images do not overlap at any pose tried.
     #[error("no pose was found at which the images share information: are both T1 images of a head?")]
     NoOverlap,

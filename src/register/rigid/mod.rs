@@ -16,7 +16,6 @@ use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use fit::fit;
 use nalgebra::{Rotation3, UnitQuaternion};
-use settings::check_settings;
 use side::{Side, side};
 
 /// Where the images count; `None` lets the head itself decide.
@@ -65,7 +64,7 @@ pub fn register_rigid<M: Frame, F: Frame>(
     masks: RigidMasks<'_, M, F>,
     settings: &RigidSettings,
 ) -> Result<RigidFit<M, F>, RegisterError> {
-    check_settings(settings)?;
+    settings.check()?;
     let moving = side("moving", moving, masks.moving)?;
     let fixed = side("fixed", fixed, masks.fixed)?;
     // The image with the thicker slices is sampled: its slices can be read as they are, and the finer image can be

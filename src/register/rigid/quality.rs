@@ -44,7 +44,8 @@ impl FitQuality {
 pub enum FitWarning {
     /// The best pose hardly stands out.
     #[error(
-        "the images hardly resemble each other (normalised information {normalised_information:.3}, {distinctness:.2} times a wrong pose): look at the overlay before using this transform"
+        "the images hardly resemble each other (similarity {normalised_information:.3} of 1, {distinctness:.2} times \
+         that of a wrong pose): look at both images together before using this transform"
     )]
     LowSimilarity {
         /// See [`FitQuality::normalised_information`].

@@ -37,24 +37,31 @@ impl Default for RigidSettings {
     }
 }
 
-/// Refuses settings out of range, by name.
-pub(super) fn check_settings(settings: &RigidSettings) -> Result<(), RegisterError> {
-    let refuse = |name, value, rule| Err(RegisterError::Setting { name, value, rule });
-    let first = settings.levels_mm.first().copied().unwrap_or(0.0);
-    if !settings.levels_mm.iter().all(|&l| l > 0.0 && l <= 16.0) || first == 0.0 {
-        return refuse("levels_mm", first, "one or more resolutions between 0 and 16 mm");
+impl RigidSettings {
+    /// Refuses settings out of range, by name.
+    ///
+    /// # Errors
+    /// [`RegisterError::Setting`] or [`RegisterError::NoLevels`].
+    pub fn check(&self) -> Result<(), RegisterError> {
+        let refuse = |name, value, rule| Err(RegisterError::Setting { name, value, rule });
+        if self.levels_mm.is_empty() {
+            return Err(RegisterError::NoLevels);
+        }
+        if let Some(&bad) = self.levels_mm.iter().find(|&&l| !(l > 0.0 && l <= 16.0)) {
+            return refuse("levels_mm", bad, "one or more resolutions between 0 and 16 mm");
+        }
+        if !(self.start_level_mm > 0.0 && self.start_level_mm <= 16.0) {
+            return refuse("start_level_mm", self.start_level_mm, "between 0 and 16 mm");
+        }
+        if !(8..=255).contains(&self.histogram_bins) {
+            return refuse("histogram_bins", self.histogram_bins as f64, "between 8 and 255");
+        }
+        if self.samples < 1000 {
+            return refuse("samples", self.samples as f64, "at least 1000");
+        }
+        if !(self.tolerance_mm > 0.0 && self.tolerance_mm <= 1.0) {
+            return refuse("tolerance_mm", self.tolerance_mm, "above 0 and at most 1 mm");
+        }
+        Ok(())
     }
-    if !(settings.start_level_mm > 0.0 && settings.start_level_mm <= 16.0) {
-        return refuse("start_level_mm", settings.start_level_mm, "between 0 and 16 mm");
-    }
-    if !(8..=255).contains(&settings.histogram_bins) {
-        return refuse("histogram_bins", settings.histogram_bins as f64, "between 8 and 255");
-    }
-    if settings.samples < 1000 {
-        return refuse("samples", settings.samples as f64, "at least 1000");
-    }
-    if !(settings.tolerance_mm > 0.0 && settings.tolerance_mm <= 1.0) {
-        return refuse("tolerance_mm", settings.tolerance_mm, "above 0 and at most 1 mm");
-    }
-    Ok(())
 }
