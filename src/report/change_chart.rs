@@ -111,10 +111,15 @@ impl ChangeChart {
             x0 + PANEL / 2.0,
             escape(&panel.name)
         );
-        for (x, state) in xs.into_iter().zip(&self.states) {
-            let (y, state) = (BOTTOM + 20.0, escape(state));
-            let _ =
-                write!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"currentColor\">{state}</text>");
+        for ((x, state), middle) in xs.into_iter().zip(&self.states).zip(panel.middle) {
+            let figures = format!("{} ± {}", number(middle.median, 3), number(middle.mad, 2));
+            for (line, text) in [state, &figures].into_iter().enumerate() {
+                let (y, text) = (BOTTOM + 20.0 + 17.0 * line as f64, escape(text));
+                let _ = write!(
+                    svg,
+                    "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"currentColor\">{text}</text>"
+                );
+            }
         }
         // Many subjects are many thin lines: still one picture.
         let opacity = (4.0 / panel.changes.len().max(1) as f64).clamp(0.08, 0.6);
@@ -136,16 +141,11 @@ impl ChangeChart {
         for (x, middle) in at.into_iter().zip(panel.middle) {
             let y = axis.at(middle.median);
             let (low, high) = (axis.at((middle.median - middle.mad).max(0.0)), axis.at(middle.median + middle.mad));
-            let text = format!("{} ± {}", number(middle.median, 3), number(middle.mad, 2));
-            let (anchor, text_x) = if x < x0 + PANEL / 2.0 { ("end", x - 8.0) } else { ("start", x + 8.0) };
             let _ = write!(
                 svg,
                 "<path d=\"M{x:.1} {low:.1}V{high:.1}M{0:.1} {low:.1}h8M{0:.1} {high:.1}h8\" stroke=\"{colour}\" \
-                 stroke-width=\"2\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"{colour}\"/>\
-                 <text x=\"{text_x:.1}\" y=\"{1:.1}\" text-anchor=\"{anchor}\" fill=\"currentColor\" \
-                 font-size=\"11\">{text}</text>",
-                x - 4.0,
-                y + 4.0
+                 stroke-width=\"2\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"{colour}\"/>",
+                x - 4.0
             );
         }
     }

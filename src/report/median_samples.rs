@@ -2,6 +2,7 @@
 
 use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::rmse::median_and_mad;
+use crate::experiment::sweep::best_sample;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -68,11 +69,9 @@ pub fn as_outcome(samples: &[MedianSample], tissues: &[String]) -> ExperimentOut
         converged: s.subjects > 0,
         ..SampleOutcome::default()
     };
-    ExperimentOutcome {
-        tissues: tissues.to_vec(),
-        samples: samples.iter().map(one).collect(),
-        ..ExperimentOutcome::default()
-    }
+    let samples: Vec<SampleOutcome> = samples.iter().map(one).collect();
+    let best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
+    ExperimentOutcome { tissues: tissues.to_vec(), samples, best_sample, ..ExperimentOutcome::default() }
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl Cohort {
             let middle = [middle(&columns[0])?, middle(&columns[1])?];
             (!changes.is_empty()).then(|| ChangePanel { name: set_name(set), changes, middle })
         };
-        let panels: Vec<ChangePanel> = ["ventricle", "margin"].into_iter().filter_map(panel).collect();
+        let panels: Vec<ChangePanel> = ["margin", "ventricle"].into_iter().filter_map(panel).collect();
         let said: Vec<String> = panels
             .iter()
             .map(|panel| {
@@ -112,7 +112,7 @@ impl Cohort {
                 cells.push(if apart { format!("<strong>{value} ▲</strong>") } else { value });
             }
             let end = if row.status == Status::Done { row.verdict.unwrap_or("–") } else { row.status.name() };
-            cells.extend([end.to_owned(), row.warnings.to_string()]);
+            cells.extend([end.replace(' ', "\u{a0}"), row.warnings.to_string()]);
             (false, cells)
         };
         let mut rows: Vec<(bool, Vec<String>)> = self.subjects.iter().map(line).collect();
