@@ -161,7 +161,7 @@ pub enum SegmentError {
         largest_cc: f64,
     },
     /// A setting has no meaning.
-    #[error("`{name}` of the segmentation is {value}: it must be {rule}")]
+    #[error("segmentation: `{name}` is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,

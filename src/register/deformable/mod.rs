@@ -97,7 +97,7 @@ pub enum DeformableError {
         known: f64,
     },
     /// A setting has no meaning.
-    #[error("`{name}` of the deformable registration is {value}: it must be {rule}")]
+    #[error("deformable registration: `{name}` is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,

@@ -38,7 +38,7 @@ pub enum RegisterError {
         which: &'static str,
     },
     /// A setting has no meaning.
-    #[error("`{name}` of the rigid registration is {value}: it must be {rule}")]
+    #[error("rigid registration: `{name}` is {value}: it must be {rule}")]
     Setting {
         /// The setting's name.
         name: &'static str,
