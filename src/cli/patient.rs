@@ -81,10 +81,6 @@ impl Patient {
         self.settings.noise_floor(self.prepared.anat.coarsest_voxel_mm)
     }
 
-    fn rest_rmse_mm(&self) -> BTreeMap<String, f64> {
-        self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]).rmse_mm
-    }
-
     /// Simulates the samples of one shard and nothing else.
     ///
     /// # Errors
@@ -181,6 +177,7 @@ impl Patient {
 
     /// What is known before any material is tried.
     fn posed_outcome(&self) -> ExperimentOutcome {
+        let rest = self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]);
         let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
         let loads = format!(
             "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {} kg/m3, with {} held",
@@ -189,7 +186,8 @@ impl Patient {
         );
         ExperimentOutcome {
             reference: "ventricle wall and cavity surface of the post-operative scan (closest points)".to_owned(),
-            rest_rmse_mm: self.rest_rmse_mm(),
+            rest_rmse_mm: rest.rmse_mm,
+            rest_surface_distance_mm: rest.surface_distance_mm,
             noise_floor: Some(self.floor()),
             loads: vec![loads],
             ..self.prepared.outcome()

@@ -39,6 +39,9 @@ pub struct ExperimentOutcome {
     /// RMSE of the undeformed mesh per node set, mm: what a sample must beat.
     #[serde(default)]
     pub rest_rmse_mm: BTreeMap<String, f64>,
+    /// The same as symmetric distance between surfaces, mm.
+    #[serde(default)]
+    pub rest_surface_distance_mm: BTreeMap<String, f64>,
     /// The moduli behind the reference where they are known (a phantom's truth), Pa per tissue.
     #[serde(default)]
     pub reference_shear_modulus_pa: BTreeMap<String, f64>,
@@ -85,6 +88,10 @@ pub struct SampleOutcome {
     /// RMSE per node set (`all`, `ventricle`, `margin`), mm; empty when the sample did not converge.
     #[serde(default)]
     pub rmse_mm: BTreeMap<String, f64>,
+    /// Symmetric distance between the set's surface and the observed one, root mean square, mm: closest points alone hide
+    /// what of the observed surface nothing comes near to. Empty for a phantom.
+    #[serde(default)]
+    pub surface_distance_mm: BTreeMap<String, f64>,
     /// Whether the solver reached its tolerance.
     pub converged: bool,
     /// Newton iterations over all load steps.
@@ -135,7 +142,7 @@ impl NoiseFloor {
     }
 }
 
-/// Volumes of a resection, cubic centimetres.
+/// What the images show of a resection: volumes in cubic centimetres, and the midline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ResectionVolumes {
@@ -154,6 +161,9 @@ pub struct ResectionVolumes {
     /// The brain before surgery.
     #[serde(default)]
     pub brain_cc: Option<f64>,
+    /// How far the septum pellucidum has moved sideways, mm; positive to the right.
+    #[serde(default)]
+    pub midline_shift_mm: Option<f64>,
 }
 
 /// One boundary set of the mesh.
@@ -305,6 +315,7 @@ mod tests {
             shear_modulus_pa: BTreeMap::from([("grey_matter".to_owned(), 300.0 + 100.0 * n as f64)]),
             laws: BTreeMap::new(),
             rmse_mm: BTreeMap::from([("ventricle".to_owned(), rmse), ("all".to_owned(), rmse)]),
+            surface_distance_mm: BTreeMap::new(),
             converged: true,
             newton_iterations: 5,
             relative_residuals: vec![1e-3, 1e-9],

@@ -23,6 +23,8 @@ pub enum Reference {
 pub struct StateErrors {
     /// RMSE per set, mm; a phantom has the one set `all`.
     pub rmse_mm: BTreeMap<String, f64>,
+    /// Symmetric distance between the surfaces, root mean square per set, mm; none for a phantom.
+    pub surface_distance_mm: BTreeMap<String, f64>,
     /// Error per node, mm; zero where `node_observed` is false.
     pub node_error_mm: Vec<f64>,
     /// Whether the reference says anything of the node.
@@ -67,6 +69,7 @@ impl Reference {
                 let all = root_mean_square(&node_error_mm).map(|rmse| ("all".to_owned(), rmse));
                 StateErrors {
                     rmse_mm: all.into_iter().collect(),
+                    surface_distance_mm: BTreeMap::new(),
                     node_observed: vec![true; node_error_mm.len()],
                     node_error_mm,
                 }
@@ -75,6 +78,7 @@ impl Reference {
                 let errors = observed.errors(mesh, displacement_mm);
                 StateErrors {
                     rmse_mm: errors.rmse_mm,
+                    surface_distance_mm: errors.symmetric.into_iter().map(|(set, d)| (set, d.rms_mm)).collect(),
                     node_error_mm: errors.node_error_mm,
                     node_observed: errors.node_observed,
                 }
@@ -122,6 +126,7 @@ pub fn solve_sample(
         shear_modulus_pa: sample.tissues.iter().map(|(name, t)| (name.clone(), t.shear_modulus_pa)).collect(),
         laws: sample.tissues.iter().map(|(name, t)| (name.clone(), t.law())).collect(),
         rmse_mm: BTreeMap::new(),
+        surface_distance_mm: BTreeMap::new(),
         converged: false,
         newton_iterations: 0,
         relative_residuals: Vec::new(),
@@ -137,6 +142,7 @@ pub fn solve_sample(
     };
     let errors = reference.errors(mesh, &outcome.displacement_mm);
     record.rmse_mm.clone_from(&errors.rmse_mm);
+    record.surface_distance_mm.clone_from(&errors.surface_distance_mm);
     record.converged = true;
     record.newton_iterations = outcome.convergence.iterations.len();
     record.relative_residuals = outcome.convergence.iterations.iter().map(|i| i.relative_residual).collect();

@@ -193,6 +193,9 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         for set in outcome.rmse_sets() {
             add(format!("rest_rmse_{set}_mm"), outcome.rest_rmse_mm.get(&set).copied());
             add(format!("rmse_{set}_mm"), best.and_then(|sample| sample.rmse_mm.get(&set).copied()));
+            add(format!("rest_surface_distance_{set}_mm"), outcome.rest_surface_distance_mm.get(&set).copied());
+            let distance = best.and_then(|sample| sample.surface_distance_mm.get(&set).copied());
+            add(format!("surface_distance_{set}_mm"), distance);
         }
         let floor = outcome.noise_floor.unwrap_or_default();
         add("noise_floor_mm".to_owned(), floor.combined_mm());
@@ -201,6 +204,10 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         add("cavity_cc".to_owned(), volumes.cavity_cc);
         add("ventricle_before_cc".to_owned(), volumes.ventricle_before_cc);
         add("ventricle_after_cc".to_owned(), volumes.ventricle_after_cc);
+        let change = |(before, after): (f64, f64)| 100.0 * (after / before - 1.0);
+        let change = volumes.ventricle_before_cc.zip(volumes.ventricle_after_cc).map(change);
+        add("ventricle_change_percent".to_owned(), change.filter(|percent| percent.is_finite()));
+        add("midline_shift_mm".to_owned(), volumes.midline_shift_mm);
         add("brain_cc".to_owned(), volumes.brain_cc);
         add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
         let margin = (outcome.rest_rmse_mm.get("margin"), best.and_then(|sample| sample.rmse_mm.get("margin")));

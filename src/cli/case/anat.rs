@@ -11,14 +11,14 @@ use crate::image::nifti::{self, ReadOptions, encode_i16, encode_mask, encode_u8,
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::register::deformable::DisplacementField;
-use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, take_pair_apart};
+use crate::resect::{GivenMasks, OperatedBrain, PairSettings, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
 use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// The pre-operative scan and its brain.
 pub const PRE_T1: &str = "anat/pre_space-MNI_T1w.nii.gz";
 pub const PRE_BRAIN: &str = "anat/pre_space-MNI_desc-brain_mask.nii.gz";
@@ -201,6 +201,7 @@ pub fn anat(
                 ventricle_before_cc: Some(before.volumes.ventricle_cc),
                 ventricle_after_cc: Some(post_ventricle.volume_cc()),
                 brain_cc: Some(before.volumes.brain_cc),
+                midline_shift_mm: midline_shift_mm(&sag.subject_from_atlas, &template.atlas_from_subject),
             },
             side: found.side,
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),

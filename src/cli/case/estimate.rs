@@ -20,7 +20,7 @@ use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Name of the estimate among the samples.
 pub const ESTIMATE: &str = "estimate";
 /// Its numbers.
@@ -296,6 +296,7 @@ fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Fail
         shear_modulus_pa: sample.tissues.iter().map(|(name, t)| (name.clone(), t.shear_modulus_pa)).collect(),
         laws: sample.tissues.iter().map(|(name, t)| (name.clone(), t.law())).collect(),
         rmse_mm: errors.rmse_mm,
+        surface_distance_mm: errors.surface_distance_mm,
         converged: true,
         newton_iterations: state.convergence.iterations.len(),
         relative_residuals: state.convergence.iterations.iter().map(|i| i.relative_residual).collect(),

@@ -263,6 +263,7 @@ fn samples_table(outcome: &ExperimentOutcome) -> String {
     let mut head = vec!["sample".to_owned()];
     head.extend(outcome.tissues.iter().flat_map(|t| [format!("{t}_sd_level"), format!("{t}_shear_modulus_pa")]));
     head.extend(sets.iter().map(|set| format!("rmse_{set}_mm")));
+    head.extend(sets.iter().map(|set| format!("surface_distance_{set}_mm")));
     head.extend(["converged", "newton_iterations", "displacement_max_mm"].map(str::to_owned));
     let mut lines = vec![head.join(",")];
     let cell = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
@@ -273,6 +274,7 @@ fn samples_table(outcome: &ExperimentOutcome) -> String {
             line.push(cell(sample.shear_modulus_pa.get(tissue).copied()));
         }
         line.extend(sets.iter().map(|set| cell(sample.rmse_mm.get(set).copied())));
+        line.extend(sets.iter().map(|set| cell(sample.surface_distance_mm.get(set).copied())));
         line.extend([sample.converged.to_string(), sample.newton_iterations.to_string()]);
         line.push(cell(sample.displacement_max_mm));
         lines.push(line.join(","));

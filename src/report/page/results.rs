@@ -110,13 +110,23 @@ fn volume_tiles(v: &ResectionVolumes) -> String {
         html += &tile("Cavity", &quantity(v.cavity_cc, 3, "cc"), "on the image after surgery");
     }
     if v.ventricle_before_cc.is_some() {
-        let note = v.ventricle_after_cc.map_or_else(String::new, |after| format!("after: {} cc", number(after, 3)));
+        let change = |after: f64| v.ventricle_before_cc.map_or(0.0, |before| 100.0 * (after / before - 1.0));
+        let after = |after: f64| format!("after: {} cc ({} %)", number(after, 3), signed_fixed(change(after)));
+        let note = v.ventricle_after_cc.map_or_else(String::new, after);
         html += &tile("Ventricles before surgery", &quantity(v.ventricle_before_cc, 3, "cc"), &note);
+    }
+    if let Some(shift) = v.midline_shift_mm {
+        let side = if shift > 0.0 { "to the right" } else { "to the left" };
+        html += &tile("Midline shift", &quantity(Some(shift.abs()), 2, "mm"), side);
     }
     if v.brain_cc.is_some() {
         html += &tile("Brain before surgery", &quantity(v.brain_cc, 4, "cc"), "");
     }
     html
+}
+
+fn signed_fixed(percent: f64) -> String {
+    if percent > 0.0 { format!("+{}", fixed(percent, 1)) } else { fixed(percent, 1) }
 }
 
 fn signed(level: f64) -> String {
@@ -427,6 +437,9 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         head.push(format!("µ of {} (Pa)", escape(&tissue_name(tissue))));
     }
     head.extend(sets.iter().map(|set| format!("RMSE, {} (mm)", escape(&set_name(set)))));
+    let apart = outcome.samples.iter().any(|s| !s.surface_distance_mm.is_empty());
+    let apart: &[String] = if apart { &sets } else { &[] };
+    head.extend(apart.iter().map(|set| format!("surfaces apart, {} (mm)", escape(&set_name(set)))));
     head.extend(["largest displacement (mm)", "Newton steps", "converged"].map(str::to_owned));
     let mut rows: Vec<(bool, Vec<String>)> = Vec::new();
     let dash = || "–".to_owned();
@@ -434,6 +447,8 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         let mut row = vec!["undeformed".to_owned()];
         row.extend(levelled.iter().chain(&outcome.tissues).map(|_| dash()));
         row.extend(sets.iter().map(|set| outcome.rest_rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
+        let rest_apart = &outcome.rest_surface_distance_mm;
+        row.extend(apart.iter().map(|set| rest_apart.get(set).map_or_else(dash, |mm| number(*mm, 3))));
         row.extend([number(0.0, 1), dash(), dash()]);
         rows.push((false, row));
     }
@@ -444,6 +459,7 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         let modulus = |t: &String| s.shear_modulus_pa.get(t).map_or_else(dash, |mu| number(*mu, 4));
         row.extend(outcome.tissues.iter().map(modulus));
         row.extend(sets.iter().map(|set| s.rmse_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
+        row.extend(apart.iter().map(|set| s.surface_distance_mm.get(set).map_or_else(dash, |mm| number(*mm, 3))));
         row.push(s.displacement_max_mm.map_or_else(dash, |mm| number(mm, 3)));
         row.push(s.newton_iterations.to_string());
         row.push(if s.converged { "yes" } else { "no" }.to_owned());

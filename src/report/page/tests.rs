@@ -1,5 +1,7 @@
 use super::*;
-use crate::experiment::outcome::{LawOutcome, NoiseFloor, RegistrationOutcome, SampleOutcome, SetOutcome};
+use crate::experiment::outcome::{
+    LawOutcome, NoiseFloor, RegistrationOutcome, ResectionVolumes, SampleOutcome, SetOutcome,
+};
 use std::collections::BTreeMap;
 
 fn map<T>(pairs: Vec<(&str, T)>) -> BTreeMap<String, T> {
@@ -17,6 +19,7 @@ fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
             shear_modulus_pa: map(vec![("grey_matter", 900.0 * (0.4 * level).exp())]),
             laws: map(vec![("grey_matter", LawOutcome { law: "neo-hookean".to_owned(), parameters: BTreeMap::new() })]),
             rmse_mm: map(vec![("ventricle", rmse), ("margin", 2.0 * rmse)]),
+            surface_distance_mm: map(vec![("margin", 3.0 * rmse)]),
             converged: true,
             newton_iterations: 4,
             relative_residuals: vec![1.0, 1e-2, 1e-5, 1e-10],
@@ -84,6 +87,22 @@ fn every_sample_and_the_rest_state_are_in_the_table() {
     }
     assert!(html.contains("undeformed") && html.contains("sample-04 · best"));
     assert!(html.contains("takes away") && html.contains("10.1007/s11548-020-02284-y"));
+}
+
+#[test]
+fn what_the_images_show_of_the_shift_is_told_with_its_side() {
+    let mut outcome = outcome(ExperimentKind::Resection);
+    outcome.rest_surface_distance_mm = map(vec![("margin", 1.25)]);
+    outcome.volumes = Some(ResectionVolumes {
+        ventricle_before_cc: Some(20.0),
+        ventricle_after_cc: Some(24.62),
+        midline_shift_mm: Some(-1.75),
+        ..ResectionVolumes::default()
+    });
+    let html = page(outcome).to_html();
+    assert!(html.contains("24.6 cc (+23.1 %)") && html.contains("surfaces apart, resection margin (mm)"));
+    let tile = html.split("Midline shift").nth(1).unwrap();
+    assert!(tile[..120].contains("1.8") && tile[..120].contains("to the left"), "{}", &tile[..120]);
 }
 
 #[test]
