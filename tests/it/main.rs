@@ -11,6 +11,7 @@ mod job;
 mod material;
 mod mesh_engines;
 mod mesh_files;
+mod midline;
 mod nifti_guard;
 mod own_masks;
 mod pipelines;
