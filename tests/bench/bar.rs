@@ -62,6 +62,15 @@ pub fn run_hgm(arguments: &[&str]) -> Finished {
         .stdout(std::process::Stdio::piped())
         .spawn()
         .expect("the program is built with the benchmark");
+    // Read while it runs: a pipe that is full would stop it.
+    let stdout = child.stdout.take();
+    let reader = std::thread::spawn(move || {
+        let mut printed = String::new();
+        if let Some(mut stdout) = stdout {
+            std::io::Read::read_to_string(&mut stdout, &mut printed).ok();
+        }
+        printed
+    });
     let folder = format!("/proc/{}", child.id());
     let (mut cpu_s, mut peak_gb) = (0.0, 0.0);
     let status = loop {
@@ -77,10 +86,7 @@ pub fn run_hgm(arguments: &[&str]) -> Finished {
             None => std::thread::sleep(std::time::Duration::from_millis(50)),
         }
     };
-    let mut printed = String::new();
-    if let Some(mut stdout) = child.stdout.take() {
-        std::io::Read::read_to_string(&mut stdout, &mut printed).ok();
-    }
+    let printed = reader.join().unwrap_or_default();
     Finished { ok: status.success(), wall_s: begin.elapsed().as_secs_f64(), cpu_s, peak_gb, printed }
 }
 
