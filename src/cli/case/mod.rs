@@ -249,7 +249,9 @@ impl Case {
             tracing::info!("{name}: it ran because {reason}");
         }
         for warning in &outcome.manifest.warnings {
-            tracing::warn!("{name}: {warning}");
+            // Some say themselves whose they are, for the page.
+            let told = warning.strip_prefix(&format!("{name}: ")).unwrap_or(warning);
+            tracing::warn!("{name}: {told}");
         }
         let facts = serde_json::from_value(outcome.manifest.facts.clone())
             .map_err(|_| anyhow!("{name}: what another version of hgm noted cannot be read; run again with --force"))?;
