@@ -219,6 +219,17 @@ fn displaced(file: &str, sample: &MeshWithFields) -> Result<Vec<[f64; 3]>, Repor
     Ok(nodes.iter().zip(field.values.chunks_exact(3)).map(moved).collect())
 }
 
+/// The error of every node, NaN where the reference says nothing of it: such a node is not without error.
+fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
+    let mut errors = sample.point_field("rmse_mm")?.values.clone();
+    if let Some(observed) = sample.point_field("rmse_observed") {
+        for (error, _) in errors.iter_mut().zip(&observed.values).filter(|(_, seen)| **seen == 0.0) {
+            *error = f64::NAN;
+        }
+    }
+    (errors.len() == sample.mesh.nodes_mm().len()).then_some(errors)
+}
+
 /// Error map and 3-D view from the best sample and the reference.
 fn add_results(
     case: &Case<'_>,
@@ -236,7 +247,7 @@ fn add_results(
     };
     let mesh = &sample.mesh;
     let deformed = displaced(&file, &sample)?;
-    let errors = sample.point_field("rmse_mm").map(|f| f.values.clone()).filter(|v| v.len() == mesh.nodes_mm().len());
+    let errors = observed_errors(&sample);
     let scale = errors.as_ref().and_then(|e| ColourScale::over(e.iter().copied(), "error per node (mm)"));
     if let (Some(errors), Some(scale)) = (&errors, &scale) {
         let sets = outcome.rmse_sets();
@@ -366,7 +377,8 @@ mod tests {
         write(folder, "mesh/rest.vtu", &vtu::encode(&mesh, &[], &[]).unwrap());
         let fields = [
             Field { name: "displacement".to_owned(), components: 3, values: vec![0.5; 15] },
-            Field::scalar("rmse_mm", vec![0.25, 1.0, 2.0, 0.5, 3.75]),
+            Field::scalar("rmse_mm", vec![0.0, 1.0, 2.0, 0.5, 3.75]),
+            Field::scalar("rmse_observed", vec![0.0, 1.0, 1.0, 1.0, 1.0]),
         ];
         write(folder, "sim/sample-00.vtu", &vtu::encode(&mesh, &fields, &[]).unwrap());
         let sample = SampleOutcome {
@@ -390,7 +402,8 @@ mod tests {
         let page = read_case(folder.path()).unwrap();
         assert_eq!(page.mesh_pictures.len(), 3);
         let map = page.error_map.as_ref().unwrap();
-        assert_eq!((map.scale.low, map.scale.high), (0.25, 3.75));
+        // The node that no reference is there for is grey, not without error.
+        assert_eq!((map.scale.low, map.scale.high), (0.5, 3.75));
         assert_eq!(map.errors_mm, [("margin".to_owned(), vec![1.0, 2.0, 3.75])]);
         let deformed = &page.viewer.as_ref().unwrap().surfaces[1];
         assert_eq!(deformed.surface.nodes_mm[0], [0.5; 3]);
