@@ -221,13 +221,14 @@ fn displaced(file: &str, sample: &MeshWithFields) -> Result<Vec<[f64; 3]>, Repor
 
 /// The error of every node, NaN where the reference says nothing of it: such a node is not without error.
 fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
-    let mut errors = sample.point_field("rmse_mm")?.values.clone();
-    if let Some(observed) = sample.point_field("rmse_observed") {
-        for (error, _) in errors.iter_mut().zip(&observed.values).filter(|(_, seen)| **seen == 0.0) {
-            *error = f64::NAN;
-        }
+    let errors = sample.point_field("rmse_mm").filter(|f| f.values.len() == sample.mesh.nodes_mm().len())?;
+    // An array of zeros and ones is read as the set of the ones.
+    let Some(observed) = sample.mesh.node_sets.get("rmse_observed") else { return Some(errors.values.clone()) };
+    let mut seen = vec![f64::NAN; errors.values.len()];
+    for &n in observed {
+        seen[n as usize] = errors.values[n as usize];
     }
-    (errors.len() == sample.mesh.nodes_mm().len()).then_some(errors)
+    Some(seen)
 }
 
 /// Error map and 3-D view from the best sample and the reference.
