@@ -10,6 +10,7 @@ use crate::experiment::synth::SynthSettings;
 use crate::image::nifti::ReadOptions;
 use crate::material::gp::FitSettings;
 use crate::material::meta_model::MetaModelSettings;
+use crate::material::toml_text::line_of;
 use crate::mesh::engine::MeshSettings;
 use crate::register::RigidSettings;
 use crate::register::deformable::DeformableSettings;
@@ -49,7 +50,9 @@ const TABLES: [Table; 14] = [
 pub fn tables(text: &str, file: &str) -> Result<toml::Table, Failure> {
     let config: toml::Table = text
         .parse()
-        .map_err(|e: toml::de::Error| anyhow!("{file}: line {}: {}; correct it", line(&e, text), in_words(e.message())))
+        .map_err(|e: toml::de::Error| {
+            anyhow!("{file}: line {}: {}; correct it", line_of(&e, text), in_words(e.message()))
+        })
         .reject()?;
     for (room, table) in &config {
         let Some((_, read)) = TABLES.iter().find(|(name, _)| name == room) else {
@@ -77,17 +80,11 @@ fn of<T: DeserializeOwned, E: Display>(table: &toml::Value, check: fn(&T) -> Res
     check(&typed(table)?).map_err(|e| e.to_string())
 }
 
-/// The line of a text that an error of TOML points at, from 1.
-pub fn line(error: &toml::de::Error, text: &str) -> usize {
-    let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
-    1 + before.matches('\n').count()
-}
-
 /// What the TOML reader says, in one line and without the names of our types.
 pub fn in_words(message: &str) -> String {
     let one_line = message.trim().replace('\n', " ");
     let mut words = Vec::new();
-    let mut rest = one_line.split(' ').peekable();
+    let mut rest = one_line.split(' ');
     while let Some(word) = rest.next() {
         let bare = word.trim_end_matches([',', ';']);
         let said = match bare {

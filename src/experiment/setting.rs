@@ -40,3 +40,13 @@ pub(super) const SETS_RULE: &str = "of the sets base, falx, ventricle, superior,
 pub(super) const LEVELS_RULE: &str = "a list of one or more numbers of standard deviations from -6 to 6";
 pub(super) const TISSUES_RULE: &str = "1 (the whole brain) or 2 (grey and white matter)";
 pub(super) const POISSON_RULE: &str = "at least 0 and below 0.5";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule_of_sets_names_every_set() {
+        assert!(SETS.iter().all(|set| SETS_RULE.contains(set)));
+    }
+}

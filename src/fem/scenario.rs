@@ -2,6 +2,7 @@
 
 use super::element::ElementKind;
 use crate::material::law::Material;
+use crate::material::toml_text::line_of;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -234,9 +235,8 @@ impl Scenario {
     /// [`ScenarioError`] with line, key and what was expected.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         toml::from_str(text).map_err(|e: toml::de::Error| {
-            let before = e.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
             let message = e.message().trim().replace('\n', " ");
-            ScenarioError { line: 1 + before.matches('\n').count(), message }
+            ScenarioError { line: line_of(&e, text), message }
         })
     }
 

@@ -11,6 +11,7 @@ pub mod random;
 pub mod rheometry;
 pub mod statistics;
 pub mod task;
+pub mod toml_text;
 pub mod training;
 
 pub use gp::TissuePrior;

@@ -110,6 +110,13 @@ pub fn memory(name: &str, gigabytes: f64, run: &Finished) -> Bar {
     )
 }
 
+/// A small synthetic patient below a folder: its scans before and after.
+pub fn small_patient(folder: &Path) -> [String; 2] {
+    let scans = folder.join("scans").display().to_string();
+    assert!(run_hgm(&["synth", "-q", "--spacing-mm", "2", "--seed", "5", "-o", &scans]).ok, "a patient to run");
+    ["pre", "post"].map(|scan| format!("{scans}/{scan}.nii.gz"))
+}
+
 /// Every file below a folder, by its path there.
 pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();

@@ -1,14 +1,12 @@
 //! Bars of sameness: any number of threads, one sweep or four shards, the same bytes of every file.
 
-use crate::bar::{Bar, contents, run_hgm};
+use crate::bar::{Bar, contents, run_hgm, small_patient};
 use std::path::Path;
 
 pub fn bars() -> Vec<Bar> {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
-    let scans = at("scans");
-    assert!(run_hgm(&["synth", "-q", "--spacing-mm", "2", "--seed", "5", "-o", &scans]).ok, "a patient to run");
-    let (pre, post) = (format!("{scans}/pre.nii.gz"), format!("{scans}/post.nii.gz"));
+    let [pre, post] = small_patient(folder.path());
     let small = ["-q", "--cells", "8000"];
 
     let threads = ["1", "2", "8"];
@@ -16,8 +14,8 @@ pub fn bars() -> Vec<Bar> {
         .iter()
         .map(|n| {
             let case = at(&format!("threads-{n}"));
-            let estimated = ["run", &pre, &post, "--estimate", "--tissues", "2", "--threads", n, "-o", &case];
-            run_hgm(&[&estimated[..], &small[..]].concat()).ok
+            let swept = run_hgm(&[&["run", &pre, &post, "--threads", n, "-o", &case][..], &small[..]].concat());
+            swept.ok && run_hgm(&["estimate", &case, "-q", "--tissues", "2", "--threads", n]).ok
         })
         .collect();
     let of_threads: Vec<_> = threads.iter().map(|n| folder.path().join(format!("threads-{n}"))).collect();

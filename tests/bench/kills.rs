@@ -1,6 +1,6 @@
 //! Bar of a patient's run that is killed: at twenty random moments, and the rerun ends with the bytes of a quiet one.
 
-use crate::bar::{Bar, contents, run_hgm};
+use crate::bar::{Bar, contents, run_hgm, small_patient};
 use hgm::material::random::CounterRng;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -10,9 +10,7 @@ const KILLS: u64 = 20;
 pub fn bars() -> Vec<Bar> {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
-    let scans = at("scans");
-    assert!(run_hgm(&["synth", "-q", "--spacing-mm", "2", "--seed", "5", "-o", &scans]).ok, "a patient to run");
-    let (pre, post) = (format!("{scans}/pre.nii.gz"), format!("{scans}/post.nii.gz"));
+    let [pre, post] = small_patient(folder.path());
     let arguments = |case: &str| ["run", "-q", &pre, &post, "--cells", "8000", "-o", case].map(str::to_owned);
 
     let begin = Instant::now();

@@ -80,7 +80,9 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     assert_eq!((medians.len(), &medians[0]["subjects"]), (9, &2.into()));
     assert!(least >= f64::midpoint(margins[0], margins[1]) - 1e-9, "no sample beats everybody's own best");
     // For the tests of pages in a browser, which come after these.
-    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("group.html"), &page).unwrap();
+    if let Some(kept) = std::env::var_os("HGM_KEPT_GROUP_PAGE") {
+        std::fs::write(kept, &page).unwrap();
+    }
 
     let sidecar = out.join("sub-02/ses-postop/anat/sub-02_ses-postop_space-MNI152NLin2009aSym_label-cavity_mask.json");
     let sidecar: Value = serde_json::from_str(&text(&sidecar)).unwrap();

@@ -124,9 +124,10 @@ fn produced(mesh: &TetMesh, solved: SolvedSample) -> Result<Produced, Failure> {
     let mut produced = Produced::default();
     let mut record = solved.record;
     match solved.state {
-        None => produced
-            .warnings
-            .push(format!("{} is left out: its body finds no equilibrium under this load (too soft)", record.id)),
+        None => {
+            tracing::debug!("{}: {}", record.id, solved.reason.unwrap_or_default());
+            produced.warnings.push(format!("{} is left out: its body finds no equilibrium under this load", record.id));
+        }
         Some((outcome, errors)) => {
             let file = format!("sim/{}.vtu", record.id);
             let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();

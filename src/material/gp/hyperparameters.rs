@@ -1,6 +1,7 @@
 //! Hyperparameters of the multi-task Gaussian process, saved and loaded as TOML.
 
 use crate::material::task::{TASKS, Task};
+use crate::material::toml_text::line_of;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -115,8 +116,7 @@ impl Hyperparameters {
     /// [`HyperparametersError`] names the field.
     pub fn from_toml(text: &str) -> Result<Self, HyperparametersError> {
         let file: File = toml::from_str(text).map_err(|error| {
-            let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
-            let line = 1 + before.matches('\n').count();
+            let line = line_of(&error, text);
             HyperparametersError::Toml { line, message: error.message().to_owned() }
         })?;
         let rank = file.tasks.first().map_or(0, |task| task.weights.len());

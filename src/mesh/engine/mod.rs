@@ -153,23 +153,22 @@ impl MeshSettings {
     /// Refuses sizes and limits that no mesh can be made with, before there is anything to mesh.
     ///
     /// # Errors
-    /// The first setting out of its range, in words.
-    pub fn check(&self) -> Result<(), String> {
+    /// [`EngineError::Setting`].
+    pub fn check(&self) -> Result<(), EngineError> {
         let size = match self.size {
             MeshSize::Cells(cells) => ("size.cells", cells as f64, cells >= 1, "1 or more"),
             MeshSize::EdgeMm(edge) => ("size.edge_mm", edge, edge > 0.0 && edge.is_finite(), "above 0"),
         };
-        let unit = |x: f64| (0.0..1.0).contains(&x);
         let rules = [
             size,
             ("smoothing_voxels", self.smoothing_voxels, (0.0..=5.0).contains(&self.smoothing_voxels), "0 to 5"),
-            ("smallest_part", self.smallest_part, unit(self.smallest_part), "at least 0 and below 1"),
+            ("smallest_part", self.smallest_part, (0.0..1.0).contains(&self.smallest_part), "at least 0 and below 1"),
             ("limits.time_s", self.limits.time_s, (0.0..=1e9).contains(&self.limits.time_s), "0 or more seconds"),
             ("limits.memory_mb", self.limits.memory_mb as f64, self.limits.memory_mb >= 1, "1 or more"),
         ];
         match rules.into_iter().find(|(_, _, holds, _)| !holds) {
             None => Ok(()),
-            Some((name, value, _, rule)) => Err(format!("`{name}` is {value:?}: it must be {rule}")),
+            Some((name, value, _, rule)) => Err(EngineError::Setting { name, value, rule }),
         }
     }
 }
@@ -196,10 +195,8 @@ impl Default for MeshSettings {
 pub enum EngineError {
     #[error("no voxel carries a label to mesh{}; check the label map", besides(without))]
     NoLabels { without: Vec<u8> },
-    #[error("{what} is {value}: it must be a number above 0")]
-    Setting { what: &'static str, value: f64 },
-    #[error("setting `{name}` of the table [mesh] is {value}: it must be 0 or more")]
-    Negative { name: &'static str, value: f64 },
+    #[error("`{name}` is {value:?}: it must be {rule}")]
+    Setting { name: &'static str, value: f64, rule: &'static str },
     #[error(
         "--edge-in or --edge-near (or [mesh.sizing]) names label {label}, which is not meshed; name one of {present:?} \
          or drop it"
@@ -267,11 +264,7 @@ pub fn mesh_labels<F: Frame>(
     programs: &EnginePrograms,
 ) -> Result<(TetMesh, MeshingRecord), EngineError> {
     let name = settings.engine.name();
-    for (name, value) in [("smoothing_voxels", settings.smoothing_voxels), ("smallest_part", settings.smallest_part)] {
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(EngineError::Negative { name, value });
-        }
-    }
+    settings.check()?;
     let no_labels = || EngineError::NoLabels { without: settings.without.clone() };
     let mut map = map.map(|l| if settings.without.contains(&l) { 0 } else { l });
     let labelled = map.data.iter().filter(|&&l| l != 0).count();
@@ -281,11 +274,8 @@ pub fn mesh_labels<F: Frame>(
     }
     // A first guess: tets of a fair mesh of edge h have about 0.17 h^3.
     let mut edge_mm = match settings.size {
-        MeshSize::EdgeMm(edge) => positive("the target edge in mm (--edge-mm, or `size` in the table [mesh])", edge)?,
-        MeshSize::Cells(cells) => {
-            let cells = positive("the number of cells (--cells, or `size` in the table [mesh])", cells as f64)?;
-            (volume_mm3 / (TET_SHARE * cells)).cbrt()
-        }
+        MeshSize::EdgeMm(edge) => edge,
+        MeshSize::Cells(cells) => (volume_mm3 / (TET_SHARE * cells as f64)).cbrt(),
     };
     let cells = volume_mm3 / (TET_SHARE * edge_mm.powi(3));
     if cells > MOST_CELLS {
@@ -371,10 +361,6 @@ const DENSE_SEEDS: usize = 400;
 
 /// Volume of a tet per cubed edge length in a mesh of this kind (a regular one has 0.118, CGAL's average 0.17).
 const TET_SHARE: f64 = 0.17;
-
-fn positive(what: &'static str, value: f64) -> Result<f64, EngineError> {
-    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(EngineError::Setting { what, value }) }
-}
 
 /// Mean place of the labelled voxels.
 fn centre_mm<F: Frame>(map: &LabelMap<F>) -> [f64; 3] {

@@ -37,8 +37,6 @@ pub enum ProcessError {
          [mesh.limits])"
     )]
     Failed { status: String, last_words: String },
-    #[error("`time_s` in the table [mesh.limits] is {time_s}: it must be a number of seconds, 0 or more")]
-    Limit { time_s: f64 },
     #[error("its answer is not a mesh; use --mesher lattice")]
     Answer,
 }
@@ -52,15 +50,10 @@ fn drain(pipe: Option<impl Read>) -> Vec<u8> {
     bytes
 }
 
-/// The moment when a program is stopped.
-fn deadline(time_s: f64) -> Result<Instant, ProcessError> {
-    let after = Duration::try_from_secs_f64(time_s).ok();
-    after.and_then(|after| Instant::now().checked_add(after)).ok_or(ProcessError::Limit { time_s })
-}
-
 /// Runs `command` under `limits` with `input` on its stdin; returns its stdout.
 pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<Vec<u8>, ProcessError> {
-    let deadline = deadline(limits.time_s)?;
+    // The settings' check has seen that this is a number of seconds.
+    let deadline = Instant::now() + Duration::from_secs_f64(limits.time_s);
     let mut child = capped(command, limits.memory_mb)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

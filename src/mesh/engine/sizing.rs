@@ -58,7 +58,10 @@ impl Sizing {
             if !(factor >= least && factor <= most) {
                 return Err(EngineError::Factor { place, label, factor, least, most });
             }
-            super::positive("the reach in mm (--edge-near LABEL=FACTOR@MM, or [mesh.sizing])", reach_mm)?;
+            if !(reach_mm > 0.0 && reach_mm.is_finite()) {
+                let name = "sizing.walls.reach_mm (--edge-near LABEL=FACTOR@MM)";
+                return Err(EngineError::Setting { name, value: reach_mm, rule: "above 0" });
+            }
         }
         Ok(())
     }
