@@ -156,8 +156,8 @@ impl MeshSettings {
     /// [`EngineError::Setting`].
     pub fn check(&self) -> Result<(), EngineError> {
         let size = match self.size {
-            MeshSize::Cells(cells) => ("size.cells", cells as f64, cells >= 1, "1 or more"),
-            MeshSize::EdgeMm(edge) => ("size.edge_mm", edge, edge > 0.0 && edge.is_finite(), "above 0"),
+            MeshSize::Cells(cells) => ("size.cells", cells as f64, cells >= 1, "a number of cells, 1 or more"),
+            MeshSize::EdgeMm(edge) => ("size.edge_mm", edge, edge > 0.0 && edge.is_finite(), "a target edge above 0"),
         };
         let rules = [
             size,
