@@ -1,9 +1,10 @@
 //! `hgm demo`: the bundled pair and the phantom, without network.
 
-use super::case::MeshOptions;
+use super::flags::{AnalysisOptions, Flags, MeshOptions};
 use super::{Failure, Session, phantom, run};
 use crate::artefact::write_whole;
 use crate::mesh::engine::Engine;
+use crate::workflow::{Goal, Inputs, run_to};
 use std::path::PathBuf;
 
 const PRE: &[u8] = include_bytes!("../../sample-data/pre.nii.gz");
@@ -28,10 +29,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     write_whole(&pre, PRE)?;
     write_whole(&post, POST)?;
     // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
-    let mesh = || MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), ..MeshOptions::default() };
-    let pair = run::analyse(&run::Args::demo(pre, post, args.output.join("pair"), mesh()), session)?;
-    let (phantom, text) = phantom::analyse(&phantom::Args::demo(args.output.join("phantom"), mesh()), session)?;
-    let both = serde_json::json!({ "pair": pair.outcome, "phantom": phantom });
-    session.emit(&both, &format!("{}\n{text}", pair.text.trim_end()))?;
-    pair.patient.quality_gate()
+    let mesh = MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), ..MeshOptions::default() };
+    let analysis = AnalysisOptions { tissues: Some(1), ..AnalysisOptions::default() };
+    let settings = run::settings(&analysis, &mesh, session)?;
+    let place = session.place(&args.output.join("pair"));
+    let pair = run_to(Goal::Sweep, &Inputs::pair(pre, post), &place, &settings, &mut session.listener())?;
+    let mut flags = Flags::default();
+    flags.set("phantom.tissues", Some(1));
+    mesh.over(&mut flags);
+    let (phantom, text) = phantom::made(flags, false, &args.output.join("phantom"), session)?;
+    let both = serde_json::json!({ "pair": pair.outcome()?, "phantom": phantom });
+    let words = run::in_words(&pair, Goal::Sweep)?;
+    session.emit(&both, &format!("{words}\n{text}"))?;
+    Ok(pair.quality_gate()?)
 }

@@ -1,19 +1,12 @@
 //! `hgm estimate`: the moduli that explain what was observed, with error bars.
 
-use super::case::{
-    self, Case, ESTIMATE, EstimateFacts, EstimateInput, EstimateOptions, OUTCOME, REFERENCE_STATE, REST_MESH,
-};
-use super::patient::Patient;
-use super::{Failure, Reject, Session};
-use crate::artefact::Manifest;
+use super::flags::Flags;
+use super::run::in_words;
+use super::{Failure, Session};
 use crate::experiment::estimate::EstimateOutcome;
-use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
-use crate::experiment::phantom::PhantomSettings;
+use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::resection::improvement;
-use crate::experiment::sweep::Reference;
-use crate::mesh::TetMesh;
-use crate::mesh::format::{Field, vtu};
-use anyhow::anyhow;
+use crate::workflow::{self, EstimateFacts, Goal, Subject};
 use std::path::PathBuf;
 
 /// Shear moduli by optimisation with solver sensitivities: most probable values, 95 % intervals, what limits them
@@ -29,90 +22,18 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let case = Case::open(&args.case, session);
-    let options: EstimateOptions = session.settings("estimate")?;
-    if case.path(REFERENCE_STATE).exists() {
-        let facts = of_phantom(&case, args.tissues, &options, session)?;
-        let mut outcome = ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?;
-        with_estimate(&mut outcome, &facts);
-        case.write_outcome(&outcome)?;
-        let page = case.write_page()?;
-        return session.emit(&facts.estimate, &(table(&facts) + &page));
+    let mut flags = Flags::default();
+    for room in ["resection", "phantom"] {
+        flags.set(&format!("{room}.tissues"), args.tissues);
     }
-    let patient = Patient::open(&case, args.tissues, session)?;
-    let earlier = if case.path(OUTCOME).exists() {
-        Some(ExperimentOutcome::from_json(&case.read_text(OUTCOME)?, OUTCOME).reject()?)
-    } else {
-        None
-    };
-    let (outcome, facts, page) = patient.estimate(&options, earlier, session)?;
-    session.emit(&facts.estimate, &(table(&facts) + &comparison(&outcome, &facts) + &page))?;
-    patient.quality_gate()
-}
-
-fn of_phantom(
-    case: &Case,
-    tissues: Option<u8>,
-    options: &EstimateOptions,
-    session: &Session,
-) -> Result<EstimateFacts, Failure> {
-    let settings: PhantomSettings = case.settings_of("phantom", session)?;
-    if tissues.is_some_and(|t| usize::from(t) != settings.tissues) {
-        return Err(Failure::Rejected(anyhow!(
-            "--tissues {0}: the phantom in this folder was made with --tissues {1}; make another with \
-             `hgm phantom --tissues {0}`",
-            tissues.unwrap_or_default(),
-            settings.tissues
-        )));
+    let settings = session.settings_of(&args.case, flags)?;
+    let case = workflow::estimate(&session.place(&args.case), &settings, &mut session.listener())?;
+    let facts = case.estimate()?;
+    if case.subject() != Some(Subject::Patient) {
+        return session.emit(&facts.estimate, &(table(&facts) + &case.page().display().to_string()));
     }
-    let mesh_bytes = case.read(REST_MESH)?;
-    let mesh = vtu::decode(&mesh_bytes, REST_MESH).reject()?.mesh;
-    let (made, _): (Manifest, SampleOutcome) = case.stage_facts("reference")?;
-    let displacement = reference_state(case, &mesh)?;
-    let input = EstimateInput {
-        mesh: (&mesh, &mesh_bytes),
-        scenario: &settings.scenario(),
-        tissues: &settings.tissue_list(),
-        poisson_ratio: settings.poisson_ratio,
-        reference: &Reference::Nodes(displacement),
-        after: &made,
-        sag: None,
-        noise_mm: options.phantom_noise_mm,
-    };
-    Ok(case::estimate(case, &input, options, session)?.1)
-}
-
-/// The displacement of a phantom's reference, mm, node by node of its mesh.
-///
-/// # Errors
-/// Rejected when the file is damaged or another mesh's.
-pub fn reference_state(case: &Case, mesh: &TetMesh) -> Result<Vec<[f64; 3]>, Failure> {
-    let state = vtu::decode(&case.read(REFERENCE_STATE)?, REFERENCE_STATE).reject()?;
-    let displacement = state.point_field("displacement").and_then(Field::vectors).unwrap_or_default();
-    let (found, nodes) = (displacement.len(), mesh.nodes_mm().len());
-    if found == nodes {
-        return Ok(displacement);
-    }
-    Err(Failure::Rejected(anyhow!(
-        "{0}: {REFERENCE_STATE} holds displacements of {found} nodes and {REST_MESH} has {nodes}: one of the two is not this \
-         phantom's; run `hgm phantom -o {0} --force` again",
-        case.folder.display()
-    )))
-}
-
-/// The outcome with the estimate as one more sample; it is the best one where no sweep has chosen another.
-pub fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFacts) {
-    outcome.samples.retain(|s| s.id != ESTIMATE);
-    if outcome.samples.is_empty() {
-        outcome.tissues = facts.record.shear_modulus_pa.keys().cloned().collect();
-    }
-    outcome.samples.push(facts.record.clone());
-    if outcome.best_sample.is_none() {
-        outcome.best_sample = Some(ESTIMATE.to_owned());
-    }
-    outcome.warnings.retain(|w| !w.starts_with("estimate: "));
-    outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
-    outcome.estimate = Some(facts.estimate.clone());
+    session.emit(&facts.estimate, &in_words(&case, Goal::Estimate)?)?;
+    Ok(case.quality_gate()?)
 }
 
 /// The estimate for a terminal.

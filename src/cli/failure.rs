@@ -1,6 +1,10 @@
 //! How a subcommand ends when it does not end well.
 
+use super::remedy::remedy;
 use super::session::has_emitted;
+use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
+use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
+use anyhow::anyhow;
 use std::process::ExitCode;
 
 /// The three ways to end without success; usage errors (exit code 2) are clap's.
@@ -26,17 +30,6 @@ impl Failure {
             Self::Failed(_) => 1,
             Self::Rejected(_) => 3,
             Self::QualityGate(_) => 4,
-        }
-    }
-
-    /// The same failure, with what it is about before its text.
-    #[must_use]
-    pub fn about(self, what: &str) -> Self {
-        let what = what.to_owned();
-        match self {
-            Self::Failed(error) => Self::Failed(error.context(what)),
-            Self::Rejected(error) => Self::Rejected(error.context(what)),
-            Self::QualityGate(error) => Self::QualityGate(error.context(what)),
         }
     }
 
@@ -75,9 +68,31 @@ pub fn in_one_line(error: &anyhow::Error) -> String {
 }
 
 impl<E: Into<anyhow::Error>> From<E> for Failure {
+    /// Whose fault it is the library says; what to do about it on the command line is added here.
     fn from(error: E) -> Self {
-        Self::Failed(error.into())
+        let error: anyhow::Error = error.into();
+        let kind = kind(&error);
+        let error = match (remedy(&error), kind) {
+            (Some(remedy), _) => anyhow!("{}; {remedy}", in_one_line(&error)),
+            (None, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
+            (None, _) => error,
+        };
+        match kind {
+            ErrorKind::Rejected => Self::Rejected(error),
+            ErrorKind::Failed => Self::Failed(error),
+            ErrorKind::QualityGate => Self::QualityGate(error),
+        }
     }
+}
+
+fn kind(error: &anyhow::Error) -> ErrorKind {
+    if let Some(error) = error.downcast_ref::<WorkflowError>() {
+        return error.kind();
+    }
+    let given = error.is::<InputError>() || error.is::<SettingsError>() || error.is::<DatasetError>();
+    let cohort = error.is::<MemberError>()
+        || error.downcast_ref::<CohortError>().is_some_and(|error| !matches!(error, CohortError::Write(_)));
+    if given || cohort { ErrorKind::Rejected } else { ErrorKind::Failed }
 }
 
 /// Marks an error as the input's fault (exit code 3).

@@ -1,12 +1,13 @@
 //! `hgm law fit`: simple stable laws for a laboratory's test or a literature model.
 
+use super::flags::Flags;
 use super::gp::StudyOptions;
-use super::session::read_input;
 use super::{Failure, Reject, Session};
 use crate::material::law::Material;
 use crate::material::literature::citation;
-use crate::material::meta_model::{Fit, MetaModel, MetaModelSettings, Search, StabilityRange};
+use crate::material::meta_model::{Fit, MetaModel, Search, StabilityRange};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry, read_rheometry};
+use crate::workflow::read_input;
 use anyhow::{Context, anyhow};
 use clap::Subcommand;
 use serde::Serialize;
@@ -66,7 +67,7 @@ struct Fitted {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Command::Fit(args) = &args.command;
-    let mut settings: MetaModelSettings = session.settings("law")?;
+    let mut settings = session.settings(Flags::default())?.law;
     if args.studies.published {
         settings.search = Search::Published;
     }

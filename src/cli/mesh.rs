@@ -1,19 +1,19 @@
 //! `hgm mesh DSEG -o MESH`: conforming tetrahedra of a label map.
 
-use super::case::{self, MeshOptions};
-use super::session::read_input;
+use super::flags::{Flags, MeshOptions};
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError, write_whole};
 use crate::geometry::Native;
 use crate::image::LabelMap;
 use crate::image::nifti;
-use crate::mesh::engine::{MeshSettings, mesh_labels};
-use crate::mesh::format::{feb, gifti, inp, msh, ply, stl, vtu};
+use crate::mesh::engine::{EnginePrograms, MeshSettings, mesh_labels};
+use crate::mesh::format::{WriteError, feb, gifti, inp, msh, ply, stl, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::report::mesh_figure::preview;
 use crate::segment::label;
 use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
-use anyhow::anyhow;
+use crate::workflow::{WorkflowError, mesh_outcome, read_input};
+use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -80,16 +80,19 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let name = args.labels.display().to_string();
     let bytes = read_input(&args.labels)?;
-    let (labels, odd) = nifti::decode_labels(&bytes, &name, &session.reading()?).reject()?;
+    let mut flags = Flags::default();
+    args.mesh.over(&mut flags);
+    flags.list("mesh.without", &args.without);
+    flags.switch("tag.tentorium", args.tentorium);
+    let whole = session.settings(flags)?;
+    let (mut settings, tags) = (whole.mesh, whole.tag);
+    let programs = session.programs.engines();
+    programs.check(settings.engine).reject()?;
+    let (labels, odd) = nifti::decode_labels(&bytes, &name, &whole.image).reject()?;
     for warning in &odd {
         tracing::warn!("{name}: {warning}");
     }
 
-    let programs = case::programs();
-    let mut settings = case::mesh_settings(&args.mesh, &programs, session)?;
-    settings.without.clone_from(&args.without);
-    let mut tags: TagSettings = session.settings("tag")?;
-    tags.tentorium |= args.tentorium;
     let in_mni = match args.sets.as_str() {
         "auto" => name.contains("space-MNI") || nifti::says_mni(&bytes),
         choice => choice == "mni",
@@ -106,15 +109,15 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     // Pictures and surfaces are made from the mesh at hand, so asking for them is asking for the mesh.
     let force = session.options.force || args.preview.is_some() || args.surfaces.is_some();
     let outcome = stage.run(force, || {
-        let (mesh, summary) = make(&labels, &settings, in_mni.then_some(&tags), &name)?;
+        let (mesh, summary) = make(&labels, &settings, in_mni.then_some(&tags), (&name, &programs))?;
         if let Some(path) = &args.preview {
             write_whole(path, &preview(&mesh, None, PREVIEW_PIXELS))?;
         }
         if let Some(folder) = &args.surfaces {
             write_surfaces(&mesh, folder)?;
         }
-        let facts = case::facts(&summary)?;
-        let bytes = encode(&mesh, &extension).map_err(|e| e.about(&file))?;
+        let facts = serde_json::to_value(&summary)?;
+        let bytes = encode(&mesh, &extension).with_context(|| file.clone())?;
         Ok(Produced { files: vec![(file.clone(), bytes)], warnings: summary.refused, facts })
     });
     let outcome = outcome.map_err(|error| match error {
@@ -136,10 +139,10 @@ fn make(
     labels: &LabelMap<Native>,
     settings: &MeshSettings,
     tags: Option<&TagSettings>,
-    name: &str,
-) -> Result<(TetMesh, Summary), Failure> {
-    let (mut mesh, record) =
-        mesh_labels(labels, settings, &case::programs()).map_err(|e| case::no_mesh(e).about(name))?;
+    (name, programs): (&str, &EnginePrograms),
+) -> Result<(TetMesh, Summary), WorkflowError> {
+    let (mut mesh, record) = mesh_labels(labels, settings, programs)
+        .map_err(|source| WorkflowError::Engine { labels: name.to_owned(), source })?;
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
         match tag_boundary_sets(&mut mesh, tags) {
@@ -147,12 +150,12 @@ fn make(
             Err(error) => refused.push(error.to_string()),
         }
     }
-    let figures = case::mesh_outcome(&mesh, &mesh, labels, settings);
+    let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let islands = record.islands.len();
     Ok((mesh, Summary { mesh: figures, edge_mm: record.edge_mm, islands, sets, refused }))
 }
 
-fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, Failure> {
+fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
     Ok(match extension {
         "msh" => msh::encode(mesh)?,
         "inp" => inp::encode(mesh)?,

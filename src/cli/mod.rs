@@ -1,31 +1,32 @@
-//! One file per subcommand: read, call, write, print. No algorithm lives here.
+//! One file per subcommand: options to settings, a call of the workflow, print. No algorithm lives here.
 //!
 //! A subcommand file has an `Args` struct (clap) and a `run(args, &Session) -> Result<(), Failure>`. Results go to
 //! stdout (JSON with `--json`), logs and progress to stderr. Exit codes: 0 done, 1 failed, 2 usage, 3 input rejected,
 //! 4 computed but the quality gate refused it (outputs kept).
 
 mod bids;
-mod case;
 mod completions;
 mod demo;
 mod doctor;
 mod estimate;
 mod failure;
+mod flags;
 mod gp;
 mod law;
+mod layout;
+mod listener;
 mod man;
 mod mesh;
-mod patient;
 mod phantom;
 mod prep;
 mod reduce;
 mod register;
+mod remedy;
 mod report;
 mod run;
 mod schema;
 mod segment;
 mod session;
-mod settings_file;
 mod simulate;
 mod sweep;
 mod synth;
@@ -50,7 +51,7 @@ pub struct Hgm {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Prep(prep::Command),
+    Prep(prep::Args),
     Run(run::Args),
     Phantom(phantom::Args),
     Sweep(sweep::Args),
@@ -69,6 +70,7 @@ enum Command {
     Report(report::Args),
     Bids(bids::Args),
     Why(why::Args),
+    Layout(layout::Args),
     Schema(schema::Args),
 }
 
@@ -78,7 +80,7 @@ pub fn main() -> ExitCode {
     let json = hgm.global.json;
     let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
         Command::Demo(args) => demo::run(&args, &session),
-        Command::Prep(command) => prep::run(&command, &session),
+        Command::Prep(args) => prep::run(&args, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
         Command::Sweep(args) => sweep::run(&args, &session),
@@ -97,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Report(args) => report::run(&args, &session),
         Command::Bids(args) => bids::run(&args, &session),
         Command::Why(args) => why::run(&args, &session),
+        Command::Layout(args) => layout::run(&args, &session),
         Command::Schema(args) => schema::run(&args, &session),
     });
     match outcome {

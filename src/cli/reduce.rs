@@ -1,9 +1,9 @@
 //! `hgm reduce`: the parts of a sweep joined.
 
-use super::case::{Case, PriorOptions, SampleMode};
-use super::patient::Patient;
-use super::run::summary;
+use super::flags::Flags;
+use super::run::in_words;
 use super::{Failure, Session};
+use crate::workflow::{self, Goal};
 use std::path::PathBuf;
 
 /// Joins the shards of a sweep: outcome, table and page, the same bytes as one run
@@ -16,9 +16,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let case = Case::open(&args.case, session);
-    let patient = Patient::open(&case, None, session)?;
-    let (outcome, page) = patient.sweep(SampleMode::Gather, &PriorOptions::default(), session)?;
-    session.emit(&outcome, &summary(&outcome, &page))?;
-    patient.quality_gate()
+    let settings = session.settings_of(&args.case, Flags::default())?;
+    let case = workflow::reduce(&session.place(&args.case), &settings, &mut session.listener())?;
+    session.emit(&case.outcome()?, &in_words(&case, Goal::Sweep)?)?;
+    Ok(case.quality_gate()?)
 }

@@ -1,16 +1,15 @@
 //! `hgm register MOVING FIXED -o XFM`: the rigid motion from one T1 image to another, or to the template.
 
-use super::session::read_input;
+use super::flags::Flags;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::nifti::{self, NiftiImage};
 use crate::image::{Mask, Volume};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
-use crate::register::{
-    FitQuality, FitWarning, RigidFit, RigidMasks, RigidSettings, register_rigid, register_to_template,
-};
+use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid, register_to_template};
 use crate::segment::atlas;
+use crate::workflow::{Settings, read_input};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -48,10 +47,8 @@ struct Summary {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut settings: RigidSettings = session.settings("register")?;
-    if let Some(seed) = session.options.seed {
-        settings.seed = seed;
-    }
+    let whole = session.settings(Flags::default())?;
+    let settings = &whole.register;
     let text_path = match args.output.extension() {
         Some(e) if e == "tfm" => args.output.with_extension("txt"),
         Some(_) => args.output.clone(),
@@ -62,9 +59,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", args.output.display())));
     }
     let mut warnings = Vec::new();
-    let (moving, moving_bytes) = image(&args.moving, session, &mut warnings)?;
-    let moving_mask =
-        args.moving_mask.as_deref().map(|path| mask(path, &moving, session, &mut warnings)).transpose()?;
+    let (moving, moving_bytes) = image(&args.moving, &whole, &mut warnings)?;
+    let moving_mask = args.moving_mask.as_deref().map(|path| mask(path, &moving, &whole, &mut warnings)).transpose()?;
     let names = || format!("{} onto {}", args.moving.display(), args.fixed.display());
 
     let to_template = args.fixed.as_os_str().eq_ignore_ascii_case("mni") && !args.fixed.exists();
@@ -74,16 +70,16 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 "--moving-mask and --fixed-mask do not go with MNI: the template's own brain is used; leave them out"
             )));
         }
-        parts(register_to_template(&moving, &atlas::template().t1_f32(), &settings).with_context(names).reject()?)
+        parts(register_to_template(&moving, &atlas::template().t1_f32(), settings).with_context(names).reject()?)
     } else {
-        let (fixed, fixed_bytes) = image(&args.fixed, session, &mut warnings)?;
+        let (fixed, fixed_bytes) = image(&args.fixed, &whole, &mut warnings)?;
         if fixed_bytes == moving_bytes {
             warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
         }
         let fixed_mask =
-            args.fixed_mask.as_deref().map(|path| mask(path, &fixed, session, &mut warnings)).transpose()?;
+            args.fixed_mask.as_deref().map(|path| mask(path, &fixed, &whole, &mut warnings)).transpose()?;
         let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
-        parts(register_rigid(&moving, &fixed, masks, &settings).with_context(names).reject()?)
+        parts(register_rigid(&moving, &fixed, masks, settings).with_context(names).reject()?)
     };
 
     let refused = doubts.iter().find(|w| matches!(w, FitWarning::LowSimilarity { .. })).cloned();
@@ -108,12 +104,12 @@ fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Nat
 
 fn image(
     path: &Path,
-    session: &Session,
+    settings: &Settings,
     warnings: &mut Vec<String>,
 ) -> Result<(Volume<f32, Native>, Vec<u8>), Failure> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
-    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &session.reading()?).reject()?;
+    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &settings.image).reject()?;
     warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
     Ok((volume, bytes))
 }
@@ -121,12 +117,12 @@ fn image(
 fn mask(
     path: &Path,
     image: &Volume<f32, Native>,
-    session: &Session,
+    settings: &Settings,
     warnings: &mut Vec<String>,
 ) -> Result<Mask<Native>, Failure> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
-    let (mask, odd) = nifti::decode_mask(&bytes, &name, &session.reading()?).reject()?;
+    let (mask, odd) = nifti::decode_mask(&bytes, &name, &settings.image).reject()?;
     warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
     if !mask.grid.coincides(&image.grid, 1e-2) {
         let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);

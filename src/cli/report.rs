@@ -1,7 +1,7 @@
 //! `hgm report CASE`: the page again from what is there.
 
-use super::case::Case;
 use super::{Failure, Session};
+use crate::workflow;
 use std::path::PathBuf;
 
 /// Make CASE/report.html again from the files of a case folder
@@ -14,6 +14,6 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let shown = Case::open(&args.case, session).write_page()?;
+    let shown = workflow::report(&session.place(&args.case))?.page().display().to_string();
     session.emit(&serde_json::json!({ "report": shown }), &shown)
 }

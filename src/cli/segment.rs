@@ -1,14 +1,14 @@
 //! `hgm segment`: one T1 to a label map.
 
-use super::session::read_input;
+use super::flags::Flags;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
 use crate::geometry::Native;
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::image::{Mask, Volume};
-use crate::register::deformable::DeformableSettings;
-use crate::register::{RigidSettings, register_to_template};
-use crate::segment::{SegmentOverrides, SegmentSettings, TissueVolumes, atlas, segment_head};
+use crate::register::register_to_template;
+use crate::segment::{SegmentOverrides, TissueVolumes, atlas, segment_head};
+use crate::workflow::{Settings, read_input};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -44,9 +44,7 @@ struct Summary {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let register: RigidSettings = session.settings("register")?;
-    let deformable: DeformableSettings = session.settings("deformable")?;
-    let settings: SegmentSettings = session.settings("segment")?;
+    let settings = session.settings(Flags::default())?;
     for path in [Some(&args.output), args.write_brain_mask.as_ref()].into_iter().flatten() {
         if !path.to_string_lossy().ends_with(".nii.gz") {
             return Err(Failure::Rejected(anyhow!(
@@ -56,18 +54,19 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     let name = args.t1.display().to_string();
-    let read = nifti::decode(&read_input(&args.t1)?, &name, &session.reading()?).reject()?;
+    let read = nifti::decode(&read_input(&args.t1)?, &name, &settings.image).reject()?;
     let t1 = read.volume;
-    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1, session)).transpose()?;
+    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1, &settings)).transpose()?;
 
     let bar = session.progress(2, "segment");
     bar.set_message("to MNI");
-    let fit =
-        register_to_template(&t1, &atlas::template().t1_f32(), &register).with_context(|| name.clone()).reject()?;
+    let fit = register_to_template(&t1, &atlas::template().t1_f32(), &settings.register)
+        .with_context(|| name.clone())
+        .reject()?;
     bar.inc(1);
     bar.set_message("labels");
     let overrides = SegmentOverrides { brain: brain.as_ref(), ..SegmentOverrides::default() };
-    let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &deformable, &settings)
+    let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &settings.deformable, &settings.segment)
         .with_context(|| name.clone())
         .reject()?;
     bar.finish_and_clear();
@@ -102,9 +101,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.emit(&Summary { labels, volumes: v, tissue_means: found.tissue_means, warnings }, &text)
 }
 
-fn brain_mask(path: &Path, t1: &Volume<f32, Native>, session: &Session) -> Result<Mask<Native>, Failure> {
+fn brain_mask(path: &Path, t1: &Volume<f32, Native>, settings: &Settings) -> Result<Mask<Native>, Failure> {
     let name = path.display().to_string();
-    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, &session.reading()?).reject()?;
+    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, &settings.image).reject()?;
     if !mask.grid.coincides(&t1.grid, 0.1) {
         let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
         return Err(Failure::Rejected(anyhow!(

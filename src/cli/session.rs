@@ -1,13 +1,14 @@
 //! What every subcommand shares: global options, settings from a file, output, progress, input files.
 
-use super::failure::{Failure, Reject};
-use super::settings_file;
+use super::failure::Failure;
+use super::flags::Flags;
+use super::listener::{Listener, bar};
 use crate::artefact::no_more_writes;
-use crate::image::nifti::{Orientation, ReadOptions};
+use crate::image::nifti::Orientation;
+use crate::workflow::{Case, Place, Programs, Settings, read_text};
 use anyhow::{Context, anyhow};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
@@ -35,7 +36,7 @@ pub struct GlobalOptions {
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
     /// Seed of everything random
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(..1 << 53))]
     pub seed: Option<u64>,
     /// Which volume, from 0, of a NIfTI file that holds several [default: such a file is refused]
     #[arg(long, global = true, value_name = "N")]
@@ -63,6 +64,8 @@ fn orientation(name: &str) -> Result<Orientation, String> {
 pub struct Session {
     /// The options as given.
     pub options: GlobalOptions,
+    /// The programs of this machine.
+    pub programs: Programs,
     config: toml::Table,
 }
 
@@ -93,49 +96,55 @@ impl Session {
         rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build_global().ok();
         let config = match &options.config {
             None => toml::Table::new(),
-            Some(path) => settings_file::tables(&read_text(path)?, &path.display().to_string())?,
+            Some(path) => Settings::layer(&read_text(path)?, &path.display().to_string())?,
         };
-        Ok(Self { options, config })
+        let programs = Programs::look_up(std::env::current_exe().ok().as_deref(), |name| std::env::var_os(name));
+        Ok(Self { options, programs, config })
     }
 
-    /// The settings of one room: the table `[room]` of the settings file over the defaults. Command-line options go
-    /// over the result in the subcommand.
+    /// The settings of a job that makes something new: the defaults, over them the settings file, over that the options.
     ///
     /// # Errors
-    /// Unknown or ill-typed keys are rejected by name.
-    pub fn settings<T: DeserializeOwned + Default>(&self, room: &str) -> Result<T, Failure> {
-        match self.config.get(room) {
-            None => Ok(T::default()),
-            Some(table) => {
-                settings_file::typed(table).map_err(|e| anyhow!("{}: table [{room}]: {e}", self.config_name())).reject()
-            }
-        }
+    /// Values that no room takes are rejected.
+    pub fn settings(&self, flags: Flags) -> Result<Settings, Failure> {
+        self.settings_over(&toml::Table::new(), flags)
     }
 
-    /// How NIfTI files that leave a choice open are read: `--volume` and `--prefer` over the table `[image]`.
+    /// The settings of a job on a case: its own come between the defaults and the settings file.
+    ///
+    /// # Errors
+    /// As [`Session::settings`]; also a case whose settings cannot be read.
+    pub fn settings_of(&self, folder: &Path, flags: Flags) -> Result<Settings, Failure> {
+        self.settings_over(&Case::open(folder)?.settings()?, flags)
+    }
+
+    /// The settings over those of a job's own, which take the place of the defaults.
     ///
     /// # Errors
     /// As [`Session::settings`].
-    pub fn reading(&self) -> Result<ReadOptions, Failure> {
-        let settings: ReadOptions = self.settings("image")?;
-        Ok(ReadOptions {
-            prefer: self.options.prefer.or(settings.prefer),
-            volume: self.options.volume.or(settings.volume),
-        })
+    pub fn settings_over(&self, own: &toml::Table, mut flags: Flags) -> Result<Settings, Failure> {
+        let mut base = Flags::default();
+        base.set("mesh.engine", Some(self.programs.engines().preferred()));
+        flags.set("image.prefer", self.options.prefer);
+        flags.set("image.volume", self.options.volume);
+        for room in ["register", "gp", "synth"] {
+            flags.set(&format!("{room}.seed"), self.options.seed);
+        }
+        Ok(Settings::resolve([&base.0, own, &self.config, &flags.0])?)
     }
 
-    /// Whether the settings file has a table of this room.
-    pub fn has_table(&self, room: &str) -> bool {
-        self.config.contains_key(room)
+    /// Where a job is done.
+    pub fn place(&self, folder: &Path) -> Place {
+        Place { folder: folder.to_path_buf(), programs: self.programs.clone(), force: self.options.force }
     }
 
-    /// Whether the settings file names this key of this room.
-    pub fn has_settings(&self, room: &str, key: &str) -> bool {
-        self.config.get(room).and_then(|table| table.get(key)).is_some()
+    /// Whoever listens to a job.
+    pub fn listener(&self) -> Listener {
+        Listener::new(self.shows_bars())
     }
 
-    fn config_name(&self) -> String {
-        self.options.config.as_ref().map_or_else(String::new, |path| path.display().to_string())
+    fn shows_bars(&self) -> bool {
+        !self.options.quiet && std::io::stderr().is_terminal()
     }
 
     /// Prints the result: `value` with `--json`, else the text.
@@ -153,17 +162,8 @@ impl Session {
     }
 
     /// A progress bar of `steps` steps with time left; hidden when stderr is not a terminal or with `-q`.
-    ///
-    /// # Panics
-    /// Never: the template is a constant.
     pub fn progress(&self, steps: u64, what: &'static str) -> ProgressBar {
-        if self.options.quiet || !std::io::stderr().is_terminal() {
-            return ProgressBar::hidden();
-        }
-        let style = ProgressStyle::with_template("{prefix:>14} [{bar:30}] {pos}/{len} {msg} (left {eta})")
-            .expect("the template is constant")
-            .progress_chars("=> ");
-        ProgressBar::new(steps).with_style(style).with_prefix(what)
+        if self.shows_bars() { bar(steps, what) } else { ProgressBar::hidden() }
     }
 }
 
@@ -178,24 +178,4 @@ fn end_between_files() -> std::io::Result<()> {
         }
     });
     Ok(())
-}
-
-/// A file the user named, whole.
-///
-/// # Errors
-/// Rejected with the file's name and what to do.
-pub fn read_input(path: &Path) -> Result<Vec<u8>, Failure> {
-    if path.is_dir() {
-        return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", path.display())));
-    }
-    std::fs::read(path).with_context(|| format!("{}: cannot be read; check the path", path.display())).reject()
-}
-
-/// A text file the user named.
-///
-/// # Errors
-/// As [`read_input`]; also when it is not UTF-8.
-pub fn read_text(path: &Path) -> Result<String, Failure> {
-    let said = |_| anyhow!("{}: not UTF-8 text; save the file as UTF-8", path.display());
-    String::from_utf8(read_input(path)?).map_err(said).reject()
 }

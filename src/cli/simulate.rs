@@ -1,8 +1,5 @@
 //! `hgm simulate MESH SCENARIO.toml -o OUT.vtu`: one deformation, or one motion.
 
-use super::case::shown;
-use super::session::{read_input, read_text};
-use super::settings_file;
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
@@ -10,6 +7,8 @@ use crate::fem::{ConvergenceRecord, ElementKind, Method, Motion, Outcome, Progre
 use crate::fem::{simulate, simulate_from};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, msh, pvd, vtu};
+use crate::workflow;
+use crate::workflow::{read_input, read_text, shown};
 use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -67,7 +66,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mesh_bytes = read_input(&args.mesh)?;
     let mesh = mesh(&args.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&args.scenario)?)
-        .map_err(|e| anyhow!("{}: {}", args.scenario.display(), settings_file::in_words(&e.to_string())))
+        .map_err(|e| anyhow!("{}: {}", args.scenario.display(), workflow::in_words(&e.to_string())))
         .reject()?;
     let start = args.start.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
     if start.is_some() && scenario.solver.method == Method::BackwardEuler {

@@ -1,9 +1,9 @@
 //! `hgm sweep`: the prior's samples on a prepared case, all of them or a part.
 
-use super::case::{Case, PriorOptions, SampleMode};
-use super::patient::{Patient, Shard};
-use super::run::summary;
+use super::flags::{Flags, PriorOptions};
+use super::run::in_words;
 use super::{Failure, Session};
+use crate::workflow::{self, Goal, Shard};
 use std::path::PathBuf;
 
 /// Samples of the prior simulated on a prepared case; --shard K/N runs a part, `hgm reduce` joins the parts
@@ -31,20 +31,20 @@ fn shard(text: &str) -> Result<Shard, String> {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let case = Case::open(&args.case, session);
-    let patient = Patient::open(&case, args.tissues, session)?;
-    if let Some(shard) = args.shard {
-        patient.sweep_shard(shard, &args.prior, session)?;
-        let Shard { number, of } = shard;
+    let mut flags = Flags::default();
+    flags.set("resection.tissues", args.tissues);
+    args.prior.over(&mut flags);
+    let settings = session.settings_of(&args.case, flags)?;
+    let case = workflow::sweep(args.shard, &session.place(&args.case), &settings, &mut session.listener())?;
+    if let Some(Shard { number, of }) = args.shard {
         session.emit(
             &serde_json::json!({ "shard": number, "of": of }),
             "shard done; when all are, join them with `hgm reduce`",
         )?;
     } else {
-        let (outcome, page) = patient.sweep(SampleMode::Run, &args.prior, session)?;
-        session.emit(&outcome, &summary(&outcome, &page))?;
+        session.emit(&case.outcome()?, &in_words(&case, Goal::Sweep)?)?;
     }
-    patient.quality_gate()
+    Ok(case.quality_gate()?)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! `hgm synth -o DIR`: a synthetic patient.
 
-use super::{Failure, Reject, Session};
+use super::flags::Flags;
+use super::{Failure, Session};
 use crate::artefact::{Produced, Stage, StageError};
-use crate::experiment::synth::{Contrast, SagKind, SynthError, SynthSettings, synthesize};
+use crate::experiment::synth::{Contrast, SagKind, SynthError, synthesize};
 use crate::segment::atlas::Side;
 use std::path::PathBuf;
 
@@ -71,22 +72,19 @@ fn contrast(text: &str) -> Result<Contrast, String> {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut settings: SynthSettings = session.settings("synth")?;
-    settings.seed = session.options.seed.unwrap_or(settings.seed);
-    settings.side = args.side.unwrap_or(settings.side);
-    settings.resection_cc = args.resection_cc.unwrap_or(settings.resection_cc);
-    settings.post_oblique_deg = args.oblique_deg.unwrap_or(settings.post_oblique_deg);
-    settings.sag = args.sag.unwrap_or(settings.sag);
-    settings.blood |= args.blood;
-    settings.air |= args.air;
-    settings.contrast = args.contrast.unwrap_or(settings.contrast);
-    if let Some(spacing_mm) = args.spacing_mm {
-        settings.spacing_mm = spacing_mm;
-        // The default of 1 mm must not be thinner than the voxels asked for.
-        settings.post_slice_mm = settings.post_slice_mm.max(spacing_mm);
-    }
-    settings.post_slice_mm = args.slice_mm.unwrap_or(settings.post_slice_mm);
-    settings.check().reject()?;
+    let mut flags = Flags::default();
+    flags.set("synth.side", args.side);
+    flags.set("synth.resection_cc", args.resection_cc);
+    flags.set("synth.post_oblique_deg", args.oblique_deg);
+    flags.set("synth.sag", args.sag);
+    flags.switch("synth.blood", args.blood);
+    flags.switch("synth.air", args.air);
+    flags.set("synth.contrast", args.contrast);
+    flags.set("synth.spacing_mm", args.spacing_mm);
+    // Slices are never thinner than the voxels asked for.
+    let slices = session.settings(Flags::default())?.synth.post_slice_mm;
+    flags.set("synth.post_slice_mm", args.slice_mm.or(args.spacing_mm.map(|spacing| slices.max(spacing))));
+    let settings = session.settings(flags)?.synth;
 
     let stage = Stage::new("synth", 2, &args.output, &settings).frame("pre, post").seed(settings.seed);
     let outcome = stage.run(session.options.force, || {

@@ -18,27 +18,17 @@ pub struct ObservedSurfaces {
 #[derive(Debug, Error, PartialEq)]
 pub enum ObservedError {
     /// The mask behind it is empty.
-    #[error(
-        "{}: the mask is empty, so the set `{set}` has no surface to be compared with; give a mask (--cavity-mask, \
-         --ventricle-mask) to `hgm prep`",
-        mask_file(set)
-    )]
+    #[error("the mask is empty, so the set `{set}` has no surface to be compared with; give a mask of your own")]
     EmptySurface {
         /// The set.
         set: String,
     },
     /// The mesh has no such nodes.
-    #[error("mesh/rest.vtu: no node is in the set `{set}`; look at the masks in anat/ and give your own to `hgm prep`")]
+    #[error("no node of the mesh is in the set `{set}`; look at the masks, and give your own")]
     EmptySet {
         /// The set.
         set: String,
     },
-}
-
-/// The case's file of the mask behind an observed set.
-fn mask_file(set: &str) -> String {
-    let mask = if set == "margin" { "cavity" } else { set };
-    format!("anat/post_space-MNI_label-{mask}_mask.nii.gz")
 }
 
 /// Errors of one deformed (or rest) mesh against the observed surfaces.

@@ -334,8 +334,8 @@ mod tests {
 
     #[test]
     fn json_brings_the_same_outcome_back() {
-        let text = outcome().to_json("sim/outcome.json").unwrap();
-        assert_eq!(ExperimentOutcome::from_json(&text, "sim/outcome.json").unwrap(), outcome());
+        let text = outcome().to_json("outcome.json").unwrap();
+        assert_eq!(ExperimentOutcome::from_json(&text, "outcome.json").unwrap(), outcome());
         assert_eq!(outcome().best().unwrap().id, "sample-01");
         assert_eq!(outcome().rmse_sets(), ["all", "ventricle"]);
     }
@@ -344,9 +344,9 @@ mod tests {
     fn nan_and_unknown_fields_are_refused_by_name() {
         let mut bad = outcome();
         bad.samples[0].rmse_mm.insert("all".to_owned(), f64::NAN);
-        assert!(bad.to_json("sim/outcome.json").unwrap_err().to_string().contains("sim/outcome.json"));
+        assert!(bad.to_json("outcome.json").unwrap_err().to_string().contains("outcome.json"));
         let text = outcome().to_json("x").unwrap().replacen("\"kind\"", "\"kinds\"", 1);
-        assert!(ExperimentOutcome::from_json(&text, "sim/outcome.json").unwrap_err().to_string().contains("kinds"));
+        assert!(ExperimentOutcome::from_json(&text, "outcome.json").unwrap_err().to_string().contains("kinds"));
     }
 
     #[test]

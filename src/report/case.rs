@@ -11,6 +11,7 @@ use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, NiftiError, ReadOptions};
 use crate::image::{LabelMap, Mask, Volume};
+use crate::layout;
 use crate::mesh::format::{MeshWithFields, ReadError, WriteError as FieldError, gifti, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::transform_text::{self, TransformTextError};
@@ -88,22 +89,20 @@ impl Case<'_> {
         Ok(self.bytes(file)?.map(|bytes| vtu::decode(&bytes, file)).transpose()?)
     }
 
-    /// `mesh/reference_*.surf.gii`, by name.
+    /// The target surfaces, by name.
     fn reference_surfaces(&self) -> Result<Vec<(String, TriMesh)>, ReportError> {
-        let mut names = Vec::new();
-        for entry in std::fs::read_dir(self.folder.join("mesh")).into_iter().flatten().flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if name.starts_with("reference_") && name.ends_with(".surf.gii") {
-                names.push(name);
-            }
+        let family = layout::REFERENCE_SURFACE;
+        let mut sets = Vec::new();
+        for entry in std::fs::read_dir(self.folder.join(family.folder())).into_iter().flatten().flatten() {
+            let file = format!("{}/{}", family.folder(), entry.file_name().to_string_lossy());
+            sets.extend(family.member(&file).map(str::to_owned));
         }
-        names.sort();
+        sets.sort();
         let mut surfaces = Vec::new();
-        for name in names {
-            let file = format!("mesh/{name}");
+        for set in sets {
+            let file = family.of(&set);
             if let Some(bytes) = self.bytes(&file)? {
-                let what = name.trim_start_matches("reference_").trim_end_matches(".surf.gii").replace('_', " ");
-                surfaces.push((what, gifti::decode_surface(&bytes, &file)?));
+                surfaces.push((set.replace('_', " "), gifti::decode_surface(&bytes, &file)?));
             }
         }
         Ok(surfaces)
@@ -116,13 +115,13 @@ impl Case<'_> {
 /// [`ReportError`] for a file that is there but cannot be used; what is not there is named on the page.
 pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     let case = Case { folder };
-    let outcome = match case.text("sim/outcome.json")? {
-        Some(text) => Some(ExperimentOutcome::from_json(&text, "sim/outcome.json")?),
+    let outcome = match case.text(layout::OUTCOME)? {
+        Some(text) => Some(ExperimentOutcome::from_json(&text, layout::OUTCOME)?),
         None => None,
     };
-    let settings_toml = case.text("settings.toml")?;
-    let provenance_json = case.text("provenance.json")?;
-    let rest = case.mesh("mesh/rest.vtu")?;
+    let settings_toml = case.text(layout::SETTINGS)?;
+    let provenance_json = case.text(layout::PROVENANCE)?;
+    let rest = case.mesh(layout::REST_MESH)?;
     let images = case.images()?;
     if outcome.is_none() && rest.is_none() && images.is_none() {
         return Err(ReportError::NoCase { folder: folder.to_path_buf() });
@@ -142,11 +141,11 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         page.mesh_pictures = cut_views(&rest.mesh, focus_mm(&rest.mesh), PICTURE);
         page.mesh_legend = legend(&rest.mesh);
     } else {
-        page.absent.push("the mesh (mesh/rest.vtu is not there)".to_owned());
+        page.absent.push(format!("the mesh ({} is not there)", layout::REST_MESH));
     }
     match &outcome {
         Some(outcome) => add_results(&case, outcome, rest.as_ref(), &mut page)?,
-        None => page.absent.push("samples and errors (sim/outcome.json is not there; run `hgm sweep`)".to_owned()),
+        None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
     }
     page.outcome = outcome;
     Ok(page)
@@ -158,7 +157,7 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
 /// [`ReportError`] as [`read_case`].
 pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
     let page = read_case(folder)?;
-    let mut files = vec![("report.html".to_owned(), page.to_html().into_bytes())];
+    let mut files = vec![(layout::PAGE.to_owned(), page.to_html().into_bytes())];
     let case = Case { folder };
     if let Some(images) = case.images()? {
         files.extend(hand_off::segmentations(&images));
@@ -185,13 +184,13 @@ pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     for (file, bytes) in report_files(folder)? {
         write_whole(&folder.join(file), &bytes)?;
     }
-    Ok(folder.join("report.html"))
+    Ok(folder.join(layout::PAGE))
 }
 
 /// The best sample's file and its name, when both are there.
 fn best_sample(case: &Case<'_>, outcome: &ExperimentOutcome) -> Result<Option<(String, MeshWithFields)>, ReportError> {
     let Some(best) = outcome.best() else { return Ok(None) };
-    let file = best.file.clone().unwrap_or_else(|| format!("sim/{}.vtu", best.id));
+    let file = best.file.clone().unwrap_or_else(|| layout::SAMPLE_STATE.of(&best.id));
     Ok(case.mesh(&file)?.map(|sample| (file, sample)))
 }
 
@@ -292,8 +291,8 @@ fn viewer(
         plain("undeformed", rest_surface),
         ViewedSurface { name: "deformed, with error".to_owned(), surface, values: values.unwrap_or_default() },
     ];
-    if let Some(reference) = case.mesh("sim/reference.vtu")? {
-        let nodes = displaced("sim/reference.vtu", &reference)?;
+    if let Some(reference) = case.mesh(layout::REFERENCE_STATE)? {
+        let nodes = displaced(layout::REFERENCE_STATE, &reference)?;
         surfaces.push(plain("reference", TriMesh::from_facets(&nodes, &reference.mesh.boundary_facets(|_| true)).0));
     }
     for (what, surface) in case.reference_surfaces()? {
@@ -334,10 +333,10 @@ impl Case<'_> {
 
     /// The images in the MNI frame; `None` without the pre-operative image and its brain.
     fn images(&self) -> Result<Option<CaseImages>, ReportError> {
-        let pre = self.masked_image("anat/pre_space-MNI_T1w.nii.gz", "anat/pre_space-MNI_desc-brain_mask.nii.gz")?;
+        let pre = self.masked_image(layout::PRE_T1, layout::PRE_BRAIN)?;
         let Some((pre, pre_brain)) = pre else { return Ok(None) };
-        let pre_from_post = self.transform::<Post, Pre>("xfm/from-post_to-pre.txt")?;
-        let mni_from_pre = self.transform::<Pre, Mni>("xfm/from-pre_to-MNI.txt")?;
+        let pre_from_post = self.transform::<Post, Pre>(layout::PRE_FROM_POST_TEXT)?;
+        let mni_from_pre = self.transform::<Pre, Mni>(layout::MNI_FROM_PRE_TEXT)?;
         // As scanned: the coordinates of the one scan are taken for those of the other.
         let registered_from_scanned = pre_from_post.zip(mni_from_pre).map(|(pre_from_post, mni_from_pre)| {
             mni_from_pre.inverse().relabelled::<Mni, Post>().then(&pre_from_post).then(&mni_from_pre)
@@ -345,10 +344,10 @@ impl Case<'_> {
         Ok(Some(CaseImages {
             pre,
             pre_brain,
-            post: self.masked_image("anat/post_space-MNI_T1w.nii.gz", "anat/post_space-MNI_desc-brain_mask.nii.gz")?,
-            labels: self.labels("anat/pre_space-MNI_dseg.nii.gz")?,
-            resected: self.mask("anat/pre_space-MNI_label-resected_mask.nii.gz")?,
-            cavity: self.mask("anat/post_space-MNI_label-cavity_mask.nii.gz")?,
+            post: self.masked_image(layout::POST_T1, layout::POST_BRAIN)?,
+            labels: self.labels(layout::PRE_LABELS)?,
+            resected: self.mask(layout::RESECTED)?,
+            cavity: self.mask(layout::CAVITY)?,
             registered_from_scanned,
         }))
     }
@@ -375,13 +374,13 @@ mod tests {
 
     fn case(folder: &Path) {
         let mesh = mesh();
-        write(folder, "mesh/rest.vtu", &vtu::encode(&mesh, &[], &[]).unwrap());
+        write(folder, layout::REST_MESH, &vtu::encode(&mesh, &[], &[]).unwrap());
         let fields = [
             Field { name: "displacement".to_owned(), components: 3, values: vec![0.5; 15] },
             Field::scalar("rmse_mm", vec![0.0, 1.0, 2.0, 0.5, 3.75]),
             Field::scalar("rmse_observed", vec![0.0, 1.0, 1.0, 1.0, 1.0]),
         ];
-        write(folder, "sim/sample-00.vtu", &vtu::encode(&mesh, &fields, &[]).unwrap());
+        write(folder, &layout::SAMPLE_STATE.of("sample-00"), &vtu::encode(&mesh, &fields, &[]).unwrap());
         let sample = SampleOutcome {
             id: "sample-00".to_owned(),
             converged: true,
@@ -393,7 +392,7 @@ mod tests {
             best_sample: Some("sample-00".to_owned()),
             ..ExperimentOutcome::default()
         };
-        write(folder, "sim/outcome.json", outcome.to_json("x").unwrap().as_bytes());
+        write(folder, layout::OUTCOME, outcome.to_json("x").unwrap().as_bytes());
     }
 
     #[test]
@@ -410,7 +409,7 @@ mod tests {
         assert_eq!(deformed.surface.nodes_mm[0], [0.5; 3]);
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(path).unwrap();
-        assert!(folder.path().join("sim/best_margin.shape.gii").is_file());
+        assert!(folder.path().join(layout::BEST_ERRORS.of("margin")).is_file());
         assert!(html.contains("id=\"view\"") && !html.contains(&folder.path().display().to_string()));
     }
 
@@ -425,23 +424,23 @@ mod tests {
         };
         let brain = Mask::from_data(grid, (0..grid.len()).map(|n| radius(n) < 24.0).collect());
         let image = Volume::from_data(grid, (0..grid.len()).map(|n| 100.0 + radius(n) as f32).collect());
-        for role in ["pre", "post"] {
-            write(folder.path(), &format!("anat/{role}_space-MNI_T1w.nii.gz"), &nifti::encode_f32(&image));
-            write(folder.path(), &format!("anat/{role}_space-MNI_desc-brain_mask.nii.gz"), &nifti::encode_mask(&brain));
+        for (scan, mask) in [(layout::PRE_T1, layout::PRE_BRAIN), (layout::POST_T1, layout::POST_BRAIN)] {
+            write(folder.path(), scan, &nifti::encode_f32(&image));
+            write(folder.path(), mask, &nifti::encode_mask(&brain));
         }
         let none = brain.map(|_| false);
-        write(folder.path(), "anat/post_space-MNI_label-cavity_mask.nii.gz", &nifti::encode_mask(&none));
-        write(folder.path(), "xfm/from-post_to-pre.txt", b"1 0 0 10\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
-        write(folder.path(), "xfm/from-pre_to-MNI.txt", b"0 -1 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n");
+        write(folder.path(), layout::CAVITY, &nifti::encode_mask(&none));
+        write(folder.path(), layout::PRE_FROM_POST_TEXT, b"1 0 0 10\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+        write(folder.path(), layout::MNI_FROM_PRE_TEXT, b"0 -1 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n");
         let images = Case { folder: folder.path() }.images().unwrap().unwrap();
         // A point of the post-operative scan moves by +10 mm along the scanner's x, which is the frame's y.
         let moved = images.registered_from_scanned.unwrap().apply(Position::new(1.0, 2.0, 3.0));
         assert!((moved.mm - nalgebra::Point3::new(1.0, 12.0, 3.0)).norm() < 1e-12, "{moved:?}");
         let page = read_case(folder.path()).unwrap();
         assert_eq!((page.registration.as_ref().unwrap().has_before, page.mosaics.len()), (true, 2));
-        write(folder.path(), "anat/pre_space-MNI_desc-brain_mask.nii.gz", b"no");
+        write(folder.path(), layout::PRE_BRAIN, b"no");
         let message = read_case(folder.path()).unwrap_err().to_string();
-        assert!(message.contains("anat/pre_space-MNI_desc-brain_mask.nii.gz"), "{message}");
+        assert!(message.contains(layout::PRE_BRAIN), "{message}");
     }
 
     #[test]
@@ -449,13 +448,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         assert!(matches!(read_case(folder.path()), Err(ReportError::NoCase { .. })));
         case(folder.path());
-        std::fs::remove_file(folder.path().join("sim/sample-00.vtu")).unwrap();
+        std::fs::remove_file(folder.path().join(layout::SAMPLE_STATE.of("sample-00"))).unwrap();
         let page = read_case(folder.path()).unwrap();
         assert!(page.absent.iter().any(|a| a.contains("the file of sample-00")), "{:?}", page.absent);
-        write(folder.path(), "sim/outcome.json", b"{\"kind\": 3}");
+        write(folder.path(), layout::OUTCOME, b"{\"kind\": 3}");
         let message = read_case(folder.path()).unwrap_err().to_string();
-        assert!(message.contains("sim/outcome.json"), "{message}");
-        write(folder.path(), "mesh/rest.vtu", b"<VTKFile");
+        assert!(message.contains(layout::OUTCOME), "{message}");
+        write(folder.path(), layout::REST_MESH, b"<VTKFile");
         assert!(read_case(folder.path()).is_err());
     }
 }

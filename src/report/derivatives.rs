@@ -3,13 +3,12 @@
 
 use super::hand_off::CaseFile;
 use crate::artefact::Manifest;
+use crate::layout::{self, BidsName, Scan, TEMPLATE};
 use crate::segment::label;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// BIDS's name of the template's space; it is reached rigidly, so sizes stay the patient's.
-const TEMPLATE: &str = "MNI152NLin2009aSym";
 const BIDS_VERSION: &str = "1.10.0";
 
 /// Why a case cannot be put under BIDS names.
@@ -39,42 +38,6 @@ impl RawScan {
     }
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Of {
-    Pre,
-    Post,
-}
-
-/// Images: file of the case, scan it belongs to, BIDS name behind the scan's, description, type of a mask.
-const IMAGES: &[(&str, Of, &str, &str, Option<&str>)] = &[
-    ("pre_space-MNI_T1w", Of::Pre, "space-T_T1w", "The scan on the template's grid, moved rigidly", None),
-    ("post_space-MNI_T1w", Of::Post, "space-T_T1w", "The scan on the template's grid, moved rigidly", None),
-    ("pre_space-MNI_dseg", Of::Pre, "space-T_dseg", "Tissue labels", None),
-    ("pre_space-native_dseg", Of::Pre, "dseg", "Tissue labels", None),
-    ("pre_space-MNI_desc-brain_mask", Of::Pre, "space-T_desc-brain_mask", "Brain", Some("Brain")),
-    ("post_space-MNI_desc-brain_mask", Of::Post, "space-T_desc-brain_mask", "Brain without the cavity", Some("Brain")),
-    ("pre_space-native_desc-brain_mask", Of::Pre, "desc-brain_mask", "Brain", Some("Brain")),
-    ("post_space-native_desc-brain_mask", Of::Post, "desc-brain_mask", "Brain without the cavity", Some("Brain")),
-    ("pre_space-MNI_label-resected_mask", Of::Pre, "space-T_label-resected_mask", "Tissue that was taken", Some("ROI")),
-    ("pre_space-native_label-resected_mask", Of::Pre, "label-resected_mask", "Tissue that was taken", Some("ROI")),
-    ("post_space-MNI_label-cavity_mask", Of::Post, "space-T_label-cavity_mask", "Resection cavity", Some("ROI")),
-    ("post_space-native_label-cavity_mask", Of::Post, "label-cavity_mask", "Resection cavity", Some("ROI")),
-    ("post_space-MNI_label-ventricle_mask", Of::Post, "space-T_label-ventricle_mask", "Ventricles", Some("ROI")),
-];
-
-/// Transforms: file of the case, scan, BIDS name behind the scan's, description.
-const TRANSFORMS: &[(&str, Of, &str, &str)] = &[
-    ("from-pre_to-MNI.tfm", Of::Pre, "from-T1w_to-T_mode-image_xfm.tfm", "ITK: resamples the scan to the template"),
-    ("from-pre_to-MNI.txt", Of::Pre, "from-T1w_to-T_mode-points_xfm.txt", "4x4, RAS, mm: maps points of the scan"),
-    ("from-post_to-pre.tfm", Of::Post, "from-T1w_to-preop_mode-image_xfm.tfm", "ITK: resamples the scan to ses-preop"),
-    (
-        "from-post_to-pre.txt",
-        Of::Post,
-        "from-T1w_to-preop_mode-points_xfm.txt",
-        "4x4, RAS, mm: maps points of the scan",
-    ),
-];
-
 /// What a case's images, transforms and page are called in the derivatives, with their bytes. Meshes and simulations
 /// stay in the case folder: BIDS has no names for them.
 ///
@@ -101,36 +64,41 @@ pub fn subject_files(case: &Path, pre: &RawScan, post: &RawScan) -> Result<Vec<C
     };
     let mut files = Vec::new();
     let mut add = |scan: &RawScan, name: &str, bytes: Vec<u8>, sidecar: &Value| {
-        let path = format!("{}_{}", scan.stem(), name.replace("-T_", &format!("-{TEMPLATE}_")));
+        let path = format!("{}_{}", scan.stem(), name);
         let stem = path.trim_end_matches(".nii.gz").trim_end_matches(".tfm").trim_end_matches(".txt");
         files.push((format!("{stem}.json"), pretty(sidecar)));
         files.push((path, bytes));
     };
-    for &(file, of, name, description, mask) in IMAGES {
-        let scan = if of == Of::Pre { pre } else { post };
-        let in_template = name.starts_with("space-");
-        // A T1 comes from one scan; where the knife was takes both.
-        let sources = if name.ends_with("T1w") { vec![scan.uri()] } else { both.to_vec() };
-        let mut own = json!({
-            "Description": description, "Sources": sources,
-            "SpatialReference": if in_template { TEMPLATE.to_owned() } else { scan.uri() },
-        });
-        if name.ends_with("T1w") {
-            own["SkullStripped"] = json!(false);
-        }
-        if let Some(kind) = mask {
-            own["Type"] = json!(kind);
-        }
-        add(scan, &format!("{name}.nii.gz"), read(format!("anat/{file}.nii.gz"))?, &made_by(own));
-    }
-    for &(file, of, name, description) in TRANSFORMS {
-        let scan = if of == Of::Pre { pre } else { post };
-        let own = json!({"Description": description, "Sources": both});
-        add(scan, name, read(format!("xfm/{file}"))?, &made_by(own));
+    for (file, bids) in layout::TABLE.iter().filter_map(|file| Some((file, file.bids?))) {
+        let scan = if bids.of == Scan::Pre { pre } else { post };
+        let own = if bids.is_transform() {
+            json!({"Description": bids.description, "Sources": both})
+        } else {
+            sidecar_of_image(&bids, scan, &both)
+        };
+        add(scan, &bids.spelt(), read(file.path.to_owned())?, &made_by(own));
     }
     let subject = pre.0.split('/').next().unwrap_or_default();
-    files.push((format!("{subject}.html"), read("report.html".to_owned())?));
+    files.push((format!("{subject}.html"), read(layout::PAGE.to_owned())?));
     Ok(files)
+}
+
+/// What a sidecar says of its image alone.
+fn sidecar_of_image(bids: &BidsName, scan: &RawScan, both: &[String; 2]) -> Value {
+    let of_one_scan = bids.name.contains("T1w");
+    // A T1 comes from one scan; where the knife was takes both.
+    let sources = if of_one_scan { vec![scan.uri()] } else { both.to_vec() };
+    let mut own = json!({
+        "Description": bids.description, "Sources": sources,
+        "SpatialReference": if bids.in_template() { TEMPLATE.to_owned() } else { scan.uri() },
+    });
+    if of_one_scan {
+        own["SkullStripped"] = json!(false);
+    }
+    if let Some(kind) = bids.mask {
+        own["Type"] = json!(kind);
+    }
+    own
 }
 
 fn generated_by() -> Value {

@@ -13,6 +13,7 @@ use super::mesh_figure::set_facets;
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::image::LabelMap;
 use crate::image::seg_nrrd::{self, Segment};
+use crate::layout;
 use crate::mesh::format::{Field, WriteError, gifti, pvd};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::label;
@@ -48,12 +49,12 @@ pub fn segmentations(images: &CaseImages) -> Vec<CaseFile> {
             segment(label::VENTRICLE, VENTRICLE),
             segment(label::RESECTED, RESECTED),
         ];
-        files.push(("anat/pre_space-MNI_dseg.seg.nrrd".to_owned(), seg_nrrd::encode(&labels, &segments)));
+        files.push((layout::LABELS_FOR_SLICER.to_owned(), seg_nrrd::encode(&labels, &segments)));
     }
     if let Some(cavity) = &images.cavity {
         let labels: LabelMap<_> = cavity.map(u8::from);
         let segments = [Segment { label: 1, name: "cavity".to_owned(), colour: fractions(CAVITY) }];
-        files.push(("anat/post_space-MNI_label-cavity.seg.nrrd".to_owned(), seg_nrrd::encode(&labels, &segments)));
+        files.push((layout::CAVITY_FOR_SLICER.to_owned(), seg_nrrd::encode(&labels, &segments)));
     }
     files
 }
@@ -76,19 +77,19 @@ pub fn error_surfaces(
         let (surface, old) = TriMesh::from_facets(deformed_mm, &facets);
         let errors = old.iter().map(|&n| errors_mm.get(n as usize).copied().unwrap_or(f64::NAN)).collect();
         let shape = gifti::encode_shape(surface.nodes_mm.len(), &[Field::scalar("rmse_mm", errors)])?;
-        files.push((format!("sim/best_{name}.surf.gii"), gifti::encode_surface(&surface, gifti::Space::Mni152, name)));
-        files.push((format!("sim/best_{name}.shape.gii"), shape));
+        files.push((layout::BEST_SURFACE.of(name), gifti::encode_surface(&surface, gifti::Space::Mni152, name)));
+        files.push((layout::BEST_ERRORS.of(name), shape));
     }
     Ok(files)
 }
 
 /// The samples that have a file as one series; the time is the sample's number.
 pub fn series(outcome: &ExperimentOutcome) -> Option<CaseFile> {
-    let beside = |file: &String| file.strip_prefix("sim/").map(str::to_owned);
+    let beside = |file: &String| std::path::Path::new(file).file_name().map(|name| name.to_string_lossy().into_owned());
     let files: Vec<(f64, String)> =
         outcome.samples.iter().enumerate().filter_map(|(n, s)| Some((n as f64, beside(s.file.as_ref()?)?))).collect();
     let named: Vec<(f64, &str)> = files.iter().map(|(n, f)| (*n, f.as_str())).collect();
-    (!named.is_empty()).then(|| ("sim/samples.pvd".to_owned(), pvd::encode(&named)))
+    (!named.is_empty()).then(|| (layout::SAMPLES_SERIES.to_owned(), pvd::encode(&named)))
 }
 
 #[cfg(test)]
@@ -113,10 +114,10 @@ mod tests {
         assert_eq!(
             names,
             [
-                "sim/best_pial.surf.gii",
-                "sim/best_pial.shape.gii",
-                "sim/best_margin.surf.gii",
-                "sim/best_margin.shape.gii"
+                &layout::BEST_SURFACE.of("pial"),
+                &layout::BEST_ERRORS.of("pial"),
+                &layout::BEST_SURFACE.of("margin"),
+                &layout::BEST_ERRORS.of("margin")
             ]
         );
         let margin = gifti::decode_surface(&files[2].1, "x").unwrap();
@@ -131,10 +132,11 @@ mod tests {
             file: file.map(str::to_owned),
             ..SampleOutcome::default()
         };
-        let samples = vec![sample("a", Some("sim/a.vtu")), sample("b", None), sample("c", Some("sim/c.vtu"))];
+        let [a, c] = ["a", "c"].map(|id| layout::SAMPLE_STATE.of(id));
+        let samples = vec![sample("a", Some(&a)), sample("b", None), sample("c", Some(&c))];
         let outcome = ExperimentOutcome { samples, ..ExperimentOutcome::default() };
         let text = String::from_utf8(series(&outcome).unwrap().1).unwrap();
-        assert!(text.contains(r#"timestep="2" part="0" file="c.vtu""#) && !text.contains("sim/"));
+        assert!(text.contains(r#"timestep="2" part="0" file="c.vtu""#) && !text.contains("file=\"sim"));
         assert!(series(&ExperimentOutcome::default()).is_none());
     }
 }

@@ -45,7 +45,7 @@ pub fn bars() -> Vec<Bar> {
     };
     let (map, _): (LabelMap<Native>, _) =
         decode_labels(&bytes, "template_labels.nii.gz", &ReadOptions::default()).expect("the measuring data are sound");
-    let programs = EnginePrograms::find(None, |name| std::env::var_os(name));
+    let programs = hgm::workflow::Programs::look_up(None, |name| std::env::var_os(name)).engines();
     let there = [
         (Engine::Cgal, programs.cgal.is_some()),
         (Engine::Lattice, true),

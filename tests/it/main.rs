@@ -19,6 +19,7 @@ mod privacy;
 mod python;
 mod refused_inputs;
 mod rooms;
+mod settings;
 mod simulate;
 mod slicer_files;
 mod transform_files;

@@ -10,7 +10,7 @@ use hgm::mesh::quality::{fidelity, shape_quality};
 use std::process::Command;
 
 fn programs() -> EnginePrograms {
-    EnginePrograms::find(None, |name| std::env::var_os(name))
+    hgm::workflow::Programs::look_up(None, |name| std::env::var_os(name)).engines()
 }
 
 /// A map at 1 mm around the origin, `n` voxels along each axis, by a rule in mm from the middle.

@@ -17,7 +17,9 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "material",
         "fem",
         "experiment",
+        "layout",
         "report",
+        "workflow",
     ];
     BTreeMap::from([
         ("geometry", vec![]),
@@ -31,7 +33,12 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("material", vec!["artefact"]),
         ("fem", vec!["geometry", "mesh", "material"]),
         ("experiment", all[..10].to_vec()),
-        ("report", vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment"]),
+        ("layout", vec!["geometry"]),
+        (
+            "report",
+            vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment", "layout"],
+        ),
+        ("workflow", all[..13].to_vec()),
         ("cli", all.to_vec()),
     ])
 }

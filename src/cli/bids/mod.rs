@@ -1,14 +1,12 @@
 //! `hgm bids`: a BIDS App, from a data set of T1 pairs to derivatives and a table of all subjects.
 
-mod dataset;
 mod group;
 mod participant;
 
-use super::case::MeshOptions;
-use super::run::AnalysisOptions;
+use super::flags::{AnalysisOptions, MeshOptions};
 use super::{Failure, Session};
-use dataset::Dataset;
-use std::path::{Path, PathBuf};
+use crate::workflow::cohort::Dataset;
+use std::path::PathBuf;
 
 /// A BIDS data set (ses-preop, ses-postop) to derivatives: every subject as `hgm run`, then all in one table
 ///
@@ -53,14 +51,4 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Level::Participant => participant::run(args, &dataset, session),
         Level::Group => group::run(args, &dataset, session),
     }
-}
-
-/// The case folder of a subject.
-fn case_folder(out: &Path, subject: &str) -> PathBuf {
-    out.join(subject).join("hgm")
-}
-
-/// Why a subject could not be done; absent when it could.
-fn log_file(out: &Path, subject: &str) -> PathBuf {
-    out.join(format!("logs/{subject}.json"))
 }

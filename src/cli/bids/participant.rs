@@ -1,29 +1,16 @@
 //! The participant level: each subject through the same code as `hgm run`, then its files under BIDS names.
 
-use super::dataset::{Dataset, NoPair, ScanPair};
-use super::{Args, case_folder, log_file};
+use super::Args;
 use crate::artefact::write_whole;
-use crate::cli::case::Overrides;
 use crate::cli::failure::in_one_line;
-use crate::cli::prep;
-use crate::cli::{Failure, Reject, Session, run};
+use crate::cli::{Failure, Session, run};
 use crate::report::cohort::Status;
-use crate::report::derivatives::{dataset_files, subject_files, way_up};
-use anyhow::{Context, anyhow};
-use serde::{Deserialize, Serialize};
+use crate::workflow::Settings;
+use crate::workflow::cohort::{self, Dataset, Log, case_folder, log_file};
+use anyhow::anyhow;
+use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
-
-/// Why a subject did not end well, as `logs/sub-X.json` keeps it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Log {
-    /// `input rejected`, `failed` or `quality gate`.
-    pub kind: String,
-    /// One sentence with the remedy.
-    pub message: String,
-    /// What `hgm run` would have ended with.
-    pub exit_code: u8,
-}
+use std::path::PathBuf;
 
 /// How a subject ended, for `--json`.
 #[derive(Debug, Serialize)]
@@ -48,7 +35,7 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
     let plan = |subject: &String| {
         let (pair, message) = match dataset.pair(subject, &args.entity) {
             Ok(pair) => (Some(pair), None),
-            Err(NoPair(message)) => (None, Some(message)),
+            Err(error) => (None, Some(in_one_line(Failure::from(error).parts().1))),
         };
         Planned {
             participant_id: subject.clone(),
@@ -68,24 +55,13 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    let refused = || {
-        let out = args.out.display();
-        format!("{out}: the folder for the derivatives cannot be made; name a folder that you may write to")
-    };
-    std::fs::create_dir_all(&args.out).with_context(refused).reject()?;
-    let absolute = |folder: &Path| {
-        let lost = || format!("{}: the folder cannot be found; check the path", folder.display());
-        folder.canonicalize().with_context(lost).reject()
-    };
-    let (out, raw) = (absolute(&args.out)?, absolute(&dataset.folder)?);
-    for (file, bytes) in dataset_files(way_up(&out, &raw).as_deref()) {
-        write_whole(&args.out.join(file), &bytes)?;
-    }
+    let settings = run::settings(&args.analysis, &args.mesh, session)?;
+    cohort::begin(dataset, &args.out)?;
     let mut done: Vec<Done> = Vec::new();
     let mut worst: Option<Failure> = None;
     for subject in &dataset.subjects {
         // A defect of the program in one subject must not cost the others their night.
-        let end = catch_unwind(AssertUnwindSafe(|| one(args, dataset, subject, session)));
+        let end = catch_unwind(AssertUnwindSafe(|| one(args, dataset, subject, &settings, session)));
         let end = end.unwrap_or_else(|_| Err(defect().into()));
         let page = args.out.join(format!("{subject}.html"));
         let log = log_file(&args.out, subject);
@@ -132,26 +108,12 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
 }
 
 /// One subject from scans to derivatives.
-fn one(args: &Args, dataset: &Dataset, subject: &str, session: &Session) -> Result<(), Failure> {
-    let ScanPair { pre, post } =
-        dataset.pair(subject, &args.entity).map_err(|NoPair(message)| anyhow!(message)).reject()?;
-    let case = case_folder(&args.out, subject);
+fn one(args: &Args, dataset: &Dataset, subject: &str, settings: &Settings, session: &Session) -> Result<(), Failure> {
+    let pair = dataset.pair(subject, &args.entity)?;
     tracing::info!("{subject}");
-    let job = run::Args {
-        prep: prep::Args {
-            pre: dataset.folder.join(&pre.0),
-            post: dataset.folder.join(&post.0),
-            output: case.clone(),
-            overrides: Overrides::default(),
-            mesh: args.mesh.clone(),
-        },
-        analysis: args.analysis.clone(),
-    };
-    let analysed = run::analyse(&job, session)?;
-    for (file, bytes) in subject_files(&case, &pre, &post)? {
-        write_whole(&args.out.join(file), &bytes)?;
-    }
-    analysed.patient.quality_gate()
+    let (goal, place) = (args.analysis.goal(), session.place(&case_folder(&args.out, subject)));
+    let case = cohort::subject(goal, (dataset, &pair), (&args.out, &place), settings, &mut session.listener())?;
+    Ok(case.quality_gate()?)
 }
 
 /// What is kept of a failure: without the folders of this machine.

@@ -2,8 +2,9 @@
 
 use super::{StudyOptions, VERSION, facts};
 use crate::artefact::{Produced, Stage};
+use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
-use crate::material::gp::{FitSettings, Hyperparameters, fit_hyperparameters, negative_log_likelihood};
+use crate::material::gp::{Hyperparameters, fit_hyperparameters, negative_log_likelihood};
 use crate::material::training::TrainingData;
 use serde_json::json;
 use std::path::PathBuf;
@@ -29,10 +30,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut settings: FitSettings = session.settings("gp")?;
-    settings.seed = session.options.seed.unwrap_or(settings.seed);
-    settings.rank = args.rank.unwrap_or(settings.rank);
-    settings.starts = args.starts.unwrap_or(settings.starts);
+    let mut flags = Flags::default();
+    flags.set("gp.rank", args.rank);
+    flags.set("gp.starts", args.starts);
+    let mut settings = session.settings(flags)?.gp;
     settings.finalists = settings.finalists.min(settings.starts.max(1));
     let studies = args.studies.read()?;
     let stage = Stage::new("gp-fit", VERSION, &args.output, &(&settings, studies.curves)).seed(settings.seed);

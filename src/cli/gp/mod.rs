@@ -5,11 +5,11 @@ mod sample;
 mod show;
 mod studies;
 
-use super::session::{read_input, read_text};
 use super::{Failure, Reject, Session};
 use crate::artefact::{Stage, StageError, StageOutcome};
 use crate::material::gp::Hyperparameters;
 use crate::material::literature::{Curves, LiteratureModel, merge, read_studies, table};
+use crate::workflow::{read_input, read_text};
 use anyhow::Context;
 use clap::Subcommand;
 use std::path::PathBuf;

@@ -77,20 +77,6 @@ pub struct EnginePrograms {
 }
 
 impl EnginePrograms {
-    /// Looks beside the executable, then in the variable `HGM_CGAL_MESHER`, then on `PATH`.
-    pub fn find(executable: Option<&std::path::Path>, variable: impl Fn(&str) -> Option<std::ffi::OsString>) -> Self {
-        let path = variable("PATH").unwrap_or_default();
-        let on_path = |name: &str| std::env::split_paths(&path).map(|d| d.join(name)).find(|p| p.is_file());
-        let folder = executable.and_then(std::path::Path::parent);
-        let beside = folder.and_then(|d| {
-            let places = [d.join("hgm-cgal-mesher"), d.join("../engines/hgm-cgal-mesher")];
-            places.into_iter().find(|p| p.is_file())
-        });
-        let named = variable("HGM_CGAL_MESHER").map(PathBuf::from).filter(|p| p.is_file());
-        let cgal = named.or(beside).or_else(|| on_path("hgm-cgal-mesher"));
-        Self { cgal, gmsh: on_path("gmsh"), tetgen: on_path("tetgen") }
-    }
-
     /// The engine that is used when none is named: `cgal` where it is built, else `lattice`.
     pub fn preferred(&self) -> Engine {
         if self.cgal.is_some() { Engine::Cgal } else { Engine::Lattice }

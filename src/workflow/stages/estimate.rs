@@ -1,30 +1,32 @@
 //! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
 
-use super::{Case, Failure, Reject, Sag, facts};
-use crate::artefact::{Manifest, Produced, Stage};
-use crate::cli::Session;
+use super::brain_shift::SeenShift;
+use crate::artefact::Produced;
 use crate::experiment::estimate::{
-    BodyError, DisplacementSettings, Estimate, EstimateError, EstimateOutcome, EstimateSettings, Instrument, LogPrior,
-    Observation, Problem, ProblemError, Turn, Unknown, moved_by, solve_problem,
+    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
+    Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::phantom::neo_hookean;
-use crate::experiment::prior::{PriorSettings, log_prior};
+use crate::experiment::prior::log_prior;
 use crate::experiment::sample::{Sample, Tissue};
 use crate::experiment::sweep::Reference;
 use crate::fem::{ElementKind, Loads, Scenario};
 use crate::geometry::{Frame, Mni};
+use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
+use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
-use anyhow::anyhow;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::plan::StageName;
+use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 5;
+const NAME: StageName = StageName::Estimate;
 /// Name of the estimate among the samples.
-pub const ESTIMATE: &str = "estimate";
-/// Its numbers.
-pub const ESTIMATE_JSON: &str = "sim/estimate.json";
+const ESTIMATE: &str = "estimate";
 
 /// What a patient's estimate is fitted to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -158,8 +160,8 @@ impl EstimateOptions {
 }
 
 /// What an estimate needs of its case.
-pub struct EstimateInput<'a> {
-    /// The rest mesh and its file's bytes.
+pub(crate) struct EstimateInput<'a> {
+    /// The undeformed mesh and its file's bytes.
     pub mesh: (&'a TetMesh, &'a [u8]),
     /// Loads, supports, solver.
     pub scenario: &'a Scenario,
@@ -169,10 +171,8 @@ pub struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
-    /// The manifest of the stage that made the reference.
-    pub after: &'a Manifest,
     /// What the images show of the displacement, where there are images.
-    pub sag: Option<&'a Sag>,
+    pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
 }
@@ -187,31 +187,27 @@ pub struct EstimateFacts {
 }
 
 /// Runs (or skips) the estimate.
-///
-/// # Errors
-/// A scenario that the solver refuses, or a prior that does not exist.
-pub fn estimate(
-    case: &Case,
+pub(crate) fn estimate(
+    work: &Work<'_>,
+    made: &mut Made,
     input: &EstimateInput<'_>,
-    options: &EstimateOptions,
-    session: &Session,
-) -> Result<(Manifest, EstimateFacts), Failure> {
-    options.suits(&input.scenario.loads).map_err(|e| anyhow!("table [estimate]: {e}")).reject()?;
-    let prior: PriorSettings = session.settings("prior")?;
+) -> Result<EstimateFacts, WorkflowError> {
+    let (options, prior) = (&work.settings.estimate, &work.settings.prior);
+    options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
+    if prior.law != MetaModel::NeoHookean {
+        return Err(WorkflowError::EstimateLaw { law: prior.law.name().to_owned() });
+    }
     let posed = serde_json::json!({
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
         "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
     });
-    let stage = Stage::new(ESTIMATE, VERSION, &case.folder, &posed)
-        .input("mesh", input.mesh.1)
-        .after(input.after)
-        .frame(Mni::NAME);
-    case.run(&stage, ESTIMATE, || {
-        let bar = &session.progress(1, "estimate");
+    let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME);
+    work.run(made, &NAME, &stage, || {
+        work.tell(|p| p.begin("estimate", 1));
         let mesh = input.mesh.0;
         let mut unknowns = Vec::new();
         for tissue in input.tissues {
-            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, &prior).reject()?));
+            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, prior)?));
         }
         unknowns.extend(options.unknown_loads(&input.scenario.loads));
         let patient = matches!(input.reference, Reference::Surfaces(_));
@@ -221,10 +217,10 @@ pub fn estimate(
         }
         let (observation, independent_share, noise_mm) = observation(input, options);
         let believed = &options.displacement;
-        let instrument = input.sag.filter(|_| options.observed == Observed::Displacement).map(|sag| {
+        let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
             move |known: &[[f64; 3]]| {
-                bar.set_message("registering the estimate");
-                let shown = sag.registration().sees(mesh, known, &sag.seen)?;
+                work.tell(|p| p.doing("registering the estimate"));
+                let shown = shift.registration().sees(mesh, known, &shift.seen)?;
                 Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
             }
         });
@@ -240,31 +236,22 @@ pub fn estimate(
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let found = solve_problem(problem, &settings).map_err(no_estimate)?;
-        bar.finish_and_clear();
+        let found = solve_problem(problem, &settings)?;
+        work.tell(|p| p.end());
         produced(input, found)
     })
-}
-
-/// Why there is no estimate: a body without an equilibrium has failed, everything else is the input's.
-fn no_estimate(error: ProblemError) -> Failure {
-    match error {
-        ProblemError::Estimate(EstimateError::Start(_)) | ProblemError::Instrument(_) => Failure::Failed(error.into()),
-        ProblemError::Body(BodyError::Fem(ref fem)) if !fem.is_input() => Failure::Failed(error.into()),
-        refused => Failure::Rejected(refused.into()),
-    }
 }
 
 /// What is observed, the share of it that is independent, and the standard deviation of one observation in mm.
 fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, f64, f64) {
     let mesh = input.mesh.0;
-    match (input.reference, input.sag) {
+    match (input.reference, input.shift) {
         (Reference::Nodes(u), _) => {
             (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0, input.noise_mm)
         }
-        (Reference::Surfaces(_), Some(sag)) if options.observed == Observed::Displacement => {
+        (Reference::Surfaces(_), Some(shift)) if options.observed == Observed::Displacement => {
             let believed = &options.displacement;
-            let nodes = believed.observed(mesh, |x| moved_by(&sag.seen, x));
+            let nodes = believed.observed(mesh, |x| moved_by(&shift.seen, x));
             (Observation::Nodes(nodes), believed.independent_share(mesh), believed.noise_mm)
         }
         (Reference::Surfaces(surfaces), _) => {
@@ -276,7 +263,7 @@ fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observa
     }
 }
 
-fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Failure> {
+fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, WorkflowError> {
     let mesh = input.mesh.0;
     let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm } = found;
     let errors = input.reference.errors(mesh, &state.displacement_mm);
@@ -288,7 +275,7 @@ fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Fail
     let sample =
         Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().enumerate().map(tissue).collect(), task: None };
     let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
-    let file = format!("sim/{ESTIMATE}.vtu");
+    let file = ESTIMATE_STATE.to_owned();
     let record = SampleOutcome {
         id: sample.id.clone(),
         task: None,
@@ -317,10 +304,10 @@ fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Fail
         Field::scalar("jacobian", state.jacobian),
         Field::scalar("strain_energy_density_pa", state.strain_energy_density_pa),
     ];
-    let json = serde_json::to_string_pretty(&outcome)? + "\n";
+    let json = serde_json::to_string_pretty(&outcome).expect("figures are plain data") + "\n";
     Ok(Produced {
         files: vec![(file, vtu::encode(mesh, &points, &cells)?), (ESTIMATE_JSON.to_owned(), json.into_bytes())],
         warnings: outcome.limits.iter().map(|limit| format!("estimate: {limit}")).collect(),
-        facts: facts(&EstimateFacts { estimate: outcome, record })?,
+        facts: facts(&EstimateFacts { estimate: outcome, record }),
     })
 }

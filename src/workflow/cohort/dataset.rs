@@ -1,10 +1,8 @@
 //! What a BIDS data set holds: subjects, and of each the scan before and the scan after surgery.
 
-use crate::cli::{Failure, Reject};
 use crate::report::derivatives::RawScan;
-use anyhow::{Context, anyhow};
-use serde::Serialize;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// Sessions of the two scans.
 const SESSIONS: [&str; 2] = ["ses-preop", "ses-postop"];
@@ -27,33 +25,44 @@ pub struct ScanPair {
     pub post: RawScan,
 }
 
-/// Why a subject has no pair; its own fault, not that of the others.
-#[derive(Clone, Debug, Serialize)]
-pub struct NoPair(pub String);
+/// Why a data set cannot be used, or one of its subjects.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum DatasetError {
+    #[error("{}: cannot be listed; name the folder of a BIDS data set: {source}", folder.display())]
+    Unlistable { folder: PathBuf, source: std::io::Error },
+    #[error(
+        "{}: no folder sub-*; name the folder of a BIDS data set (the one with dataset_description.json)", folder.display()
+    )]
+    NoSubjects { folder: PathBuf },
+    #[error("{absent} is not in {}; it has {}", folder.display(), subjects.join(", "))]
+    Absent { absent: String, folder: PathBuf, subjects: Vec<String> },
+    #[error("{folder}: no {stem}_T1w.nii.gz{}; add the scan, or leave the subject out", with(entities))]
+    NoScan { folder: String, stem: String, entities: Vec<String> },
+    #[error("{folder}: {} scans fit ({})", found.len(), found.join(", "))]
+    SeveralScans { folder: String, found: Vec<String>, entity: String },
+}
+
+fn with(entities: &[String]) -> String {
+    if entities.is_empty() { String::new() } else { format!(" with {}", entities.join(", ")) }
+}
 
 impl Dataset {
     /// Lists the subjects, all of them or those with these labels (with or without `sub-`).
     ///
     /// # Errors
-    /// Rejected when the folder has no subjects or not one of those asked for.
-    pub fn open(folder: &Path, labels: &[String]) -> Result<Self, Failure> {
-        let shown = folder.display();
-        let mut subjects: Vec<String> = names(folder)
-            .with_context(|| format!("{shown}: cannot be listed; name the folder of a BIDS data set"))
-            .reject()?;
+    /// [`DatasetError`] when the folder has no subjects or not one of those asked for.
+    pub fn open(folder: &Path, labels: &[String]) -> Result<Self, DatasetError> {
+        let here = || folder.to_path_buf();
+        let mut subjects = names(folder).map_err(|source| DatasetError::Unlistable { folder: here(), source })?;
         subjects.retain(|name| name.starts_with("sub-") && folder.join(name).is_dir());
         if subjects.is_empty() {
-            return Err(Failure::Rejected(anyhow!(
-                "{shown}: no folder sub-*; name the folder of a BIDS data set (the one with dataset_description.json)"
-            )));
+            return Err(DatasetError::NoSubjects { folder: here() });
         }
         let wanted: Vec<String> =
             labels.iter().map(|label| format!("sub-{}", label.strip_prefix("sub-").unwrap_or(label))).collect();
         if let Some(absent) = wanted.iter().find(|name| !subjects.contains(name)) {
-            return Err(Failure::Rejected(anyhow!(
-                "--participant-label: {absent} is not in {shown}; it has {}",
-                subjects.join(", ")
-            )));
+            return Err(DatasetError::Absent { absent: absent.clone(), folder: here(), subjects });
         }
         subjects.retain(|name| wanted.is_empty() || wanted.contains(name));
         Ok(Self { folder: folder.to_path_buf(), subjects })
@@ -62,13 +71,13 @@ impl Dataset {
     /// The two scans of a subject; `entities` (such as `run-2`) choose where a session has several.
     ///
     /// # Errors
-    /// [`NoPair`] with the remedy.
-    pub fn pair(&self, subject: &str, entities: &[String]) -> Result<ScanPair, NoPair> {
+    /// [`DatasetError::NoScan`] or [`DatasetError::SeveralScans`].
+    pub fn pair(&self, subject: &str, entities: &[String]) -> Result<ScanPair, DatasetError> {
         let [pre, post] = SESSIONS.map(|session| self.scan(subject, session, entities));
         Ok(ScanPair { pre: pre?, post: post? })
     }
 
-    fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, NoPair> {
+    fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, DatasetError> {
         let folder = format!("{subject}/{session}/anat");
         let mut found = names(&self.folder.join(&folder)).unwrap_or_default();
         let begin = format!("{subject}_{session}_");
@@ -80,16 +89,13 @@ impl Dataset {
         });
         match &found[..] {
             [one] => Ok(RawScan(format!("{folder}/{one}"))),
-            [] => Err(NoPair(format!(
-                "{folder}: no {subject}_{session}_T1w.nii.gz{}; add the scan, or leave the subject out with --participant-label",
-                if entities.is_empty() { String::new() } else { format!(" with {}", entities.join(", ")) }
-            ))),
-            several => Err(NoPair(format!(
-                "{folder}: {} scans fit ({}); choose one with --entity, such as --entity {}",
-                several.len(),
-                several.join(", "),
-                distinguishing(several)
-            ))),
+            [] => {
+                Err(DatasetError::NoScan { folder, stem: format!("{subject}_{session}"), entities: entities.to_vec() })
+            }
+            several => {
+                let entity = distinguishing(several).to_owned();
+                Err(DatasetError::SeveralScans { folder, found: found.clone(), entity })
+            }
         }
     }
 }
@@ -147,12 +153,13 @@ mod tests {
             "sub-01/ses-postop/anat/sub-01_ses-postop_run-2_T1w.nii.gz",
             "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii.gz",
         ]);
-        let doubtful = dataset.pair("sub-01", &[]).unwrap_err().0;
-        assert!(doubtful.contains("2 scans fit") && doubtful.contains("--entity run-2"), "{doubtful}");
+        let doubtful = dataset.pair("sub-01", &[]).unwrap_err();
+        assert!(matches!(&doubtful, DatasetError::SeveralScans { entity, .. } if entity == "run-2"), "{doubtful}");
+        assert!(doubtful.to_string().contains("2 scans fit"));
         let chosen = dataset.pair("sub-01", &["run-2".to_owned()]).unwrap();
         assert!(chosen.pre.0.ends_with("run-2_T1w.nii.gz"));
-        let missing = dataset.pair("sub-02", &[]).unwrap_err().0;
-        assert!(missing.contains("sub-02/ses-postop/anat") && missing.contains("--participant-label"), "{missing}");
+        let missing = dataset.pair("sub-02", &[]).unwrap_err().to_string();
+        assert!(missing.contains("sub-02/ses-postop/anat") && missing.contains("leave the subject out"), "{missing}");
     }
 
     #[test]
@@ -162,6 +169,6 @@ mod tests {
         let labels = |label: &str| Dataset::open(folder.path(), &[label.to_owned()]);
         assert_eq!(labels("sub-b").unwrap().subjects, ["sub-b"]);
         assert_eq!(labels("b").unwrap().subjects, ["sub-b"]);
-        assert!(matches!(labels("c"), Err(Failure::Rejected(e)) if e.to_string().contains("sub-c is not in")));
+        assert!(labels("c").unwrap_err().to_string().contains("sub-c is not in"));
     }
 }

@@ -1,24 +1,21 @@
 //! The registration behind the displacement of a patient's brain, with the images it looked at, as a case's files hold them.
 
-use super::anat::{PRE_BRAIN, PRE_T1};
+use super::anat::Anatomy;
 use super::registration::transforms;
-use super::{Anatomy, Case, Failure, Reject};
-use crate::cli::Session;
 use crate::experiment::estimate::ReRegistration;
 use crate::geometry::{Mni, Post};
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
+use crate::layout::{POST_NATIVE_BRAIN, PRE_BRAIN, PRE_T1};
 use crate::register::deformable::{DeformableSettings, DisplacementField};
-use crate::resect::PairSettings;
 use crate::segment::label;
+use crate::workflow::case::Case;
+use crate::workflow::error::WorkflowError;
 
-/// A mask on the post-operative scan's own grid: what tells how far that scan looked.
-const POST_BRAIN: &str = "anat/post_space-native_desc-brain_mask.nii.gz";
-
-/// What a patient's scans show of the sag, and what it takes to show the registration another one.
+/// What a patient's scans show of the brain shift, and what it takes to show the registration another one.
 #[derive(Debug)]
-pub struct Sag {
+pub(crate) struct SeenShift {
     /// Where the brain has moved to, around the cavity.
     pub seen: DisplacementField<Mni>,
     pre: Volume<f32, Mni>,
@@ -29,21 +26,19 @@ pub struct Sag {
     settings: DeformableSettings,
 }
 
-impl Sag {
+impl SeenShift {
     /// Reads the images of a case.
-    ///
-    /// # Errors
-    /// Rejected when a file is missing or damaged.
-    pub fn read(case: &Case, anatomy: Anatomy, session: &Session) -> Result<Self, Failure> {
+    /// The registration is posed as it was for the masks: by the case's own settings.
+    pub fn read(case: &Case, anatomy: Anatomy, settings: &DeformableSettings) -> Result<Self, WorkflowError> {
         let options = ReadOptions::default();
-        let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_T1)?, PRE_T1, &options).reject()?.volume.relabelled();
-        let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options).reject()?;
-        let (on_post, _) = nifti::decode_mask(&case.read(POST_BRAIN)?, POST_BRAIN, &options).reject()?;
+        let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_T1)?, PRE_T1, &options)?.volume.relabelled();
+        let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options)?;
+        // On the post-operative scan's own grid: what tells how far that scan looked.
+        let (on_post, _) = nifti::decode_mask(&case.read(POST_NATIVE_BRAIN)?, POST_NATIVE_BRAIN, &options)?;
         let on_post: Volume<f32, Post> = on_post.map(f32::from).relabelled();
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
         let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
-        let pair: PairSettings = case.settings_of("anat", session)?;
         Ok(Self {
             fluid: mean_in_ventricle(&pre, &anatomy.labels),
             pre,
@@ -51,7 +46,7 @@ impl Sag {
             post_known,
             seen: anatomy.sag,
             cavity: anatomy.cavity,
-            settings: pair.sag,
+            settings: settings.clone(),
         })
     }
 

@@ -1,0 +1,212 @@
+//! Options that several commands share, and how they become a layer of settings over the settings file.
+
+use crate::material::StudyKind;
+use crate::material::meta_model::MetaModel;
+use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
+use crate::segment::label;
+use crate::workflow::{Goal, Inputs};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The settings that were given as options: the last layer.
+#[derive(Clone, Debug, Default)]
+pub struct Flags(pub toml::Table);
+
+impl Flags {
+    /// Sets what was given: `path` is the table and the setting, with dots between.
+    pub fn set(&mut self, path: &str, value: Option<impl Serialize>) {
+        let Some(value) = value.and_then(|value| toml::Value::try_from(value).ok()) else { return };
+        let mut names: Vec<&str> = path.split('.').collect();
+        let last = names.pop().unwrap_or_default();
+        let mut table = &mut self.0;
+        for name in names {
+            let below = table.entry(name).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+            let toml::Value::Table(below) = below else { return };
+            table = below;
+        }
+        table.insert(last.to_owned(), value);
+    }
+
+    /// The same for an option that is there or not.
+    pub fn switch(&mut self, path: &str, on: bool) {
+        self.set(path, on.then_some(true));
+    }
+
+    /// The same for an option that may be given again and again.
+    pub fn list(&mut self, path: &str, values: &[impl Serialize]) {
+        self.set(path, (!values.is_empty()).then_some(values));
+    }
+}
+
+/// Engine and size of a mesh.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct MeshOptions {
+    /// Mesh engine [default: cgal where it is built, else lattice]
+    #[arg(long, value_name = "ENGINE", value_parser = engine)]
+    pub mesher: Option<Engine>,
+    /// Target number of tetrahedra (within 15 %)
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Target edge length in mm, instead of a number of tetrahedra
+    #[arg(long, value_name = "MM", conflicts_with = "cells")]
+    pub edge_mm: Option<f64>,
+    /// Edges inside a label, times the target: white_matter=1.5 (again for more labels)
+    #[arg(long, value_name = "LABEL=FACTOR", value_parser = label_edge)]
+    pub edge_in: Vec<LabelEdge>,
+    /// Edges at the wall of a label, times the target, and the distance to which that counts: ventricle=0.5@8
+    #[arg(long, value_name = "LABEL=FACTOR@MM", value_parser = wall_edge)]
+    pub edge_near: Vec<WallEdge>,
+}
+
+impl MeshOptions {
+    /// What they set.
+    pub fn over(&self, flags: &mut Flags) {
+        flags.set("mesh.engine", self.mesher);
+        flags.set("mesh.size", self.cells.map(MeshSize::Cells).or(self.edge_mm.map(MeshSize::EdgeMm)));
+        flags.list("mesh.sizing.labels", &self.edge_in);
+        flags.list("mesh.sizing.walls", &self.edge_near);
+    }
+}
+
+fn label_edge(text: &str) -> Result<LabelEdge, String> {
+    let read = || {
+        let (label, factor) = text.split_once('=')?;
+        Some(LabelEdge { label: label::number(label)?, factor: factor.parse().ok()? })
+    };
+    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR, such as white_matter=1.5 or 3=1.5"))
+}
+
+fn wall_edge(text: &str) -> Result<WallEdge, String> {
+    let read = || {
+        let (label, rest) = text.split_once('=')?;
+        let (factor, reach) = rest.split_once('@')?;
+        Some(WallEdge { label: label::number(label)?, factor: factor.parse().ok()?, reach_mm: reach.parse().ok()? })
+    };
+    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
+}
+
+fn engine(name: &str) -> Result<Engine, String> {
+    serde_json::from_value(name.into()).map_err(|_| {
+        format!("no engine `{name}`: say cgal, lattice, gmsh or tetgen (`hgm doctor` tells which are installed)")
+    })
+}
+
+/// The prior.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct PriorOptions {
+    /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
+    #[arg(long, value_name = "KIND")]
+    study: Option<StudyKind>,
+    /// The law fitted to every sample: neo-hookean, mooney-rivlin, ogden or ogden-high [default: neo-hookean]
+    #[arg(long, value_name = "LAW")]
+    law: Option<MetaModel>,
+}
+
+impl PriorOptions {
+    /// What they set.
+    pub fn over(&self, flags: &mut Flags) {
+        flags.set("prior.study", self.study);
+        flags.set("prior.law", self.law);
+    }
+}
+
+/// What is asked of a prepared patient.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct AnalysisOptions {
+    /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub tissues: Option<u8>,
+    #[command(flatten)]
+    pub prior: PriorOptions,
+    /// Estimate the moduli with their intervals instead of trying the prior's samples; on 160,000 tetrahedra unless
+    /// --cells or --edge-mm says otherwise
+    #[arg(long)]
+    pub estimate: bool,
+}
+
+impl AnalysisOptions {
+    /// What they set.
+    pub fn over(&self, flags: &mut Flags) {
+        flags.set("resection.tissues", self.tissues);
+        self.prior.over(flags);
+    }
+
+    /// How far the job goes.
+    pub fn goal(&self) -> Goal {
+        if self.estimate { Goal::Estimate } else { Goal::Sweep }
+    }
+}
+
+/// Masks that win over the computed ones. Each may be in the grid of either scan.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[allow(clippy::struct_field_names, reason = "the options' names")]
+pub struct OwnMasks {
+    /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    brain_mask: Option<PathBuf>,
+    /// A mask of the lateral and third ventricles before the operation, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    ventricle_mask: Option<PathBuf>,
+    /// A mask of the cavity, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    cavity_mask: Option<PathBuf>,
+    /// A mask of the resected tissue, in the grid of either scan (wins over the computed one)
+    #[arg(long, value_name = "FILE")]
+    resected_mask: Option<PathBuf>,
+}
+
+/// A pair and where its case goes.
+#[derive(Clone, Debug, clap::Args)]
+// Flattened into `run`, whose own group of arguments has this name.
+#[group(skip)]
+pub struct PairOptions {
+    /// Pre-operative T1 (.nii or .nii.gz)
+    pre: PathBuf,
+    /// Post-operative T1 (.nii or .nii.gz)
+    post: PathBuf,
+    /// The case folder
+    #[arg(short, long, value_name = "CASE", default_value = "case")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    masks: OwnMasks,
+    #[command(flatten)]
+    pub mesh: MeshOptions,
+}
+
+impl PairOptions {
+    /// The files.
+    pub fn inputs(&self) -> Inputs {
+        let OwnMasks { brain_mask, ventricle_mask, cavity_mask, resected_mask } = self.masks.clone();
+        let (pre, post) = (self.pre.clone(), self.post.clone());
+        Inputs { pre, post, brain_mask, ventricle_mask, cavity_mask, resected_mask }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workflow::Settings;
+
+    #[test]
+    fn sizes_are_read_by_name_or_number_of_the_label() {
+        let wall = WallEdge { label: label::VENTRICLE, factor: 0.5, reach_mm: 8.0 };
+        assert_eq!([wall_edge("ventricle=0.5@8"), wall_edge("4=0.5@8")], [Ok(wall), Ok(wall)]);
+        assert_eq!(label_edge("white_matter=1.5"), Ok(LabelEdge { label: label::WHITE_MATTER, factor: 1.5 }));
+        for text in ["ventricle", "ventricle=0.5", "falx=0.5@8", "4=half@8", "300=0.5@8"] {
+            assert!(wall_edge(text).unwrap_err().contains("ventricle=0.5@8"), "{text}");
+        }
+        assert!(label_edge("3=").unwrap_err().contains("white_matter=1.5"));
+    }
+
+    #[test]
+    fn options_win_over_the_file_and_leave_the_rest_of_it() {
+        let file =
+            "[mesh]\nengine = \"gmsh\"\n[mesh.size]\nedge_mm = 3.0\n[prior]\npublished = true\n".parse().unwrap();
+        let mut flags = Flags::default();
+        MeshOptions { cells: Some(8000), ..MeshOptions::default() }.over(&mut flags);
+        PriorOptions { law: Some(MetaModel::Ogden), study: None }.over(&mut flags);
+        let settings = Settings::resolve([&file, &flags.0]).unwrap();
+        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::Gmsh, MeshSize::Cells(8000)));
+        assert!(settings.prior.published && settings.prior.law == MetaModel::Ogden);
+    }
+}

@@ -1,0 +1,219 @@
+//! A case folder: what is in it and how it is read back.
+
+use super::error::WorkflowError;
+use super::plan::{StageName, Subject};
+use super::settings::Settings;
+use super::stages::{EstimateFacts, MeshFacts};
+use crate::artefact::Manifest;
+use crate::experiment::outcome::ExperimentOutcome;
+use crate::layout;
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, vtu};
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A folder that a job has filled, or is filling.
+#[derive(Clone, Debug)]
+pub struct Case {
+    folder: PathBuf,
+}
+
+/// Why a case cannot be read.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum CaseError {
+    #[error("{}: not a case folder", folder.display())]
+    NotACase { folder: PathBuf },
+    #[error("{}: {file} is not there", folder.display())]
+    Missing { folder: PathBuf, file: String, subject: Option<Subject> },
+    #[error("{}: {file} cannot be read ({source}); check its permissions", folder.display())]
+    Unreadable { folder: PathBuf, file: String, source: std::io::Error },
+    #[error("{}: {file} is damaged or another version's", folder.display())]
+    Damaged { folder: PathBuf, file: String, subject: Option<Subject> },
+    #[error("{}: {file} is not on the grid of {other}: one of the two is not this case's", folder.display())]
+    Grid { folder: PathBuf, file: &'static str, other: &'static str },
+    #[error(
+        "{}: {file} holds displacements of {found} nodes and {mesh} has {nodes}: one of the two is not this phantom's",
+        folder.display()
+    )]
+    OtherMesh { folder: PathBuf, file: &'static str, mesh: &'static str, found: usize, nodes: usize },
+    #[error("{}: this is a phantom, and a patient's case is asked for", folder.display())]
+    Phantom { folder: PathBuf },
+    #[error("the phantom in this folder has {made} and {asked} were asked for", made = tissues(*made), asked = tissues(*asked))]
+    OtherTissues { made: usize, asked: usize },
+    #[error("{}: no result holds an array `{name}`", folder.display())]
+    NoField { folder: PathBuf, name: String },
+}
+
+fn tissues(count: usize) -> String {
+    if count == 1 { "1 tissue".to_owned() } else { format!("{count} tissues") }
+}
+
+impl Case {
+    /// A case that a job has made.
+    ///
+    /// ```no_run
+    /// # fn main() -> Result<(), hgm::workflow::WorkflowError> {
+    /// let case = hgm::workflow::Case::open("case")?;
+    /// println!("{:?}", case.outcome()?.best_sample);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`CaseError::NotACase`] where no stage has finished.
+    pub fn open(folder: impl AsRef<Path>) -> Result<Self, WorkflowError> {
+        let case = Self::at(folder.as_ref());
+        match case.subject() {
+            Some(_) => Ok(case),
+            None => Err(CaseError::NotACase { folder: case.folder }.into()),
+        }
+    }
+
+    /// A folder that a job is about to fill.
+    pub(crate) fn at(folder: &Path) -> Self {
+        Self { folder: folder.to_path_buf() }
+    }
+
+    /// Where it lies.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// A file of the case, by its name in the [`layout`].
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// The page.
+    pub fn page(&self) -> PathBuf {
+        self.path(layout::PAGE)
+    }
+
+    /// What it was made from, by the stages that have finished.
+    pub fn subject(&self) -> Option<Subject> {
+        let has = |stage: StageName| Manifest::path_of_stage(&self.folder, &stage.to_string()).exists();
+        if has(StageName::Registration) {
+            Some(Subject::Patient)
+        } else if has(StageName::Labels) {
+            Some(Subject::Phantom { every_task: false })
+        } else {
+            None
+        }
+    }
+
+    /// The experiment's numbers.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged.
+    pub fn outcome(&self) -> Result<ExperimentOutcome, WorkflowError> {
+        Ok(ExperimentOutcome::from_json(&self.read_text(layout::OUTCOME)?, layout::OUTCOME)?)
+    }
+
+    /// The undeformed mesh with its boundary sets.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged.
+    pub fn mesh(&self) -> Result<TetMesh, WorkflowError> {
+        Ok(vtu::decode(&self.read(layout::REST_MESH)?, layout::REST_MESH)?.mesh)
+    }
+
+    /// An array of the best sample's state, on nodes or cells: `displacement` (mm), `rmse_mm`, `jacobian` ...
+    ///
+    /// # Errors
+    /// A file that is missing or damaged, or no such array.
+    pub fn field(&self, name: &str) -> Result<Field, WorkflowError> {
+        let outcome = self.outcome()?;
+        let none = || CaseError::NoField { folder: self.folder.clone(), name: name.to_owned() };
+        let file = outcome.best().and_then(|best| best.file.clone()).ok_or_else(none)?;
+        self.field_of(&file, name)
+    }
+
+    /// The same of one sample, or of `estimate`.
+    ///
+    /// # Errors
+    /// As [`Case::field`].
+    pub fn field_in(&self, sample: &str, name: &str) -> Result<Field, WorkflowError> {
+        self.field_of(&layout::SAMPLE_STATE.of(sample), name)
+    }
+
+    fn field_of(&self, file: &str, name: &str) -> Result<Field, WorkflowError> {
+        let state = vtu::decode(&self.read(file)?, file)?;
+        let found = state.point_field(name).or_else(|| state.cell_fields.iter().find(|field| field.name == name));
+        let none = || CaseError::NoField { folder: self.folder.clone(), name: name.to_owned() };
+        Ok(found.cloned().ok_or_else(none)?)
+    }
+
+    /// The estimate, where one was made.
+    ///
+    /// # Errors
+    /// A stage that is missing or another version's.
+    pub fn estimate(&self) -> Result<EstimateFacts, WorkflowError> {
+        Ok(self.stage(&StageName::Estimate)?.1)
+    }
+
+    /// Whether its boundary sets are to be believed.
+    ///
+    /// # Errors
+    /// [`WorkflowError::QualityGate`] with a sentence per set; a phantom's are not asked.
+    pub fn quality_gate(&self) -> Result<(), WorkflowError> {
+        let (_, mesh): (_, MeshFacts) = self.stage(&StageName::Mesh)?;
+        if mesh.implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(mesh.implausible)) }
+    }
+
+    /// The settings it was made with, as a layer; nothing where none are kept.
+    ///
+    /// # Errors
+    /// A file that is not settings.
+    pub fn settings(&self) -> Result<toml::Table, WorkflowError> {
+        if !self.path(layout::SETTINGS).exists() {
+            return Ok(toml::Table::new());
+        }
+        let file = self.path(layout::SETTINGS).display().to_string();
+        Ok(Settings::layer(&self.read_text(layout::SETTINGS)?, &file)?)
+    }
+
+    /// What a finished stage has left: its manifest and its figures.
+    ///
+    /// # Errors
+    /// A stage that has not been run here, or another version's.
+    pub fn stage<Facts: DeserializeOwned>(&self, stage: &StageName) -> Result<(Manifest, Facts), WorkflowError> {
+        let file = format!(".stages/{stage}.manifest.json");
+        self.read(&file)?;
+        let damaged =
+            || CaseError::Damaged { folder: self.folder.clone(), file: file.clone(), subject: self.subject() };
+        let manifest = Manifest::of_stage(&self.folder, &stage.to_string()).ok_or_else(damaged)?;
+        let facts = serde_json::from_value(manifest.facts.clone()).map_err(|_| damaged())?;
+        Ok((manifest, facts))
+    }
+
+    /// The bytes of a file of the case.
+    ///
+    /// # Errors
+    /// A file that is not there or may not be read.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, WorkflowError> {
+        let said = |source: std::io::Error| {
+            let (folder, file) = (self.folder.clone(), name.to_owned());
+            let subject = self.subject();
+            if subject.is_none() {
+                CaseError::NotACase { folder }
+            } else if source.kind() == std::io::ErrorKind::NotFound {
+                CaseError::Missing { folder, file, subject }
+            } else {
+                CaseError::Unreadable { folder, file, source }
+            }
+        };
+        Ok(std::fs::read(self.path(name)).map_err(said)?)
+    }
+
+    /// A text file of the case.
+    ///
+    /// # Errors
+    /// As [`Case::read`]; also when it is not UTF-8.
+    pub fn read_text(&self, name: &str) -> Result<String, WorkflowError> {
+        let damaged =
+            |_| CaseError::Damaged { folder: self.folder.clone(), file: name.to_owned(), subject: self.subject() };
+        Ok(String::from_utf8(self.read(name)?).map_err(damaged)?)
+    }
+}

@@ -1,0 +1,125 @@
+//! A cohort: the subjects of a BIDS data set, each as one case, and all of them together.
+
+mod dataset;
+
+pub use dataset::{Dataset, DatasetError, ScanPair};
+
+use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError, run_to};
+use crate::artefact::{WriteError, sha256_hex, write_whole};
+use crate::experiment::outcome::ExperimentOutcome;
+use crate::layout;
+use crate::report::cohort::{Member, Status};
+use crate::report::derivatives::{dataset_files, subject_files, way_up};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// The case folder of a subject below the derivatives.
+pub fn case_folder(out: &Path, subject: &str) -> PathBuf {
+    out.join(subject).join("hgm")
+}
+
+/// Why a subject could not be done; absent when it could.
+pub fn log_file(out: &Path, subject: &str) -> PathBuf {
+    out.join(format!("logs/{subject}.json"))
+}
+
+/// Why a subject did not end well, as `logs/sub-X.json` keeps it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Log {
+    /// `input rejected`, `failed` or `quality gate`.
+    pub kind: String,
+    /// One sentence with the remedy.
+    pub message: String,
+    /// What a run of this subject alone would have ended with.
+    pub exit_code: u8,
+}
+
+/// Why the derivatives cannot be begun, or a log of theirs not read.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum CohortError {
+    #[error("{}: the folder for the derivatives cannot be made; name a folder that you may write to: {source}", out.display())]
+    NoFolder { out: PathBuf, source: std::io::Error },
+    #[error("{}: the folder cannot be found; check the path: {source}", folder.display())]
+    Lost { folder: PathBuf, source: std::io::Error },
+    #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
+    Log { file: PathBuf },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// Writes what lies once at the top of the derivatives.
+///
+/// # Errors
+/// [`CohortError`] when the folder cannot be made.
+pub fn begin(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
+    std::fs::create_dir_all(out).map_err(|source| CohortError::NoFolder { out: out.to_path_buf(), source })?;
+    let absolute = |folder: &Path| {
+        folder.canonicalize().map_err(|source| CohortError::Lost { folder: folder.to_path_buf(), source })
+    };
+    let (from, raw) = (absolute(out)?, absolute(&dataset.folder)?);
+    for (file, bytes) in dataset_files(way_up(&from, &raw).as_deref()) {
+        write_whole(&out.join(file), &bytes)?;
+    }
+    Ok(())
+}
+
+/// One subject from its scans to its files under BIDS names.
+///
+/// # Errors
+/// As [`run_to`].
+pub fn subject(
+    goal: Goal,
+    (dataset, pair): (&Dataset, &ScanPair),
+    (out, place): (&Path, &Place),
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<Case, WorkflowError> {
+    let inputs = Inputs::pair(dataset.folder.join(&pair.pre.0), dataset.folder.join(&pair.post.0));
+    let case = run_to(goal, &inputs, place, settings, progress)?;
+    for (file, bytes) in subject_files(case.folder(), &pair.pre, &pair.post)? {
+        write_whole(&out.join(file), &bytes)?;
+    }
+    Ok(case)
+}
+
+/// What is known of a subject for the table of all.
+///
+/// # Errors
+/// An outcome or a log that is damaged.
+pub fn member(out: &Path, subject: &str) -> Result<Member, MemberError> {
+    let case = case_folder(out, subject);
+    let read = |file: &str| std::fs::read_to_string(case.join(file)).ok();
+    let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
+    let outcome = read(layout::OUTCOME).map(|text| ExperimentOutcome::from_json(&text, &shown));
+    let file = log_file(out, subject);
+    let log: Option<Log> = match std::fs::read(&file) {
+        Err(_) => None,
+        Ok(bytes) => Some(serde_json::from_slice(&bytes).map_err(|_| CohortError::Log { file })?),
+    };
+    let status = match (&log, &outcome) {
+        (Some(log), _) if log.exit_code == 4 => Status::QualityGate,
+        (Some(_), _) => Status::Failed,
+        (None, Some(_)) => Status::Done,
+        (None, None) => Status::Missing,
+    };
+    Ok(Member {
+        participant_id: subject.to_owned(),
+        status,
+        message: log.map(|log| format!("{}: {}", log.kind, log.message)),
+        outcome: outcome.transpose()?,
+        settings_sha256: read(layout::SETTINGS).map(|text| sha256_hex(text.as_bytes())),
+    })
+}
+
+/// Why a subject cannot stand in the table.
+#[derive(Debug, Error)]
+pub enum MemberError {
+    /// Its log.
+    #[error(transparent)]
+    Log(#[from] CohortError),
+    /// Its outcome.
+    #[error(transparent)]
+    Outcome(#[from] crate::experiment::outcome::OutcomeError),
+}

@@ -1,0 +1,127 @@
+//! Why a job did not end well.
+
+use super::case::CaseError;
+use super::inputs::InputError;
+use super::settings::SettingsError;
+use crate::artefact::WriteError;
+use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
+use crate::experiment::observed::ObservedError;
+use crate::experiment::outcome::OutcomeError;
+use crate::experiment::prior::PriorError;
+use crate::experiment::sweep::SweepError;
+use crate::image::nifti::NiftiError;
+use crate::layout;
+use crate::mesh::engine::EngineError;
+use crate::mesh::format::{ReadError, WriteError as FormatError};
+use crate::register::RegisterError;
+use crate::register::transform_text::TransformTextError;
+use crate::report::case::ReportError;
+use crate::report::derivatives::DerivativesError;
+use crate::resect::PairError;
+use crate::tag::{MARGIN, TagError};
+use thiserror::Error;
+
+/// Who is to do something about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// The input or a setting cannot be used; a computation was not begun.
+    Rejected,
+    /// The computation or the machine failed.
+    Failed,
+    /// Computed, and not to be believed.
+    QualityGate,
+}
+
+/// Why a job did not end well.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum WorkflowError {
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    #[error(transparent)]
+    Image(#[from] NiftiError),
+    #[error(transparent)]
+    Transform(#[from] TransformTextError),
+    #[error("registering {what}: {source}")]
+    Registration { what: &'static str, source: RegisterError },
+    #[error(transparent)]
+    Pair(#[from] PairError),
+    #[error("{labels}: {source}")]
+    Engine { labels: String, source: EngineError },
+    #[error("{labels}: the mesh of these labels holds no grey or white matter; look at the labels")]
+    NoTissue { labels: &'static str },
+    #[error(transparent)]
+    Tag(#[from] TagError),
+    #[error(transparent)]
+    MeshFile(#[from] ReadError),
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    #[error("{file}: {0}", file = file_of(.0))]
+    Observed(#[from] ObservedError),
+    #[error(transparent)]
+    Prior(#[from] PriorError),
+    #[error("samples of every task compare materials of the whole brain: they do not go with two tissues")]
+    EveryTaskOfTwo,
+    #[error("the table [{table}] asks for a simulation that cannot be done: {source}")]
+    Sample { table: &'static str, source: SweepError },
+    #[error("{sample} is not done with these settings ({reason})")]
+    SampleMissing { sample: String, reason: String },
+    #[error(
+        "the phantom's reference state has no equilibrium ({reason}); lower `one_tissue_force_n` or \
+         `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings"
+    )]
+    NoReferenceState { reason: String },
+    #[error("table [estimate]: {0}")]
+    EstimateLoads(&'static str),
+    #[error(
+        "table [prior]: `law` is {law}: an estimate is made with neo-hookean materials alone, and an interval of another \
+         law's modulus would not be this patient's; set `law = \"neo-hookean\"` for it"
+    )]
+    EstimateLaw { law: String },
+    #[error(transparent)]
+    Estimate(#[from] ProblemError),
+    #[error(transparent)]
+    Outcome(#[from] OutcomeError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    #[error(transparent)]
+    Derivatives(#[from] DerivativesError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("{}", .0.join("; "))]
+    QualityGate(Vec<String>),
+}
+
+/// The file of a case whose fault it is.
+fn file_of(error: &ObservedError) -> &'static str {
+    match error {
+        ObservedError::EmptySurface { set } if set == MARGIN => layout::CAVITY,
+        ObservedError::EmptySurface { .. } => layout::POST_VENTRICLE,
+        ObservedError::EmptySet { .. } => layout::REST_MESH,
+    }
+}
+
+impl WorkflowError {
+    /// Who is to do something about it.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
+            Self::Write(_)
+            | Self::Format(_)
+            | Self::Outcome(OutcomeError { .. })
+            | Self::Derivatives(_)
+            | Self::NoReferenceState { .. }
+            | Self::Report(ReportError::Write(_))
+            | Self::Engine { source: EngineError::Program { .. } | EngineError::Invalid { .. }, .. }
+            | Self::Estimate(ProblemError::Instrument(_) | ProblemError::Estimate(EstimateError::Start(_))) => {
+                ErrorKind::Failed
+            }
+            Self::Estimate(ProblemError::Body(BodyError::Fem(fem))) if !fem.is_input() => ErrorKind::Failed,
+            _ => ErrorKind::Rejected,
+        }
+    }
+}

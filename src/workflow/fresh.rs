@@ -1,0 +1,140 @@
+//! No stale answer: what is in a folder is checked against the stages it was made from, and what an earlier state has left
+//! behind is taken away.
+
+use super::case::{Case, CaseError};
+use super::error::WorkflowError;
+use super::plan::{StageName, Subject};
+use crate::artefact::{Manifest, sha256_hex};
+use crate::layout;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// `provenance.json`: what outcome and page were made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Provenance {
+    /// `hgm x.y.z`.
+    pub program: String,
+    /// SHA-256 of the outcome and of the settings it was gathered with.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub gathered: BTreeMap<String, String>,
+    /// The stages.
+    pub stages: Vec<StageRecord>,
+}
+
+/// A stage as it was when the outcome was gathered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StageRecord {
+    stage: String,
+    key: String,
+    inputs: BTreeMap<String, String>,
+    outputs: serde_json::Value,
+}
+
+impl StageRecord {
+    /// What is kept of a manifest.
+    pub fn of(manifest: &Manifest) -> Self {
+        Self {
+            stage: manifest.stage.clone(),
+            key: manifest.key.clone(),
+            inputs: manifest.inputs.clone(),
+            outputs: super::work::facts(&manifest.outputs),
+        }
+    }
+}
+
+/// Files whose checksum stands beside the stages.
+pub(crate) const GATHERED: [&str; 2] = [layout::OUTCOME, layout::SETTINGS];
+
+impl Case {
+    /// Refuses an outcome that is not of what is in the folder now.
+    ///
+    /// # Errors
+    /// [`CaseError::Stale`] with what has changed since it was gathered.
+    pub fn check_outcome(&self) -> Result<(), WorkflowError> {
+        let stale = |reason: String| {
+            let folder = self.folder().to_path_buf();
+            Err(CaseError::Stale { folder, what: layout::OUTCOME.to_owned(), reasons: vec![reason] }.into())
+        };
+        let damaged = |_| CaseError::Damaged {
+            folder: self.folder().to_path_buf(),
+            file: layout::PROVENANCE.to_owned(),
+            subject: self.subject(),
+        };
+        let text = self.read_text(layout::PROVENANCE)?;
+        let provenance: Provenance = serde_json::from_str(&text).map_err(damaged)?;
+        for (file, sum) in &provenance.gathered {
+            if sha256_hex(&self.read(file)?) != *sum {
+                return stale(format!("{file} is not the one it was gathered with"));
+            }
+        }
+        for record in &provenance.stages {
+            match Manifest::of_stage(self.folder(), &record.stage) {
+                None => return stale(format!("stage {} was taken away or not finished", record.stage)),
+                Some(now) if StageRecord::of(&now) != *record => {
+                    return stale(format!("stage {} was made again", record.stage));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The stages that have finished here, each after those it was made from.
+    pub(crate) fn recorded(&self) -> Vec<Manifest> {
+        let entries = std::fs::read_dir(self.path(".stages")).into_iter().flatten().flatten();
+        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let stages = names.filter_map(|name| name.strip_suffix(".manifest.json").map(str::to_owned));
+        let mut waiting: Vec<Manifest> =
+            stages.filter_map(|stage| Manifest::of_stage(self.folder(), &stage)).collect();
+        waiting.sort_by(|a, b| a.stage.cmp(&b.stage));
+        let mut ordered: Vec<Manifest> = Vec::new();
+        while !waiting.is_empty() {
+            let ready =
+                |m: &Manifest| !waiting.iter().any(|other| m.inputs.contains_key(&format!("stage {}", other.stage)));
+            let next = waiting.iter().position(ready).unwrap_or(0);
+            ordered.push(waiting.remove(next));
+        }
+        ordered
+    }
+
+    /// Takes away the files of every stage that was made from another state of the stages before it.
+    pub(crate) fn drop_stale(&self) {
+        let mut present: BTreeMap<String, Manifest> = BTreeMap::new();
+        for manifest in self.recorded() {
+            let holds = |(role, sum): (&String, &String)| match role.strip_prefix("stage ") {
+                Some(earlier) => present.get(earlier).is_some_and(|earlier| earlier.made_sha256() == *sum),
+                None if role == "mesh" => {
+                    let mesh = present.get("mesh").and_then(|mesh| mesh.outputs.get(layout::REST_MESH));
+                    mesh.is_some_and(|mesh| mesh.sha256 == *sum)
+                }
+                None => true,
+            };
+            if manifest.inputs.iter().all(holds) {
+                present.insert(manifest.stage.clone(), manifest);
+            } else {
+                manifest.remove(self.folder());
+            }
+        }
+    }
+
+    /// Takes away the samples that are not of this list: a sweep of other settings has left them.
+    pub(crate) fn drop_samples_but(&self, ids: &BTreeSet<&str>) {
+        for manifest in self.recorded() {
+            if let Some(StageName::Sample(id)) = StageName::parse(&manifest.stage)
+                && !ids.contains(id.as_str())
+            {
+                manifest.remove(self.folder());
+            }
+        }
+    }
+
+    /// Refuses a folder that was made from something else.
+    pub(crate) fn check_subject(&self, subject: Subject) -> Result<(), WorkflowError> {
+        let folder = self.folder().to_path_buf();
+        match (self.subject(), subject) {
+            (Some(Subject::Phantom { .. }), Subject::Patient) => Err(CaseError::Phantom { folder }.into()),
+            (Some(Subject::Patient), Subject::Phantom { .. }) => Err(CaseError::Patient { folder }.into()),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! The files a user gives: two scans and masks of their own.
+
+use super::error::WorkflowError;
+use super::work::Work;
+use crate::artefact::sha256_hex;
+use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
+use crate::image::nifti::{self, ReadOptions};
+use crate::image::{Grid, Mask, Volume};
+use crate::segment::native::mask_on;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A pair of scans, and masks that win over the computed ones.
+#[derive(Clone, Debug, Default)]
+pub struct Inputs {
+    /// The pre-operative T1 (NIfTI).
+    pub pre: PathBuf,
+    /// The post-operative T1.
+    pub post: PathBuf,
+    /// The brain, in the pre-operative scan's grid.
+    pub brain_mask: Option<PathBuf>,
+    /// Lateral and third ventricles before the operation, in the grid of either scan.
+    pub ventricle_mask: Option<PathBuf>,
+    /// The cavity, in the grid of either scan.
+    pub cavity_mask: Option<PathBuf>,
+    /// The resected tissue, in the grid of either scan.
+    pub resected_mask: Option<PathBuf>,
+}
+
+impl Inputs {
+    /// Two scans and nothing else.
+    pub fn pair(pre: impl Into<PathBuf>, post: impl Into<PathBuf>) -> Self {
+        Self { pre: pre.into(), post: post.into(), ..Self::default() }
+    }
+}
+
+/// A mask of the user's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaskRole {
+    /// The brain.
+    Brain,
+    /// Lateral and third ventricles.
+    Ventricle,
+    /// The cavity.
+    Cavity,
+    /// The resected tissue.
+    Resected,
+}
+
+impl fmt::Display for MaskRole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Brain => "brain mask",
+            Self::Ventricle => "ventricle mask",
+            Self::Cavity => "cavity mask",
+            Self::Resected => "resected mask",
+        })
+    }
+}
+
+/// Why a file that was given cannot be used.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum InputError {
+    #[error("{}: is a folder; name a file", path.display())]
+    Folder { path: PathBuf },
+    #[error("{}: cannot be read; check the path: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{}: not UTF-8 text; save the file as UTF-8", path.display())]
+    NotText { path: PathBuf },
+    #[error(
+        "{} and {}: the two files are the same; give the pre-operative scan first, the post-operative second",
+        pre.display(), post.display()
+    )]
+    SameFile { pre: PathBuf, post: PathBuf },
+    #[error(
+        "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery: give another file",
+        pre.display(), post.display()
+    )]
+    SameVoxels { pre: PathBuf, post: PathBuf },
+    #[error(
+        "{role} {name}: its grid ({} voxels) is that of neither scan (pre-operative {}, post-operative {}){}; resample \
+         the mask onto one of them",
+        size(*found), size(*pre), size(*post),
+        if [pre, post].contains(&found) { ": it lies elsewhere" } else { "" }
+    )]
+    MaskGrid { role: MaskRole, name: String, found: [usize; 3], pre: [usize; 3], post: [usize; 3] },
+}
+
+fn size([x, y, z]: [usize; 3]) -> String {
+    format!("{x} x {y} x {z}")
+}
+
+/// A file the user named, whole.
+///
+/// # Errors
+/// [`InputError`] with the file's name and what to do.
+pub fn read_input(path: &Path) -> Result<Vec<u8>, InputError> {
+    if path.is_dir() {
+        return Err(InputError::Folder { path: path.to_path_buf() });
+    }
+    std::fs::read(path).map_err(|source| InputError::Unreadable { path: path.to_path_buf(), source })
+}
+
+/// A text file the user named.
+///
+/// # Errors
+/// As [`read_input`]; also when it is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, InputError> {
+    String::from_utf8(read_input(path)?).map_err(|_| InputError::NotText { path: path.to_path_buf() })
+}
+
+/// The last part of a path: what messages and manifests may say of a patient's file.
+pub fn shown(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Checksums of the two scans' files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScanSums {
+    /// Of the pre-operative file.
+    pub pre: String,
+    /// Of the post-operative file.
+    pub post: String,
+}
+
+/// The two scans.
+#[derive(Debug)]
+pub(crate) struct Scans {
+    /// Checksums of the files.
+    pub sums: ScanSums,
+    /// The pre-operative scan.
+    pub pre: Volume<f32, Pre>,
+    /// The post-operative scan.
+    pub post: Volume<f32, Post>,
+    /// What the reader noticed.
+    pub warnings: Vec<String>,
+}
+
+impl Scans {
+    /// Reads both scans.
+    pub fn read(inputs: &Inputs, options: &ReadOptions) -> Result<Self, WorkflowError> {
+        let (pre, post) = (&inputs.pre, &inputs.post);
+        let (pre_bytes, post_bytes) = (read_input(pre)?, read_input(post)?);
+        if pre_bytes == post_bytes {
+            return Err(InputError::SameFile { pre: pre.clone(), post: post.clone() }.into());
+        }
+        let before = nifti::decode(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), options)?;
+        let after = nifti::decode(&post_bytes, &format!("post-operative scan {}", shown(post)), options)?;
+        if before.volume == after.volume {
+            return Err(InputError::SameVoxels { pre: pre.clone(), post: post.clone() }.into());
+        }
+        let mut warnings: Vec<String> = before.warnings.iter().map(|w| format!("pre: {w}")).collect();
+        warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
+        let (pre, post) = (before.volume.relabelled(), after.volume.relabelled());
+        let sums = ScanSums { pre: sha256_hex(&pre_bytes), post: sha256_hex(&post_bytes) };
+        Ok(Self { sums, pre, post, warnings })
+    }
+}
+
+/// The user's own masks with the bytes of their files.
+#[derive(Debug)]
+pub(crate) struct OwnMasks {
+    pub brain: Option<(GivenMask, Vec<u8>)>,
+    pub ventricle: Option<(GivenMask, Vec<u8>)>,
+    pub cavity: Option<(GivenMask, Vec<u8>)>,
+    pub resected: Option<(GivenMask, Vec<u8>)>,
+}
+
+impl OwnMasks {
+    /// Reads those that were given. Comes before any stage: a mask that fits neither scan leaves nothing behind.
+    pub fn read(inputs: &Inputs, scans: &Scans, work: &Work<'_>) -> Result<Self, WorkflowError> {
+        let read = |role: MaskRole, path: &Option<PathBuf>| {
+            path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
+        };
+        Ok(Self {
+            brain: read(MaskRole::Brain, &inputs.brain_mask)?,
+            ventricle: read(MaskRole::Ventricle, &inputs.ventricle_mask)?,
+            cavity: read(MaskRole::Cavity, &inputs.cavity_mask)?,
+            resected: read(MaskRole::Resected, &inputs.resected_mask)?,
+        })
+    }
+
+    /// Those that were given, by role.
+    pub fn given(&self) -> impl Iterator<Item = (MaskRole, &[u8])> {
+        let masks = [
+            (MaskRole::Brain, &self.brain),
+            (MaskRole::Ventricle, &self.ventricle),
+            (MaskRole::Cavity, &self.cavity),
+            (MaskRole::Resected, &self.resected),
+        ];
+        masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())))
+    }
+}
+
+/// A mask in the frame of the scan whose grid it has.
+#[derive(Debug)]
+pub(crate) enum GivenMask {
+    /// On the pre-operative grid.
+    Pre(Mask<Pre>),
+    /// On the post-operative grid.
+    Post(Mask<Post>),
+}
+
+/// Reads a mask and finds whose grid it is on.
+fn given_mask(
+    role: MaskRole,
+    path: &Path,
+    scans: &Scans,
+    work: &Work<'_>,
+) -> Result<(GivenMask, Vec<u8>), WorkflowError> {
+    // Half a voxel is what two programs may disagree about an origin; more is another grid.
+    const TOLERANCE_MM: f64 = 0.1;
+    let bytes = read_input(path)?;
+    let name = format!("{role} {}", shown(path));
+    let (mask, odd): (Mask<Native>, _) = nifti::decode_mask(&bytes, &name, &work.settings.image)?;
+    let pre: Grid<Native> = scans.pre.grid.relabelled();
+    let post: Grid<Native> = scans.post.grid.relabelled();
+    let given = if mask.grid.coincides(&pre, TOLERANCE_MM) {
+        GivenMask::Pre(mask.relabelled())
+    } else if mask.grid.coincides(&post, TOLERANCE_MM) {
+        GivenMask::Post(mask.relabelled())
+    } else {
+        let (found, name) = (mask.grid.dims, shown(path));
+        return Err(InputError::MaskGrid { role, name, found, pre: pre.dims, post: post.dims }.into());
+    };
+    for warning in odd {
+        work.tell(|p| p.odd(&name, &warning));
+    }
+    Ok((given, bytes))
+}
+
+impl GivenMask {
+    /// The mask on the MNI grid.
+    pub fn on_mni(
+        &self,
+        grid: &Grid<Mni>,
+        mni_from_pre: &RigidTransform<Pre, Mni>,
+        mni_from_post: &RigidTransform<Post, Mni>,
+    ) -> Mask<Mni> {
+        match self {
+            Self::Pre(mask) => mask_on(mask, grid, &mni_from_pre.inverse()),
+            Self::Post(mask) => mask_on(mask, grid, &mni_from_post.inverse()),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! After the stages: the numbers gathered, the settings, the provenance and the page.
+
+use super::error::WorkflowError;
+use super::stages::EstimateFacts;
+use super::work::Work;
+use crate::artefact::{Manifest, write_whole};
+use crate::experiment::outcome::ExperimentOutcome;
+use crate::layout;
+use crate::report::case::write_report;
+
+/// Writes outcome, samples table, settings and provenance, then the page.
+pub(crate) fn finish(
+    work: &Work<'_>,
+    outcome: &ExperimentOutcome,
+    manifests: &[&Manifest],
+) -> Result<(), WorkflowError> {
+    write_whole(&work.case.path(layout::OUTCOME), outcome.to_json(layout::OUTCOME)?.as_bytes())?;
+    write_whole(&work.case.path(layout::SAMPLES_TABLE), samples_table(outcome).as_bytes())?;
+    keep_settings(work)?;
+    write_whole(&work.case.path(layout::PROVENANCE), provenance(manifests).as_bytes())?;
+    write_report(work.case.folder())?;
+    Ok(())
+}
+
+/// `settings.toml`: every setting, whole.
+pub(crate) fn keep_settings(work: &Work<'_>) -> Result<(), WorkflowError> {
+    Ok(write_whole(&work.case.path(layout::SETTINGS), work.settings.to_toml().as_bytes())?)
+}
+
+/// `provenance.json`: program, stages, checksums of inputs and outputs.
+fn provenance(manifests: &[&Manifest]) -> String {
+    let stages: Vec<_> = manifests
+        .iter()
+        .map(|m| serde_json::json!({"stage": m.stage, "key": m.key, "inputs": m.inputs, "outputs": m.outputs}))
+        .collect();
+    let program = concat!("hgm ", env!("CARGO_PKG_VERSION"));
+    format!("{:#}", serde_json::json!({"program": program, "stages": stages}))
+}
+
+/// `sim/samples.csv`: a line per sample.
+fn samples_table(outcome: &ExperimentOutcome) -> String {
+    let sets = outcome.rmse_sets();
+    let mut head = vec!["sample".to_owned()];
+    head.extend(outcome.tissues.iter().flat_map(|t| [format!("{t}_sd_level"), format!("{t}_shear_modulus_pa")]));
+    head.extend(sets.iter().map(|set| format!("rmse_{set}_mm")));
+    head.extend(sets.iter().map(|set| format!("surface_distance_{set}_mm")));
+    head.extend(["converged", "newton_iterations", "displacement_max_mm"].map(str::to_owned));
+    let mut lines = vec![head.join(",")];
+    let cell = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+    for sample in &outcome.samples {
+        let mut line = vec![sample.id.clone()];
+        for tissue in &outcome.tissues {
+            line.push(cell(sample.sd_levels.get(tissue).copied()));
+            line.push(cell(sample.shear_modulus_pa.get(tissue).copied()));
+        }
+        line.extend(sets.iter().map(|set| cell(sample.rmse_mm.get(set).copied())));
+        line.extend(sets.iter().map(|set| cell(sample.surface_distance_mm.get(set).copied())));
+        line.extend([sample.converged.to_string(), sample.newton_iterations.to_string()]);
+        line.push(cell(sample.displacement_max_mm));
+        lines.push(line.join(","));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// The outcome with the estimate as one more sample; it is the best one where no sweep has chosen another.
+pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFacts) {
+    let name = &facts.record.id;
+    outcome.samples.retain(|s| s.id != *name);
+    if outcome.samples.is_empty() {
+        outcome.tissues = facts.record.shear_modulus_pa.keys().cloned().collect();
+    }
+    outcome.samples.push(facts.record.clone());
+    if outcome.best_sample.is_none() {
+        outcome.best_sample = Some(name.clone());
+    }
+    outcome.warnings.retain(|w| !w.starts_with("estimate: "));
+    outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
+    outcome.estimate = Some(facts.estimate.clone());
+}

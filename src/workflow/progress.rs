@@ -1,0 +1,41 @@
+//! How a job tells whoever started it what it is doing.
+
+use super::plan::StageName;
+
+/// Listens to a job. Every method may be left out.
+#[allow(unused_variables, reason = "the names say what is handed over")]
+pub trait Progress {
+    /// A part of the job of this many steps begins.
+    fn begin(&mut self, part: &'static str, steps: usize) {}
+    /// What is being done within the step.
+    fn doing(&mut self, what: &str) {}
+    /// One step is done.
+    fn step(&mut self) {}
+    /// The part has ended.
+    fn end(&mut self) {}
+    /// A stage is there: made now, or from before.
+    fn stage(&mut self, ended: &StageEnded<'_>) {}
+    /// Something odd about a file that was given.
+    fn odd(&mut self, file: &str, what: &str) {}
+    /// What only somebody looking for a fault wants to know.
+    fn detail(&mut self, of: &str, what: &str) {}
+}
+
+/// A stage whose files are there.
+#[derive(Clone, Copy, Debug)]
+pub struct StageEnded<'a> {
+    /// Which.
+    pub stage: &'a StageName,
+    /// Whether its files were there already.
+    pub skipped: bool,
+    /// Why it was made again; empty where it was skipped, new or asked for.
+    pub reasons: &'a [String],
+    /// What a reader must know of its files.
+    pub warnings: &'a [String],
+}
+
+/// Listens to nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}

@@ -1,0 +1,135 @@
+//! Stage `mesh`: label map to undeformed mesh with its boundary sets.
+
+use crate::artefact::{Produced, Stage};
+use crate::experiment::outcome::{MeshOutcome, SetOutcome};
+use crate::geometry::{Frame, Mni, Position};
+use crate::image::LabelMap;
+use crate::layout::{PRE_LABELS, REST_GMSH, REST_MESH, REST_SURFACE};
+use crate::mesh::engine::{MeshSettings, mesh_labels};
+use crate::mesh::format::gifti::{self, Space};
+use crate::mesh::format::{msh, vtu};
+use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
+use crate::mesh::{TetMesh, TriMesh};
+use crate::register::deformable::DisplacementField;
+use crate::segment::{label, with_closed_sulci};
+use crate::tag::{falx_sheet, tag_boundary_sets_with};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::plan::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 7;
+const NAME: StageName = StageName::Mesh;
+/// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
+const LARGE_ISLAND_MM3: f64 = 500.0;
+/// Sulci and fissures up to twice this width are closed in the mesh.
+const SULCUS_MM: f64 = 4.0;
+
+/// What the report says of the mesh.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MeshFacts {
+    /// Size and quality.
+    pub mesh: MeshOutcome,
+    /// The boundary sets.
+    pub sets: Vec<SetOutcome>,
+    /// Sets that are not to be believed, a sentence each.
+    pub implausible: Vec<String>,
+}
+
+/// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
+pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
+    let tag = &work.settings.tag;
+    let mut settings = MeshSettings { without: vec![label::CSF], ..work.settings.mesh.clone() };
+    if tag.falx && settings.split.is_none() {
+        settings.split = Some(falx_sheet());
+    }
+    let both = serde_json::json!({ "mesh": settings, "tag": tag });
+    (work.stage(made, &NAME, VERSION, &both).frame(Mni::NAME), settings)
+}
+
+/// Meshes a label map (grey, white, ventricle, resected), tags the sets, leaves only the tissue, writes the undeformed mesh.
+/// `template_from_labels` carries the landmarks of the template onto a patient; without it they are taken where they are.
+pub(crate) fn mesh(
+    work: &Work<'_>,
+    made: &mut Made,
+    labels: &LabelMap<Mni>,
+    template_from_labels: Option<&DisplacementField<Mni>>,
+) -> Result<MeshFacts, WorkflowError> {
+    let (stage, settings) = mesh_stage(work, made);
+    work.run(made, &NAME, &stage, || {
+        let body = with_closed_sulci(labels, SULCUS_MM);
+        let source = template_from_labels.map_or("the template's labels", |_| PRE_LABELS);
+        let (mut whole, record) = mesh_labels(&body, &settings, &work.place.programs.engines())
+            .map_err(|error| WorkflowError::Engine { labels: source.to_owned(), source: error })?;
+        let in_template = |p: [f64; 3]| match template_from_labels {
+            Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
+            None => p,
+        };
+        let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
+        let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
+        let tissue_of = whole.restricted(tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
+        let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
+        let mut produced = Produced::default();
+        produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
+        produced.files.push((REST_GMSH.to_owned(), msh::encode(&rest)?));
+        for (set, facets) in &rest.facet_sets {
+            let (surface, _) = TriMesh::from_facets(rest.nodes_mm(), facets);
+            produced.files.push((REST_SURFACE.of(set), gifti::encode_surface(&surface, Space::Mni152, set)));
+        }
+        let large = record.islands.iter().filter(|island| island.volume_mm3 > LARGE_ISLAND_MM3);
+        produced.warnings.extend(large.map(|island| {
+            let name = label::name(island.label).unwrap_or("unknown");
+            format!("a part of {name} of {:.2} cc lay apart and was left out of the mesh", island.volume_mm3 / 1000.0)
+        }));
+        produced.warnings.extend(tags.warnings.iter().cloned());
+        let sets = tags.sets.iter().map(|set| SetOutcome {
+            name: set.name.clone(),
+            nodes: set.nodes,
+            area_mm2: Some(set.area_mm2),
+            centroid_mm: Some(set.centroid_mm),
+        });
+        let facts_of_mesh = MeshFacts {
+            mesh: mesh_outcome(&rest, &whole, &body, &settings),
+            sets: sets.collect(),
+            implausible: tags.warnings.clone(),
+        };
+        produced.facts = facts(&facts_of_mesh);
+        Ok(produced)
+    })
+}
+
+/// Size and shape of what is simulated, and how well the `whole` mesh it was cut from fills its label map.
+pub fn mesh_outcome<F: Frame>(
+    mesh: &TetMesh,
+    whole: &TetMesh,
+    map: &LabelMap<F>,
+    settings: &MeshSettings,
+) -> MeshOutcome {
+    let named = |l: u8| label::name(l).map_or_else(|| l.to_string(), str::to_owned);
+    let mut volume_cc = BTreeMap::new();
+    for (t, &l) in mesh.labels().iter().enumerate() {
+        *volume_cc.entry(named(l)).or_insert(0.0) += mesh.volume_mm3(t) / 1000.0;
+    }
+    let shape = shape_quality(mesh);
+    let fit = fidelity(whole, map, &settings.without);
+    let border = surface_distance(whole, map, &settings.without);
+    MeshOutcome {
+        engine: settings.engine.name().to_owned(),
+        nodes: mesh.nodes_mm().len(),
+        tets: mesh.tets().len(),
+        volume_cc,
+        dihedral_min_deg: Some(shape.dihedral_min_deg),
+        dihedral_percentile_1_deg: Some(shape.dihedral_percentile_1_deg),
+        dihedral_below_10_percent: Some(shape.dihedral_below_10_percent),
+        dihedral_counts: shape.dihedral_counts,
+        radius_ratio_min: Some(shape.radius_ratio_min),
+        radius_ratio_mean: Some(shape.radius_ratio_mean),
+        scaled_jacobian_min: Some(shape.scaled_jacobian_min),
+        volume_error_percent: fit.labels.iter().map(|l| (named(l.label), l.volume_error_percent)).collect(),
+        dice: fit.labels.iter().map(|l| (named(l.label), l.dice)).collect(),
+        surface_distance_mean_mm: border.map(|d| d.mean_mm),
+        surface_distance_95_mm: border.map(|d| d.percentile_95_mm),
+    }
+}

@@ -1,0 +1,38 @@
+//! The stages of a case, a file for each.
+//!
+//! Every stage reads what it needs from files and writes files: a stage that was skipped and one that was run leave the
+//! next one the same bytes to start from.
+
+mod anat;
+mod brain_shift;
+mod estimate;
+mod labels;
+mod mesh;
+mod reference;
+mod registration;
+mod samples;
+
+pub use anat::AnatFacts;
+pub use estimate::{EstimateFacts, EstimateOptions, Observed};
+pub use mesh::{MeshFacts, mesh_outcome};
+pub use registration::RegistrationFacts;
+
+pub(crate) use anat::{Anatomy, anat, anat_stage};
+pub(crate) use brain_shift::SeenShift;
+pub(crate) use estimate::{EstimateInput, estimate};
+pub(crate) use labels::labels;
+pub(crate) use mesh::{mesh, mesh_stage};
+pub(crate) use reference::{known_state, observed_surfaces, phantom_reference, reference, reference_stage};
+pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage};
+pub(crate) use samples::{SampleMode, Sweep, sample_stage, samples};
+
+use crate::image::nifti::ReadOptions;
+use serde::Serialize;
+
+/// A stage's settings with how the user's files are read: another volume of the same file is another scan.
+#[derive(Serialize)]
+struct WithReading<'a, S> {
+    #[serde(flatten)]
+    settings: &'a S,
+    image: ReadOptions,
+}

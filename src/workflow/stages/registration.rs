@@ -1,0 +1,116 @@
+//! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
+
+use super::WithReading;
+use crate::artefact::{Produced, Stage};
+use crate::experiment::outcome::RegistrationOutcome;
+use crate::experiment::resection::GravityFrame;
+use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::image::Grid;
+use crate::layout;
+use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
+use crate::register::{RigidFit, RigidMasks, register_rigid, register_to_template};
+use crate::segment::atlas;
+use crate::workflow::case::Case;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::inputs::{ScanSums, Scans};
+use crate::workflow::plan::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use nalgebra::{Point3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Registration;
+
+/// What the report says of the two fits.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RegistrationFacts {
+    /// Post to pre, then pre to MNI.
+    pub fits: Vec<RegistrationOutcome>,
+}
+
+/// The stage with its settings and inputs.
+pub(crate) fn registration_stage(work: &Work<'_>, sums: &ScanSums) -> Stage {
+    let posed = WithReading { settings: &work.settings.register, image: work.settings.image };
+    work.stage(&Made::default(), &NAME, VERSION, &posed)
+        .input_sha256("pre", &sums.pre)
+        .input_sha256("post", &sums.post)
+        .frame(Mni::NAME)
+}
+
+/// Fits both scans and writes both transforms as text and as ITK .tfm.
+pub(crate) fn registration(
+    work: &Work<'_>,
+    made: &mut Made,
+    scans: &Scans,
+) -> Result<RegistrationFacts, WorkflowError> {
+    let settings = &work.settings.register;
+    work.run(made, &NAME, &registration_stage(work, &scans.sums), || {
+        work.tell(|p| p.begin("registration", 2));
+        work.tell(|p| p.doing("post to pre"));
+        let refused = |what| move |source| WorkflowError::Registration { what, source };
+        let pre_from_post = register_rigid(&scans.post, &scans.pre, RigidMasks::default(), settings)
+            .map_err(refused("the post-operative scan (moving) onto the pre-operative one (fixed)"))?;
+        work.tell(|p| p.step());
+        work.tell(|p| p.doing("pre to MNI"));
+        let mni_from_pre = register_to_template(&scans.pre, &atlas::template().t1_f32(), settings)
+            .map_err(refused("the pre-operative scan (moving) onto the MNI template (fixed)"))?;
+        work.tell(|p| p.end());
+        let mut produced = Produced::default();
+        produced.warnings.extend(scans.warnings.iter().cloned());
+        produced.warnings.extend(pre_from_post.warnings.iter().map(|w| format!("post to pre: {w}")));
+        produced.warnings.extend(mni_from_pre.warnings.iter().map(|w| format!("pre to MNI: {w}")));
+        let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
+        write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
+        let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
+        write_transform(&mut produced, text, itk, &mni_from_pre.fixed_from_moving);
+        let fits = vec![outcome(&pre_from_post, &scans.post.grid), outcome(&mni_from_pre, &scans.pre.grid)];
+        produced.facts = facts(&RegistrationFacts { fits });
+        Ok(produced)
+    })
+}
+
+/// Post to pre, and pre to MNI.
+type Poses = (RigidTransform<Post, Pre>, RigidTransform<Pre, Mni>);
+
+/// The two transforms of a case, as the files hold them.
+pub(crate) fn transforms(case: &Case) -> Result<Poses, WorkflowError> {
+    let (post, pre) = (layout::PRE_FROM_POST_TEXT, layout::MNI_FROM_PRE_TEXT);
+    let pre_from_post = rigid_from_text(&case.read_text(post)?, post)?;
+    let mni_from_pre = rigid_from_text(&case.read_text(pre)?, pre)?;
+    Ok((pre_from_post, mni_from_pre))
+}
+
+/// What turns a vector of the frame that gravity is given in to the MNI frame.
+pub(crate) fn mni_from_gravity_frame(case: &Case, frame: GravityFrame) -> Result<UnitQuaternion<f64>, WorkflowError> {
+    let (pre_from_post, mni_from_pre) = transforms(case)?;
+    Ok(match frame {
+        GravityFrame::Mni => UnitQuaternion::identity(),
+        GravityFrame::Pre => mni_from_pre.rotation,
+        GravityFrame::Post => pre_from_post.then(&mni_from_pre).rotation,
+    })
+}
+
+fn write_transform<M: Frame, F: Frame>(
+    produced: &mut Produced,
+    text: &str,
+    itk: &str,
+    transform: &RigidTransform<M, F>,
+) {
+    produced.files.push((text.to_owned(), to_matrix_text(transform).into_bytes()));
+    produced.files.push((itk.to_owned(), to_itk_text(transform).into_bytes()));
+}
+
+fn outcome<M: Frame, F: Frame>(fit: &RigidFit<M, F>, moving: &Grid<M>) -> RegistrationOutcome {
+    let centre = moving.position(Point3::from(moving.dims.map(|n| (n as f64 - 1.0) / 2.0)));
+    let moved = fit.fixed_from_moving.apply(centre).mm - centre.mm;
+    RegistrationOutcome {
+        moving: M::NAME.to_owned(),
+        fixed: F::NAME.to_owned(),
+        rotation_deg: fit.fixed_from_moving.rotation.angle().to_degrees(),
+        translation_mm: moved.into(),
+        similarity: "Mattes mutual information (nats)".to_owned(),
+        similarity_before: None,
+        similarity_after: Some(fit.quality.mutual_information),
+    }
+}

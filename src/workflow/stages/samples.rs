@@ -1,0 +1,119 @@
+//! Stage `sim-SAMPLE`: one simulation each, so that a sweep can stop anywhere, resume, and be split over machines.
+
+use crate::artefact::{Manifest, Produced, Stage};
+use crate::experiment::outcome::SampleOutcome;
+use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::sweep::{Reference, SolvedSample, solve_sample};
+use crate::fem::Scenario;
+use crate::geometry::{Frame, Mni};
+use crate::layout::SAMPLE_STATE;
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, vtu};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::plan::{StageName, Subject};
+use crate::workflow::work::{Made, Work, facts};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 3;
+
+/// What every sample of a sweep shares.
+#[derive(Debug)]
+pub(crate) struct Sweep<'a> {
+    /// The undeformed mesh.
+    pub mesh: &'a TetMesh,
+    /// Loads, supports and solver; the materials are the sample's.
+    pub template: &'a Scenario,
+    /// The tissues whose material is varied.
+    pub tissues: &'a [Tissue],
+    /// What the samples are compared with.
+    pub reference: &'a Reference,
+}
+
+/// Whether samples that are not there are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SampleMode {
+    /// Make them.
+    Run,
+    /// Refuse and say which.
+    Gather,
+}
+
+/// The stage of one sample.
+pub(crate) fn sample_stage(
+    work: &Work<'_>,
+    made: &Made,
+    template: &Scenario,
+    tissues: &[Tissue],
+    sample: &Sample,
+) -> Stage {
+    let posed = serde_json::json!({ "scenario": template, "tissues": tissues, "sample": sample });
+    work.stage(made, &StageName::Sample(sample.id.clone()), VERSION, &posed).frame(Mni::NAME)
+}
+
+/// Runs (or skips) every sample; the records come back in order with what made them. A sample without equilibrium is only
+/// recorded.
+pub(crate) fn samples(
+    work: &Work<'_>,
+    made: &Made,
+    sweep: &Sweep<'_>,
+    list: &[Sample],
+    mode: SampleMode,
+) -> Result<Vec<(SampleOutcome, Manifest)>, WorkflowError> {
+    work.tell(|p| p.begin("simulation", list.len()));
+    let table = if work.subject == Subject::Patient { "resection" } else { "phantom" };
+    let mut records = Vec::with_capacity(list.len());
+    for sample in list {
+        let stage = sample_stage(work, made, sweep.template, sweep.tissues, sample);
+        if mode == SampleMode::Gather
+            && let Some(reason) = stage.why().first()
+        {
+            // The values are this program's data; the user's own are in the settings file.
+            let reason = reason.split(" changed from ").next().unwrap_or(reason).to_owned();
+            return Err(WorkflowError::SampleMissing { sample: sample.id.clone(), reason });
+        }
+        let name = StageName::Sample(sample.id.clone());
+        let mut own = made.clone();
+        let record = work.run(&mut own, &name, &stage, || {
+            let show = |p: &crate::fem::Progress| {
+                work.tell(|shown| shown.doing(&format!("{} residual {:.1e}", sample.id, p.relative_residual)));
+            };
+            let solved = solve_sample(sweep.mesh, sweep.template, sweep.tissues, sample, sweep.reference, &show)
+                .map_err(|source| WorkflowError::Sample { table, source })?;
+            produced(work, sweep.mesh, solved)
+        })?;
+        records.extend(own.get(&name).map(|manifest| (record, manifest.clone())));
+        work.tell(|p| p.step());
+    }
+    work.tell(|p| p.end());
+    Ok(records)
+}
+
+fn produced(work: &Work<'_>, mesh: &TetMesh, solved: SolvedSample) -> Result<Produced, WorkflowError> {
+    let mut produced = Produced::default();
+    let mut record = solved.record;
+    match solved.state {
+        None => {
+            work.tell(|p| p.detail(&record.id, &solved.reason.unwrap_or_default()));
+            produced.warnings.push(format!("{} is left out: its body finds no equilibrium under this load", record.id));
+        }
+        Some((outcome, errors)) => {
+            let file = SAMPLE_STATE.of(&record.id);
+            let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
+            let points = [
+                Field::vector("displacement", &outcome.displacement_mm),
+                Field::vector("reaction_n", &outcome.reaction_n),
+                Field::scalar("rmse_mm", errors.node_error_mm),
+                Field::scalar("rmse_observed", observed),
+            ];
+            let cells = [
+                Field::scalar("jacobian", outcome.jacobian),
+                Field::scalar("strain_energy_density_pa", outcome.strain_energy_density_pa),
+            ];
+            produced.files.push((file.clone(), vtu::encode(mesh, &points, &cells)?));
+            produced.warnings.extend(outcome.warnings);
+            record.file = Some(file);
+        }
+    }
+    produced.facts = facts(&record);
+    Ok(produced)
+}

@@ -1,0 +1,116 @@
+//! What the stages of one job share: the folder, the settings, the machine's programs, whoever listens.
+
+use super::case::{Case, CaseError};
+use super::error::WorkflowError;
+use super::plan::{StageName, Subject};
+use super::programs::Programs;
+use super::progress::{Progress, StageEnded};
+use super::settings::Settings;
+use crate::artefact::{Manifest, Produced, Stage, StageError};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Where a job is done.
+#[derive(Clone, Debug, Default)]
+pub struct Place {
+    /// The case folder.
+    pub folder: PathBuf,
+    /// The programs of this machine; none are needed.
+    pub programs: Programs,
+    /// Makes everything again, also what is there.
+    pub force: bool,
+}
+
+impl<P: Into<PathBuf>> From<P> for Place {
+    fn from(folder: P) -> Self {
+        Self { folder: folder.into(), ..Self::default() }
+    }
+}
+
+/// One job at work.
+pub(crate) struct Work<'a> {
+    pub case: Case,
+    pub subject: Subject,
+    pub settings: &'a Settings,
+    pub place: &'a Place,
+    progress: RefCell<&'a mut dyn Progress>,
+}
+
+/// The manifests of the stages that are there, by name.
+#[derive(Clone, Debug, Default)]
+pub struct Made(BTreeMap<StageName, Manifest>);
+
+impl Made {
+    /// Adds one.
+    pub fn add(&mut self, stage: StageName, manifest: Manifest) {
+        self.0.insert(stage, manifest);
+    }
+
+    /// The manifest of a stage that is there.
+    pub fn get(&self, stage: &StageName) -> Option<&Manifest> {
+        self.0.get(stage)
+    }
+
+    /// A stage of this name after those it is made from.
+    pub fn stage(
+        &self,
+        (case, subject): (&Case, Subject),
+        name: &StageName,
+        version: u32,
+        settings: &impl Serialize,
+    ) -> Stage {
+        let stage = Stage::new(&name.to_string(), version, case.folder(), settings);
+        let before = name.after(subject).iter().filter_map(|earlier| self.get(earlier));
+        before.fold(stage, |stage, earlier| stage.after(earlier))
+    }
+}
+
+impl<'a> Work<'a> {
+    pub fn new(place: &'a Place, subject: Subject, settings: &'a Settings, progress: &'a mut dyn Progress) -> Self {
+        Self { case: Case::at(&place.folder), subject, settings, place, progress: RefCell::new(progress) }
+    }
+
+    /// A stage of this name after those it is made from.
+    pub fn stage(&self, made: &Made, name: &StageName, version: u32, settings: &impl Serialize) -> Stage {
+        made.stage((&self.case, self.subject), name, version, settings)
+    }
+
+    /// Tells whoever listens.
+    pub fn tell(&self, what: impl FnOnce(&mut dyn Progress)) {
+        what(&mut **self.progress.borrow_mut());
+    }
+
+    /// Runs a stage, or skips it, and adds its manifest to those that are there; returns its figures.
+    pub fn run<Facts: DeserializeOwned>(
+        &self,
+        made: &mut Made,
+        name: &StageName,
+        stage: &Stage,
+        compute: impl FnOnce() -> Result<Produced, WorkflowError>,
+    ) -> Result<Facts, WorkflowError> {
+        let outcome = stage.run(self.place.force, compute).map_err(|error| match error {
+            StageError::Compute(error) => error,
+            StageError::Write(error) => error.into(),
+        })?;
+        let (reasons, warnings) = (&outcome.reasons, &outcome.manifest.warnings);
+        self.tell(|p| p.stage(&StageEnded { stage: name, skipped: outcome.skipped, reasons, warnings }));
+        let facts = serde_json::from_value(outcome.manifest.facts.clone()).map_err(|_| CaseError::Damaged {
+            folder: self.case.folder().to_path_buf(),
+            file: format!(".stages/{name}.manifest.json"),
+            subject: Some(self.subject),
+        })?;
+        made.add(name.clone(), outcome.manifest);
+        Ok(facts)
+    }
+}
+
+/// Figures as a manifest keeps them.
+///
+/// # Panics
+/// Never: figures are plain data.
+pub(crate) fn facts(value: &impl Serialize) -> serde_json::Value {
+    serde_json::to_value(value).expect("figures are plain data")
+}

@@ -1,0 +1,55 @@
+//! Settings as a case keeps them: resolved once, and meant by every later command.
+
+use crate::bids::COARSE;
+use crate::job::{output, sample};
+use serde_json::Value;
+use std::path::Path;
+
+const SETTINGS: &str = "\
+[resection]
+sd_levels = [0.0]
+[prior]
+study = \"mre\"
+[anat.sag]
+iterations = [20, 10, 5]
+";
+
+fn json(arguments: &[&str]) -> Value {
+    let result = output(&[arguments, &["--json", "-q"]].concat());
+    assert!(matches!(result.status.code(), Some(0 | 4)), "{}", String::from_utf8_lossy(&result.stderr));
+    serde_json::from_slice(&result.stdout).unwrap()
+}
+
+/// An estimate on a case takes the case's own settings: it equals the estimate of one run with them.
+#[test]
+fn slow_an_estimate_means_the_settings_its_case_was_made_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("s.toml"), SETTINGS).unwrap();
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let scans = [pre.to_str().unwrap(), post.to_str().unwrap()];
+    let (two, one, config) = (path("two"), path("one"), path("s.toml"));
+    let run = |case: &str, more: &[&str]| {
+        json(&[&["run", scans[0], scans[1], "-o", case, "--config", &config], &COARSE[..], more].concat())
+    };
+    run(&two, &[]);
+    let later = json(&["estimate", &two]);
+    let at_once = &run(&one, &["--estimate"])["estimate"];
+    assert_eq!(later, *at_once);
+    let kept: toml::Table = std::fs::read_to_string(Path::new(&two).join("settings.toml")).unwrap().parse().unwrap();
+    assert_eq!(kept["anat"]["sag"]["iterations"].as_array().unwrap()[0].as_integer(), Some(20));
+    assert_eq!(kept["prior"]["study"].as_str(), Some("mre"));
+    assert_eq!(kept["mesh"]["size"]["cells"].as_integer(), Some(3000));
+}
+
+#[test]
+fn an_estimate_of_another_law_is_refused_before_anything_is_computed() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let arguments = ["run", pre.to_str().unwrap(), post.to_str().unwrap(), "-o", case.to_str().unwrap()];
+    let refused = output(&[&arguments[..], &COARSE, &["--estimate", "--law", "ogden"]].concat());
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(3), "{said}");
+    assert!(said.contains("[prior]") && said.contains("law = \"neo-hookean\"") && !case.exists(), "{said}");
+}
