@@ -76,7 +76,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::Rejected(anyhow!("--poisson-ratio is {nu}: it must be at least 0 and below 0.5")));
     }
     let (name, test) = points(args)?;
-    let laws = if args.law.is_empty() { MetaModel::ALL.to_vec() } else { args.law.clone() };
+    let laws = if args.law.is_empty() { MetaModel::all().collect() } else { args.law.clone() };
     let mut fitted = Vec::new();
     for law in laws {
         let fit = fit_rheometry(law, &test, &settings).with_context(|| name.clone()).reject()?;

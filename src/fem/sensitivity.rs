@@ -33,7 +33,8 @@ pub enum By {
     AllLoads,
 }
 
-/// Relative step of differences in a parameter. Forces are linear in all moduli, so only Ogden's exponents see it.
+/// Relative step of differences in a parameter. Forces are linear in all moduli, so only other numbers of a law, such as
+/// Ogden's exponents, see it.
 const STEP: f64 = 1.0 / 512.0;
 
 /// Relative residual of the tangent solves.
@@ -179,8 +180,9 @@ impl<'a> Linearised<'a> {
                         let rate = nu * 2.0 * mu / (1.0 - 2.0 * nu).powi(2) / step;
                         f1.iter().zip(&f0).map(|(a, b)| [0, 1, 2].map(|i| rate * (a[i] - b[i]))).collect()
                     }
-                    Parameter::OgdenAlpha(_) => derivative(|e| with(1.0 + e), STEP, true)?,
-                    _ => derivative(|e| with(1.0 + e), STEP, false)?,
+                    Parameter::Stiffness | Parameter::Own(_) => {
+                        derivative(|e| with(1.0 + e), STEP, !material.linear_in(*parameter))?
+                    }
                 };
                 slope.iter_mut().flatten().for_each(|v| *v = -*v);
                 Ok(slope)
