@@ -86,9 +86,8 @@ fn wall_edge(text: &str) -> Result<WallEdge, String> {
 }
 
 fn engine(name: &str) -> Result<Engine, String> {
-    serde_json::from_value(name.into()).map_err(|_| {
-        format!("no engine `{name}`: say cgal, lattice, gmsh or tetgen (`hgm doctor` tells which are installed)")
-    })
+    Engine::named(name)
+        .ok_or_else(|| format!("no engine `{name}`: say {} (`hgm doctor` tells which are installed)", Engine::names()))
 }
 
 /// The prior.
@@ -204,9 +203,9 @@ mod tests {
             "[mesh]\nengine = \"gmsh\"\n[mesh.size]\nedge_mm = 3.0\n[prior]\npublished = true\n".parse().unwrap();
         let mut flags = Flags::default();
         MeshOptions { cells: Some(8000), ..MeshOptions::default() }.over(&mut flags);
-        PriorOptions { law: Some(MetaModel::Ogden), study: None }.over(&mut flags);
+        PriorOptions { law: Some(MetaModel::OGDEN), study: None }.over(&mut flags);
         let settings = Settings::resolve([&file, &flags.0]).unwrap();
-        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::Gmsh, MeshSize::Cells(8000)));
-        assert!(settings.prior.published && settings.prior.law == MetaModel::Ogden);
+        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::GMSH, MeshSize::Cells(8000)));
+        assert!(settings.prior.published && settings.prior.law == MetaModel::OGDEN);
     }
 }

@@ -1,6 +1,6 @@
 //! The materials a sweep tries: one law per tissue, drawn from the prior at stated levels.
 
-use super::outcome::LawOutcome;
+use super::law_outcome::LawOutcome;
 use crate::material::Task;
 use crate::material::law::Material;
 use crate::segment::label;

@@ -9,17 +9,13 @@ use super::element::{
 use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
 use super::order::{Graph, renumbered, reverse_cuthill_mckee, sorted};
-use super::scenario::{MassKind, Method, Scenario};
+use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, State};
 use crate::material::law::{Material, Parameter};
 use crate::mesh::TetMesh;
-use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
-
-/// Materials by label name.
-pub type Materials = BTreeMap<String, Material>;
 
 /// A mesh with held nodes and loads, ready to be solved with any materials.
 pub struct Model {

@@ -5,9 +5,11 @@
 //! linear solve; one scalar of u costs one solve for all its parameters (the adjoint).
 
 use super::equilibrium::largest_ratio;
-use super::linear::{self, LinearSolver, Tangent};
+use super::linear::{LinearSolver, Tangent};
 use super::load::Load;
-use super::model::{Materials, Model};
+use super::model::Model;
+use super::scenario::Materials;
+use super::solver;
 use super::units::millimetres;
 use super::{FemError, State, reduce};
 use crate::material::law::Parameter;
@@ -111,7 +113,7 @@ impl<'a> Linearised<'a> {
         let laws = model.laws(materials)?;
         let mut forces = vec![[0.0; 3]; state.u.len()];
         let tangent = model.tangent(&state.u, &laws, &mut forces, false, None);
-        let mut solver = linear::for_model(model, largest_ratio(materials));
+        let mut solver = solver::for_model(model, largest_ratio(materials));
         solver.prepare(&tangent);
         Ok(Self { model, materials, u: &state.u, tangent, solver })
     }

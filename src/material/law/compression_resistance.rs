@@ -1,7 +1,7 @@
 //! Added resistance against compression, around any law.
 
-use super::volume::{OfVolume, add_tangent_of_volume, cofactors, volume_change};
 use super::hyperelastic::{Hyperelastic, Tangent};
+use super::volume::{OfVolume, add_tangent_of_volume, cofactors, volume_change};
 use nalgebra::Matrix3;
 
 /// Psi = Psi_inner - k/12 (J - 1)^3 for J < 1 and Psi_inner above: stiffer the more an element is squeezed, nothing

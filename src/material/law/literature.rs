@@ -121,8 +121,7 @@ fn scan(form: &Form, [low, high]: [f64; 2]) -> Stability {
     let mut holds = [true; 3];
     let scale = form.small_strain_shear_modulus_pa().abs();
     for l in stretches(low, high, SCANNED) {
-        let Jet { gradient: [slope, ..], hessian: [[bend, ..], ..], .. } =
-            form.uniaxial_energy_pa(Jet::variable(l, 0));
+        let Jet { gradient: [slope, ..], hessian: [[bend, ..], ..], .. } = form.uniaxial_energy_pa(Jet::variable(l, 0));
         // At rest the slope of forms with large coefficients is rounding.
         holds[0] &= (l - 1.0) * slope >= -1e-9 * scale;
         holds[1] &= bend > 0.0;
@@ -197,7 +196,9 @@ mod tests {
     fn an_energy_is_a_number_or_infinite_at_any_deformation() {
         for id in ids() {
             let law = law(id, 1.0);
-            for (a, b, c) in [(1e-3, 1.0, 1.0), (5.0, 0.2, 1.0), (40.0, 40.0, 40.0), (1e-3, 1e-3, 1e-3), (-1.0, 1.0, 1.0)] {
+            for (a, b, c) in
+                [(1e-3, 1.0, 1.0), (5.0, 0.2, 1.0), (40.0, 40.0, 40.0), (1e-3, 1e-3, 1e-3), (-1.0, 1.0, 1.0)]
+            {
                 let h = Matrix3::from_diagonal(&Vector3::new(a - 1.0, b - 1.0, c - 1.0));
                 assert!(!law.energy_density_pa(&h).is_nan(), "{id} at {a} {b} {c}");
             }

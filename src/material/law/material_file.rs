@@ -175,7 +175,10 @@ mod tests {
         assert_eq!(text, wanted);
         let terms = "law = 'ogden'\nterms = [{ mu_pa = -500, alpha = -4 }]\npoisson_ratio = 0.45";
         let text = serde_json::to_string(&toml::from_str::<Material>(terms).unwrap()).unwrap();
-        assert!(text.starts_with("{\"law\":\"ogden\",\"terms\":[{\"alpha\":-4.0,\"mu_pa\":-500.0}],\"poisson"), "{text}");
+        assert!(
+            text.starts_with("{\"law\":\"ogden\",\"terms\":[{\"alpha\":-4.0,\"mu_pa\":-500.0}],\"poisson"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -183,7 +186,9 @@ mod tests {
         let refused = |text: &str| toml::from_str::<Material>(text).unwrap_err().message().to_owned();
         let plain = "law = 'neo-hookean'\nshear_modulus_pa = 1.0\npoisson_ratio = 0.4\n";
         assert!(refused(&format!("{plain}young = 3.0")).contains("unknown field `young`"));
-        assert!(refused(&plain.replace("neo-hookean", "hooke")).starts_with("unknown variant `hooke`, expected one of"));
+        assert!(
+            refused(&plain.replace("neo-hookean", "hooke")).starts_with("unknown variant `hooke`, expected one of")
+        );
         assert!(refused(&plain.replace("shear_modulus_pa = 1.0", "")).contains("missing field `shear_modulus_pa`"));
         assert!(refused(&plain.replace("1.0", "'soft'")).contains("shear_modulus_pa"));
         let stable = plain.replace("neo-hookean", "stable-neo-hookean");

@@ -1,9 +1,7 @@
 //! Stresses tabulated by hand and by other codes: mu = 1000 Pa, nu = .45; Mooney-Rivlin C1 = 300, C2 = 200 Pa; Ogden
 //! alpha = -4, mu1 = -500 Pa.
 
-use super::{
-    Hyperelastic, LAWS, Material, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, check_hyperelastic_within,
-};
+use super::{Hyperelastic, LAWS, Material, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, check_hyperelastic_within};
 use nalgebra::{Matrix3, Vector3};
 
 fn laws() -> [(&'static str, Box<dyn Hyperelastic>); 3] {

@@ -7,8 +7,8 @@ mod curve;
 mod least_squares;
 mod search;
 
-pub use curve::MetaModel;
 pub use crate::material::law::{Search, Stability, StabilityRange};
+pub use curve::MetaModel;
 pub use search::{Fit, FitError, MetaModelSettings, fit, fit_stress};
 
 #[cfg(test)]
