@@ -85,6 +85,13 @@ fn wall_edge(text: &str) -> Result<WallEdge, String> {
     read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
 }
 
+/// A help text with the names of the laws that can be fitted in place of `{}`.
+pub fn laws(help: &str) -> String {
+    let names = MetaModel::names();
+    let (last, others) = names.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
+    help.replace("{}", &format!("{} or {last}", others.join(", ")))
+}
+
 fn engine(name: &str) -> Result<Engine, String> {
     Engine::named(name)
         .ok_or_else(|| format!("no engine `{name}`: say {} (`hgm doctor` tells which are installed)", Engine::names()))
@@ -96,8 +103,7 @@ pub struct PriorOptions {
     /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
     #[arg(long, value_name = "KIND")]
     study: Option<StudyKind>,
-    /// The law fitted to every sample: neo-hookean, mooney-rivlin, ogden or ogden-high [default: neo-hookean]
-    #[arg(long, value_name = "LAW")]
+    #[arg(long, value_name = "LAW", help = laws("The law fitted to every sample: {} [default: neo-hookean]"))]
     law: Option<MetaModel>,
 }
 

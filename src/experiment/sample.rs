@@ -55,6 +55,8 @@ impl TissueSample {
                         }
                     }
                 }
+                // Only numbers are parameters; no law of the prior has a word.
+                (_, serde_json::Value::String(_)) => {}
                 (name, value) => {
                     law.parameters.insert(name.to_owned(), value.as_f64().unwrap_or_default());
                 }

@@ -34,8 +34,8 @@ impl Stuck {
 }
 
 /// Why an energy is not finite.
-pub(super) const INSIDE_OUT: &str =
-    "the deformation turns an element inside out, where a law without `inversion_threshold` has no energy";
+pub(super) const INSIDE_OUT: &str = "the deformation turns an element inside out, where a law without \
+    `inversion_threshold` has no energy, or stretches it beyond what its law has an energy for";
 
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;

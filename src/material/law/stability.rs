@@ -42,6 +42,16 @@ impl Stability {
         Self { energy_grows: range, convex: range, true_stress_rises: range }
     }
 
+    /// What does not even hold in the window, in words.
+    pub fn broken(&self) -> Vec<&'static str> {
+        let statements = [
+            (self.energy_grows, "the energy does not grow away from rest"),
+            (self.convex, "nominal stress does not rise with stretch"),
+            (self.true_stress_rises, "true stress does not rise with stretch"),
+        ];
+        statements.into_iter().filter(|(range, _)| *range == StabilityRange::Nowhere).map(|(_, words)| words).collect()
+    }
+
     /// Whether all three hold at every stretch.
     pub fn everywhere(&self) -> bool {
         [self.energy_grows, self.convex, self.true_stress_rises].iter().all(|r| *r == StabilityRange::Everywhere)
