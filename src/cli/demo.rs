@@ -29,7 +29,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     write_whole(&pre, PRE)?;
     write_whole(&post, POST)?;
     // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
-    let mesh = MeshOptions { mesher: Some(Engine::Lattice), cells: Some(CELLS), ..MeshOptions::default() };
+    let mesh = MeshOptions { mesher: Some(Engine::LATTICE), cells: Some(CELLS), ..MeshOptions::default() };
     let analysis = AnalysisOptions { tissues: Some(1), ..AnalysisOptions::default() };
     let settings = run::settings(&analysis, &mesh, session)?;
     let place = session.place(&args.output.join("pair"));

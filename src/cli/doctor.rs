@@ -1,7 +1,7 @@
 //! `hgm doctor`: what is installed, what is missing, the command that installs it.
 
 use super::{Failure, Session};
-use crate::workflow::{KNOWN, Known};
+use crate::workflow::{Known, known};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -22,12 +22,12 @@ struct Finding {
 }
 
 pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
-    let finding = |known: &Known| {
+    let finding = |known: Known| {
         let location = session.programs.find(known.name).map(|path| path.display().to_string());
-        let Known { name: what, used_for, install, .. } = *known;
+        let Known { name: what, used_for, install, .. } = known;
         Finding { what, used_for, found: location.is_some(), location, install }
     };
-    let findings: Vec<Finding> = KNOWN.iter().map(finding).collect();
+    let findings: Vec<Finding> = known().map(finding).collect();
     let mut text = String::from("Needed: nothing beyond this program. Optional:\n");
     for f in &findings {
         let state = f.location.clone().unwrap_or_else(|| format!("missing; install: {}", f.install));

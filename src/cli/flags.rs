@@ -85,10 +85,16 @@ fn wall_edge(text: &str) -> Result<WallEdge, String> {
     read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
 }
 
+/// A help text with the names of the laws that can be fitted in place of `{}`.
+pub fn laws(help: &str) -> String {
+    let names = MetaModel::names();
+    let (last, others) = names.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
+    help.replace("{}", &format!("{} or {last}", others.join(", ")))
+}
+
 fn engine(name: &str) -> Result<Engine, String> {
-    serde_json::from_value(name.into()).map_err(|_| {
-        format!("no engine `{name}`: say cgal, lattice, gmsh or tetgen (`hgm doctor` tells which are installed)")
-    })
+    Engine::named(name)
+        .ok_or_else(|| format!("no engine `{name}`: say {} (`hgm doctor` tells which are installed)", Engine::names()))
 }
 
 /// The prior.
@@ -97,8 +103,7 @@ pub struct PriorOptions {
     /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
     #[arg(long, value_name = "KIND")]
     study: Option<StudyKind>,
-    /// The law fitted to every sample: neo-hookean, mooney-rivlin, ogden or ogden-high [default: neo-hookean]
-    #[arg(long, value_name = "LAW")]
+    #[arg(long, value_name = "LAW", help = laws("The law fitted to every sample: {} [default: neo-hookean]"))]
     law: Option<MetaModel>,
 }
 
@@ -204,9 +209,9 @@ mod tests {
             "[mesh]\nengine = \"gmsh\"\n[mesh.size]\nedge_mm = 3.0\n[prior]\npublished = true\n".parse().unwrap();
         let mut flags = Flags::default();
         MeshOptions { cells: Some(8000), ..MeshOptions::default() }.over(&mut flags);
-        PriorOptions { law: Some(MetaModel::Ogden), study: None }.over(&mut flags);
+        PriorOptions { law: Some(MetaModel::OGDEN), study: None }.over(&mut flags);
         let settings = Settings::resolve([&file, &flags.0]).unwrap();
-        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::Gmsh, MeshSize::Cells(8000)));
-        assert!(settings.prior.published && settings.prior.law == MetaModel::Ogden);
+        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::GMSH, MeshSize::Cells(8000)));
+        assert!(settings.prior.published && settings.prior.law == MetaModel::OGDEN);
     }
 }

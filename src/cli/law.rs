@@ -1,6 +1,6 @@
 //! `hgm law fit`: simple stable laws for a laboratory's test or a literature model.
 
-use super::flags::Flags;
+use super::flags::{Flags, laws};
 use super::gp::StudyOptions;
 use super::{Failure, Reject, Session};
 use crate::material::law::Material;
@@ -44,8 +44,7 @@ struct FitArgs {
     /// A literature model by id instead
     #[arg(long, value_name = "ID")]
     literature: Option<u32>,
-    /// Laws, with commas between: neo-hookean, mooney-rivlin, ogden, ogden-high [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "NAME")]
+    #[arg(long, value_delimiter = ',', value_name = "NAME", help = laws("Laws, with commas between: {} [default: all]"))]
     law: Vec<MetaModel>,
     /// Poisson's ratio of the material tables in the result
     #[arg(long, default_value_t = 0.45, value_name = "NU")]
@@ -76,7 +75,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::Rejected(anyhow!("--poisson-ratio is {nu}: it must be at least 0 and below 0.5")));
     }
     let (name, test) = points(args)?;
-    let laws = if args.law.is_empty() { MetaModel::ALL.to_vec() } else { args.law.clone() };
+    let laws = if args.law.is_empty() { MetaModel::all().collect() } else { args.law.clone() };
     let mut fitted = Vec::new();
     for law in laws {
         let fit = fit_rheometry(law, &test, &settings).with_context(|| name.clone()).reject()?;

@@ -3,6 +3,8 @@
 //! Lengths in mm, moduli in Pa, areas in mm2, volumes in cc. A figure that could not be computed is absent, never NaN
 //! (JSON has none). Maps are ordered by name, samples in order of their grid: the same experiment gives the same bytes.
 
+pub use super::law_outcome::LawOutcome;
+
 use super::estimate::EstimateOutcome;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -106,16 +108,6 @@ pub struct SampleOutcome {
     /// The sample's mesh file, relative to the case directory: `sim/sample-05.vtu`.
     #[serde(default)]
     pub file: Option<String>,
-}
-
-/// A law and its parameters, as a scenario writes them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LawOutcome {
-    /// `neo-hookean`, `mooney-rivlin`, `ogden`.
-    pub law: String,
-    /// Parameters by name, units in the names.
-    pub parameters: BTreeMap<String, f64>,
 }
 
 /// Errors of the measurement itself, mm, each where it is known.

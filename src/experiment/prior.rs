@@ -23,7 +23,7 @@ pub struct PriorSettings {
 
 impl Default for PriorSettings {
     fn default() -> Self {
-        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NeoHookean }
+        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NEO_HOOKEAN }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The materials a sweep tries: one law per tissue, drawn from the prior at stated levels.
 
-use super::outcome::LawOutcome;
+use super::law_outcome::LawOutcome;
 use crate::material::Task;
 use crate::material::law::Material;
 use crate::segment::label;
@@ -55,6 +55,8 @@ impl TissueSample {
                         }
                     }
                 }
+                // Only numbers are parameters; no law of the prior has a word.
+                (_, serde_json::Value::String(_)) => {}
                 (name, value) => {
                     law.parameters.insert(name.to_owned(), value.as_f64().unwrap_or_default());
                 }

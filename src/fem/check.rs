@@ -1,9 +1,8 @@
 //! What must hold of mesh and scenario before anything is solved.
 
 use super::FemError;
-use super::model::Materials;
 use super::order::Graph;
-use super::scenario::Scenario;
+use super::scenario::{Materials, Scenario};
 use crate::mesh::TetMesh;
 
 /// The node set of a name.

@@ -11,8 +11,10 @@ use super::body::Laws;
 use super::equilibrium::{INSIDE_OUT, largest_ratio};
 use super::linear::{self, Tangent};
 use super::mass::Mass;
-use super::model::{Materials, Model};
+use super::model::Model;
 use super::outcome::worst;
+use super::scenario::Materials;
+use super::solver;
 use super::units::METRES_PER_MM;
 use super::{ConvergenceRecord, FemError, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
 
@@ -44,7 +46,7 @@ impl Model {
         self.move_prescribed(&mut u, 1.0);
         let v = vec![[0.0; 3]; self.free_nodes()];
         let mut body = Moving { model: self, laws, mass, u, v, spare: None };
-        let mut solver = linear::for_model(self, largest_ratio(materials));
+        let mut solver = solver::for_model(self, largest_ratio(materials));
         let mut record = ConvergenceRecord::default();
         let mut motion = Motion::default();
         let h = settings.time_step_s;

@@ -8,17 +8,13 @@
 
 use super::body::Laws;
 use super::linear::{LinearReport, LinearSolver};
-use super::model::{Materials, Model};
+use super::model::Model;
 use super::outcome::worst;
-use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, linear, reduce};
+use super::scenario::Materials;
+use super::solver;
+use super::state::State;
+use super::{ConvergenceRecord, FemError, NewtonIteration, Outcome, Progress, reduce};
 use crate::material::law::Material;
-
-/// A displacement field to start from: the solution of a neighbouring problem on the same model.
-#[derive(Clone, Debug)]
-pub struct State {
-    /// Solver numbering, m.
-    pub(super) u: Vec<[f64; 3]>,
-}
 
 /// Why a load step was given up.
 enum Stuck {
@@ -38,8 +34,8 @@ impl Stuck {
 }
 
 /// Why an energy is not finite.
-pub(super) const INSIDE_OUT: &str =
-    "the deformation turns an element inside out, where a law without `inversion_threshold` has no energy";
+pub(super) const INSIDE_OUT: &str = "the deformation turns an element inside out, where a law without \
+    `inversion_threshold` has no energy, or stretches it beyond what its law has an energy for";
 
 /// Sufficient decrease of the line search.
 const ARMIJO: f64 = 1e-4;
@@ -67,7 +63,7 @@ impl Model {
     ) -> Result<(Outcome, State), FemError> {
         let laws = self.laws(materials)?;
         let mut record = ConvergenceRecord::default();
-        let mut solver = linear::for_model(self, largest_ratio(materials));
+        let mut solver = solver::for_model(self, largest_ratio(materials));
         let nodes = self.nodes_m.len();
         let mut forces = vec![[0.0; 3]; nodes];
         let load_scale = reduce::norm(&self.free_part(&self.load_n));

@@ -20,21 +20,23 @@ mod outcome;
 mod reduce;
 mod scenario;
 mod sensitivity;
+mod solver;
 mod sparse;
+mod state;
 mod stiffness;
 pub mod units;
 
 pub use element::ElementKind;
-pub use equilibrium::State;
 pub use error::FemError;
 pub use load::Load;
-pub use model::{Materials, Model};
+pub use model::Model;
 pub use outcome::{ConvergenceRecord, Frame, Motion, NewtonIteration, Outcome, Progress};
 pub use scenario::{
-    CsfLevel, DynamicsSettings, LinearMethod, Loads, MassKind, Method, PatchLoad, Prescribed, PressureLoad, Scenario,
-    ScenarioError, SolverSettings,
+    CsfLevel, DynamicsSettings, LinearMethod, Loads, MassKind, Materials, Method, PatchLoad, Prescribed, PressureLoad,
+    Scenario, ScenarioError, SolverSettings,
 };
 pub use sensitivity::By;
+pub use state::State;
 pub use stiffness::Stiffness;
 
 use crate::mesh::TetMesh;

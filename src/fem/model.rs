@@ -9,17 +9,13 @@ use super::element::{
 use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
 use super::order::{Graph, renumbered, reverse_cuthill_mckee, sorted};
-use super::scenario::{MassKind, Method, Scenario};
+use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, State};
 use crate::material::law::{Material, Parameter};
 use crate::mesh::TetMesh;
-use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
-
-/// Materials by label name.
-pub type Materials = BTreeMap<String, Material>;
 
 /// A mesh with held nodes and loads, ready to be solved with any materials.
 pub struct Model {
@@ -175,7 +171,7 @@ impl Model {
             Body::Tet4(e) | Body::Tet4Nodal(e, _) => e.partition(&row_of, &pattern),
             Body::Tet10(e) => e.partition(&row_of, &pattern),
         };
-        let mut warnings = Vec::new();
+        let mut warnings = unstable_laws(&scenario.materials);
         if scenario.solver.element == ElementKind::Tet4 {
             let stiffest = scenario.materials.values().map(Material::poisson_ratio).fold(0.0, f64::max);
             if stiffest > 0.47 {
@@ -332,4 +328,21 @@ impl Model {
         of_nodes.iter().zip(&self.number).for_each(|(v, &new)| all[new as usize] = *v);
         all
     }
+}
+
+/// A sentence for every law that is unstable where it was measured.
+fn unstable_laws(materials: &Materials) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (name, material) in materials {
+        let Some(([low, high], stability)) = material.measured() else { continue };
+        let broken = stability.broken();
+        if !broken.is_empty() {
+            warnings.push(format!(
+                "`[materials.{name}]` is not stable at the stretches it was measured at ({low} to {high}): {}; there may be \
+                 no equilibrium, or several",
+                broken.join(", ")
+            ));
+        }
+    }
+    warnings
 }

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
+/// Materials by label name.
+pub type Materials = BTreeMap<String, Material>;
+
 /// A simulation without its mesh. Lengths in mm, forces in N, moduli in Pa.
 ///
 /// ```

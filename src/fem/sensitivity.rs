@@ -5,9 +5,11 @@
 //! linear solve; one scalar of u costs one solve for all its parameters (the adjoint).
 
 use super::equilibrium::largest_ratio;
-use super::linear::{self, LinearSolver, Tangent};
+use super::linear::{LinearSolver, Tangent};
 use super::load::Load;
-use super::model::{Materials, Model};
+use super::model::Model;
+use super::scenario::Materials;
+use super::solver;
 use super::units::millimetres;
 use super::{FemError, State, reduce};
 use crate::material::law::Parameter;
@@ -33,7 +35,8 @@ pub enum By {
     AllLoads,
 }
 
-/// Relative step of differences in a parameter. Forces are linear in all moduli, so only Ogden's exponents see it.
+/// Relative step of differences in a parameter. Forces are linear in all moduli, so only other numbers of a law, such as
+/// Ogden's exponents, see it.
 const STEP: f64 = 1.0 / 512.0;
 
 /// Relative residual of the tangent solves.
@@ -110,7 +113,7 @@ impl<'a> Linearised<'a> {
         let laws = model.laws(materials)?;
         let mut forces = vec![[0.0; 3]; state.u.len()];
         let tangent = model.tangent(&state.u, &laws, &mut forces, false, None);
-        let mut solver = linear::for_model(model, largest_ratio(materials));
+        let mut solver = solver::for_model(model, largest_ratio(materials));
         solver.prepare(&tangent);
         Ok(Self { model, materials, u: &state.u, tangent, solver })
     }
@@ -179,8 +182,9 @@ impl<'a> Linearised<'a> {
                         let rate = nu * 2.0 * mu / (1.0 - 2.0 * nu).powi(2) / step;
                         f1.iter().zip(&f0).map(|(a, b)| [0, 1, 2].map(|i| rate * (a[i] - b[i]))).collect()
                     }
-                    Parameter::OgdenAlpha(_) => derivative(|e| with(1.0 + e), STEP, true)?,
-                    _ => derivative(|e| with(1.0 + e), STEP, false)?,
+                    Parameter::Stiffness | Parameter::Own(_) => {
+                        derivative(|e| with(1.0 + e), STEP, !material.linear_in(*parameter))?
+                    }
                 };
                 slope.iter_mut().flatten().for_each(|v| *v = -*v);
                 Ok(slope)

@@ -1,7 +1,8 @@
 //! Forces and stiffness of a body at a state.
 
 use super::linear::Tangent;
-use super::model::{Materials, Model};
+use super::model::Model;
+use super::scenario::Materials;
 use super::{FemError, State};
 
 /// Internal forces and tangent stiffness at a state: what a solver, an integrator or an eigenvalue iteration of one's

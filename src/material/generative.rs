@@ -38,7 +38,7 @@ impl Default for SampleSettings {
         Self {
             curves: Curves::Corrected,
             hyperparameters: Hyperparameters::published(),
-            model: MetaModel::NeoHookean,
+            model: MetaModel::NEO_HOOKEAN,
             meta_model: MetaModelSettings::default(),
             stretches: 501,
         }
@@ -204,9 +204,9 @@ mod tests {
     #[test]
     fn every_draw_is_fitted_by_a_stable_law() {
         let cases = [
-            (MetaModel::NeoHookean, 10_000, Task::HYPERELASTIC_WHITE),
-            (MetaModel::MooneyRivlin, 300, Task::HYPERELASTIC_GREY),
-            (MetaModel::Ogden, 300, Task::HYPERELASTIC_HEALTHY),
+            (MetaModel::NEO_HOOKEAN, 10_000, Task::HYPERELASTIC_WHITE),
+            (MetaModel::MOONEY_RIVLIN, 300, Task::HYPERELASTIC_GREY),
+            (MetaModel::OGDEN, 300, Task::HYPERELASTIC_HEALTHY),
         ];
         for (model, draws, task) in cases {
             let settings = SampleSettings { stretches: 101, model, ..SampleSettings::default() };

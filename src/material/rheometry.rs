@@ -230,7 +230,7 @@ mod tests {
     use super::*;
     use crate::material::task::stretches;
 
-    const LAW: (MetaModel, [f64; 2]) = (MetaModel::MooneyRivlin, [140.0, 166.5]);
+    const LAW: (MetaModel, [f64; 2]) = (MetaModel::MOONEY_RIVLIN, [140.0, 166.5]);
 
     fn table(header: &str, row: impl Fn(f64) -> (f64, f64)) -> String {
         let line = |l: f64| {

@@ -10,7 +10,7 @@ use super::task::stretches;
 use serde::Serialize;
 
 /// The laws that are compared.
-pub const COMPARED: [MetaModel; 3] = [MetaModel::NeoHookean, MetaModel::MooneyRivlin, MetaModel::Ogden];
+pub const COMPARED: [MetaModel; 3] = [MetaModel::NEO_HOOKEAN, MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN];
 
 /// A test's statistic and the probability of one as large when nothing differs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -221,11 +221,16 @@ fn displaced(file: &str, sample: &MeshWithFields) -> Result<Vec<[f64; 3]>, Repor
 /// The error of every node, NaN where the reference says nothing of it: such a node is not without error.
 fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
     let errors = sample.point_field("rmse_mm").filter(|f| f.values.len() == sample.mesh.nodes_mm().len())?;
-    // An array of zeros and ones is read as the set of the ones.
-    let Some(observed) = sample.mesh.node_sets.get("rmse_observed") else { return Some(errors.values.clone()) };
     let mut seen = vec![f64::NAN; errors.values.len()];
-    for &n in observed {
-        seen[n as usize] = errors.values[n as usize];
+    // In a file from before node sets were marked, or written again by another program, the array is read as a set.
+    match (sample.point_field("rmse_observed"), sample.mesh.node_sets.get("rmse_observed")) {
+        (Some(observed), _) => {
+            for (n, _) in observed.values.iter().enumerate().filter(|(_, v)| **v == 1.0) {
+                seen[n] = errors.values[n];
+            }
+        }
+        (None, Some(observed)) => observed.iter().for_each(|&n| seen[n as usize] = errors.values[n as usize]),
+        (None, None) => return Some(errors.values.clone()),
     }
     Some(seen)
 }

@@ -41,7 +41,7 @@ pub use error::{ErrorKind, WorkflowError};
 pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
 pub use patient::Shard;
 pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
-pub use programs::{KNOWN, Known, Programs};
+pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
 pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed, RegistrationFacts, mesh_outcome};
@@ -107,7 +107,7 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(engine).map_err(refused)?;
     let law = work.settings.prior.law;
-    if goal == Goal::Estimate && law != MetaModel::NeoHookean {
+    if goal == Goal::Estimate && law != MetaModel::NEO_HOOKEAN {
         return Err(WorkflowError::EstimateLaw { law: law.name().to_owned() });
     }
     plan(work.settings, work.subject, goal).map(|_| ())

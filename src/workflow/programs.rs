@@ -1,6 +1,6 @@
 //! The programs of other people that hgm can use: looked up here and nowhere else.
 
-use crate::mesh::engine::EnginePrograms;
+use crate::mesh::engine::{Engine, EnginePrograms, Program};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -17,20 +17,14 @@ pub struct Known {
     pub variable: Option<&'static str>,
 }
 
-const CGAL: &str = "hgm-cgal-mesher";
-const GMSH: &str = "gmsh";
-const TETGEN: &str = "tetgen";
+/// Every program that hgm can use, those of the mesh engines first; it needs none of them.
+pub fn known() -> impl Iterator<Item = Known> {
+    let engines = Engine::all().filter_map(|engine| engine.mesher().program());
+    let engine = |p: &Program| Known { name: p.name, used_for: p.used_for, install: p.install, variable: p.variable };
+    engines.map(engine).chain(OTHERS)
+}
 
-/// Every program that hgm can use; it needs none of them.
-pub const KNOWN: [Known; 6] = [
-    Known {
-        name: CGAL,
-        used_for: "mesh engine `cgal` (without it: `lattice`)",
-        install: "./run engines",
-        variable: Some("HGM_CGAL_MESHER"),
-    },
-    Known { name: GMSH, used_for: "mesh engine `gmsh`", install: "sudo apt-get install gmsh", variable: None },
-    Known { name: TETGEN, used_for: "mesh engine `tetgen`", install: "sudo apt-get install tetgen", variable: None },
+const OTHERS: [Known; 3] = [
     Known {
         name: "python3",
         used_for: "renderer, cross-checks and cohorts in pipelines/",
@@ -59,12 +53,12 @@ impl Programs {
         let path = variable("PATH").unwrap_or_default();
         let beside = executable.and_then(Path::parent).map(|d| [d.to_path_buf(), d.join("../engines")]);
         let folders: Vec<PathBuf> = beside.into_iter().flatten().chain(std::env::split_paths(&path)).collect();
-        let place = |known: &Known| {
+        let place = |known: Known| {
             let named = known.variable.and_then(&variable).map(PathBuf::from);
             let places = named.into_iter().chain(folders.iter().map(|folder| folder.join(known.name)));
             places.into_iter().find(|file| file.is_file()).map(|file| (known.name, file))
         };
-        Self { found: KNOWN.iter().filter_map(place).collect() }
+        Self { found: known().filter_map(place).collect() }
     }
 
     /// Where a program is.
@@ -74,8 +68,7 @@ impl Programs {
 
     /// Those that make meshes.
     pub fn engines(&self) -> EnginePrograms {
-        let of = |name| self.find(name).map(Path::to_path_buf);
-        EnginePrograms { cgal: of(CGAL), gmsh: of(GMSH), tetgen: of(TETGEN) }
+        EnginePrograms::of(|name| self.find(name).map(Path::to_path_buf))
     }
 }
 
@@ -101,7 +94,7 @@ mod tests {
                 _ => None,
             };
             let executable = folder.path().join("release/hgm");
-            Programs::look_up(Some(&executable), variable).engines().cgal
+            Programs::look_up(Some(&executable), variable).engines().place(Engine::CGAL).map(Path::to_path_buf)
         };
         assert_eq!(look_up(None), Some(on_path));
         std::fs::create_dir_all(folder.path().join("release")).unwrap();
@@ -109,6 +102,6 @@ mod tests {
         assert_eq!(look_up(None), Some(folder.path().join("release/../engines/hgm-cgal-mesher")));
         let own = put("own/mesher");
         assert_eq!(look_up(Some(&own)), Some(own));
-        assert_eq!(Programs::look_up(None, |_| None).find(GMSH), None);
+        assert_eq!(Programs::look_up(None, |_| None).find("gmsh"), None);
     }
 }

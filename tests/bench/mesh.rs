@@ -46,14 +46,8 @@ pub fn bars() -> Vec<Bar> {
     let (map, _): (LabelMap<Native>, _) =
         decode_labels(&bytes, "template_labels.nii.gz", &ReadOptions::default()).expect("the measuring data are sound");
     let programs = hgm::workflow::Programs::look_up(None, |name| std::env::var_os(name)).engines();
-    let there = [
-        (Engine::Cgal, programs.cgal.is_some()),
-        (Engine::Lattice, true),
-        (Engine::Gmsh, programs.gmsh.is_some()),
-        (Engine::Tetgen, programs.tetgen.is_some()),
-    ];
     let mut bars = Vec::new();
-    for (engine, _) in there.into_iter().filter(|e| e.1) {
+    for engine in Engine::all().filter(|engine| programs.has(*engine)) {
         let mut areas: Vec<BTreeMap<String, f64>> = Vec::new();
         for limits in &LIMITS {
             areas.extend(column(&map, engine, &programs, limits, &mut bars));
@@ -77,7 +71,7 @@ fn column(
     bars: &mut Vec<Bar>,
 ) -> Option<BTreeMap<String, f64>> {
     // The lattice may have half as many tets again; a sixth is enough.
-    let cells = if engine == Engine::Lattice { limits.cells * 7 / 6 } else { limits.cells };
+    let cells = if engine == Engine::LATTICE { limits.cells * 7 / 6 } else { limits.cells };
     let settings =
         MeshSettings { engine, size: MeshSize::Cells(cells), split: Some(falx_sheet()), ..MeshSettings::default() };
     let start = Instant::now();

@@ -1,6 +1,7 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
 mod bids;
+mod circles;
 mod cluster;
 mod cohort;
 mod command_line;

@@ -43,13 +43,7 @@ fn assert_shape(mesh: &TetMesh, what: &str) {
 #[test]
 fn every_engine_meshes_a_ball_in_a_shell_well_and_twice_the_same() {
     let programs = programs();
-    let there = [
-        (Engine::Lattice, true),
-        (Engine::Cgal, programs.cgal.is_some()),
-        (Engine::Gmsh, programs.gmsh.is_some()),
-        (Engine::Tetgen, programs.tetgen.is_some()),
-    ];
-    for (engine, _) in there.into_iter().filter(|e| e.1) {
+    for engine in Engine::all().filter(|engine| programs.has(*engine)) {
         let map = ball_in_shell();
         let make = || mesh_labels(&map, &settings(engine, 6000), &programs).unwrap().0;
         let mesh = make();
@@ -67,15 +61,13 @@ fn every_engine_meshes_a_ball_in_a_shell_well_and_twice_the_same() {
 fn engines_that_take_too_long_are_stopped_by_name() {
     let programs = programs();
     let limits = Limits { time_s: 1e-3, ..Limits::default() };
-    for (engine, program) in [(Engine::Gmsh, &programs.gmsh), (Engine::Tetgen, &programs.tetgen)] {
-        if program.is_some() {
-            let settings = MeshSettings { limits, ..settings(engine, 3000) };
-            let error = mesh_labels(&ball_in_shell(), &settings, &programs).unwrap_err();
-            let message = error.to_string();
-            assert!(message.contains(engine.name()) && message.contains("stopped after"), "{message}");
-        }
+    for engine in [Engine::GMSH, Engine::TETGEN].into_iter().filter(|engine| programs.has(*engine)) {
+        let settings = MeshSettings { limits, ..settings(engine, 3000) };
+        let error = mesh_labels(&ball_in_shell(), &settings, &programs).unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains(engine.name()) && message.contains("stopped after"), "{message}");
     }
-    let error = mesh_labels(&ball_in_shell(), &settings(Engine::Tetgen, 3000), &EnginePrograms::default()).unwrap_err();
+    let error = mesh_labels(&ball_in_shell(), &settings(Engine::TETGEN, 3000), &EnginePrograms::default()).unwrap_err();
     assert!(matches!(&error, EngineError::Missing { engine: "tetgen", .. }), "{error}");
 }
 
@@ -104,7 +96,7 @@ fn hard_label_maps_are_meshed_within_the_bars_or_refused_by_name() {
         ("islands", islands),
     ];
     let programs = programs();
-    for engine in [Some(Engine::Lattice), programs.cgal.is_some().then_some(Engine::Cgal)].into_iter().flatten() {
+    for engine in [Engine::LATTICE, Engine::CGAL].into_iter().filter(|engine| programs.has(*engine)) {
         for (what, map) in &cases {
             let what = format!("{what} with {}", engine.name());
             match mesh_labels(map, &settings(engine, 5000), &programs) {

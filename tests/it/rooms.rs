@@ -1,5 +1,6 @@
 //! The walls of the house: which room may import which.
 
+use super::circles::code;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -54,11 +55,9 @@ fn rust_files(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
     }
 }
 
-/// The rooms that a file names through `crate::`; code below `#[cfg(test)]` may look anywhere.
+/// The rooms that a file names through `crate::`; code for tests may look anywhere.
 fn imported_rooms(text: &str) -> Vec<String> {
-    let code = text.split("#[cfg(test)]").next().unwrap_or("");
-    let lines = code.lines().map(|line| line.split("//").next().unwrap_or(""));
-    let code = lines.collect::<Vec<_>>().join("\n");
+    let code = code(text);
     let word = |s: &str| s.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
     let mut rooms = Vec::new();
     for rest in code.split("crate::").skip(1) {
@@ -109,4 +108,5 @@ fn a_forbidden_import_would_be_seen() {
         ["mesh", "fem", "cli"]
     );
     assert!(imported_rooms("// crate::cli\nlet x = 1;\n#[cfg(test)]\nmod t { use crate::cli; }").is_empty());
+    assert_eq!(imported_rooms("#[cfg(test)]\nmod t { use crate::cli; }\nuse crate::fem::Model;"), ["fem"]);
 }

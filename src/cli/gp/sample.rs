@@ -2,6 +2,7 @@
 
 use super::{HyperparameterOptions, StudyOptions, VERSION, facts};
 use crate::artefact::{Produced, Stage};
+use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
 use crate::material::Task;
 use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior, nine_levels, sample_prior};
@@ -36,8 +37,7 @@ pub struct Args {
     /// Also write the drawn curves, one column a draw
     #[arg(long, requires = "draws")]
     curves: bool,
-    /// Law fitted to each: neo-hookean, mooney-rivlin, ogden or ogden-high
-    #[arg(long, default_value = "neo-hookean")]
+    #[arg(long, default_value = "neo-hookean", help = laws("Law fitted to each: {}"))]
     law: MetaModel,
     /// Points over the task's window
     #[arg(long, default_value_t = 501, value_name = "N", value_parser = clap::value_parser!(u16).range(5..=5001))]

@@ -117,7 +117,7 @@ fn fitted(model: &LiteratureModel, studies: &Studies, settings: &SampleSettings)
     let curve = model.curve(studies.curves);
     let offset = settings.meta_model.log_offset_pa;
     let targets: Vec<f64> = curve.energies_pa.iter().map(|w| (w.max(0.0) + offset).ln()).collect();
-    let fits = MetaModel::ALL.map(|law| fit(law, &curve.stretches, &targets, &settings.meta_model));
+    let fits = MetaModel::PAPER.map(|law| fit(law, &curve.stretches, &targets, &settings.meta_model));
     let fits = fits.into_iter().collect::<Result<_, _>>()?;
     Ok(FittedCurve { name: format!("{}: {} ({})", model.id, model.study, model.citation), curve, fits })
 }

@@ -1,7 +1,7 @@
 //! Smooth displacement fields on a coarse grid.
 
-use super::Patient;
-use crate::geometry::Position;
+use super::frame::Patient;
+use crate::geometry::{Mni, Position};
 use crate::image::{Grid, Volume};
 use crate::material::random::CounterRng;
 use nalgebra::{Point3, Vector3};
@@ -102,6 +102,11 @@ pub fn random_anatomy(grid: Grid<Patient>, seed: u64, size_mm: f64) -> Field {
         }
         sum + Vector3::new(stretch[0] * p.x, stretch[1] * p.y, stretch[2] * p.z)
     })
+}
+
+/// The point of the template that looks like point `p` of the patient.
+pub fn in_template(anatomy: &Field, p: Point3<f64>) -> Position<Mni> {
+    Position::from_point(p + anatomy.at(p))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 mod enhancement;
 mod field;
 mod files;
+mod frame;
 mod head;
 mod resection;
 mod sag;
@@ -13,29 +14,23 @@ mod sag_fem;
 mod scan;
 mod settings;
 
+pub use frame::Patient;
 pub use settings::{Contrast, SagKind, SynthError, SynthSettings};
 
 use crate::experiment::smooth_noise::SmoothNoise;
-use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
+use crate::geometry::{Frame, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
 use enhancement::Enhancement;
-use field::Field;
+use field::{Field, in_template};
+use frame::centre;
 use head::{FLUID, Head};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use resection::Resection;
 use scan::{Bias, Storage};
 use serde::Serialize;
-
-/// The patient's own frame, near the template's: what both scanners' frames are poses of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patient;
-
-impl Frame for Patient {
-    const NAME: &'static str = "patient";
-}
 
 /// The scans and the truth.
 #[derive(Clone, Debug)]
@@ -95,16 +90,6 @@ pub struct Truth {
     pub largest_displacement_mm: f64,
     /// Mean displacement of brain that stays, in mm.
     pub mean_displacement_mm: f64,
-}
-
-/// The point of the template that looks like point `p` of the patient.
-fn in_template(anatomy: &Field, p: Point3<f64>) -> Position<Mni> {
-    Position::from_point(p + anatomy.at(p))
-}
-
-/// Centre of voxel number `n`.
-fn centre<F: Frame>(grid: &Grid<F>, n: usize) -> Point3<f64> {
-    grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm
 }
 
 /// Everything in the patient's frame.

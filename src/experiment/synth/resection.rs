@@ -1,8 +1,8 @@
 //! What the surgeon takes: the front of one temporal lobe.
 
-use super::field::Field;
+use super::field::{Field, in_template};
+use super::frame::{Patient, centre};
 use super::settings::{SynthError, SynthSettings};
-use super::{Patient, centre, in_template};
 use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::Position;
 use crate::image::components::{Connectivity, largest_component};

@@ -1,10 +1,10 @@
 //! How the brain moves once part of it is gone.
 
-use super::field::Field;
+use super::field::{Field, in_template};
+use super::frame::Patient;
 use super::head::Head;
 use super::resection::Resection;
 use super::settings::SynthSettings;
-use super::{Patient, in_template};
 use crate::image::Grid;
 use crate::material::random::CounterRng;
 use nalgebra::{Point3, Vector3};

@@ -3,11 +3,11 @@
 //! The mesh has its own size and the element averages the volume change over nodes, so that an estimate made with another
 //! mesh and the plain element does not meet its own discretisation errors in the truth.
 
-use super::field::Field;
+use super::field::{Field, in_template};
+use super::frame::Patient;
 use super::resection::Resection;
 use super::sag::{gravity, grid};
 use super::settings::{SynthError, SynthSettings};
-use super::{Patient, in_template};
 use crate::experiment::nodal_field::on_grid;
 use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, simulate};
 use crate::image::LabelMap;

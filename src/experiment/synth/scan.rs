@@ -1,6 +1,7 @@
 //! From a head to a scan: pose, field of view, slice profile, bias field, noise, storage.
 
-use super::{Patient, head};
+use super::frame::Patient;
+use super::head;
 use crate::geometry::{Frame, Position, RigidTransform};
 use crate::image::{Grid, Volume};
 use crate::material::random::CounterRng;

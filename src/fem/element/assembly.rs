@@ -5,8 +5,8 @@
 
 use super::super::reduce::CHUNK;
 use super::super::sparse::{BlockMatrix, BlockPattern, HELD};
-use super::Point;
 use super::kernel::{Kernel, M3, cofactors};
+use super::point::Point;
 use rayon::prelude::*;
 
 /// Elements with `K` nodes and `Q` points, ordered so that neighbours in the list share nodes in memory.

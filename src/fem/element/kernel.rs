@@ -21,13 +21,10 @@ pub(in super::super) type M3 = [[f64; 3]; 3];
 impl Kernel {
     /// A material with this lambda (Pa): its own, or 0 where its volume term is evaluated elsewhere.
     pub(in super::super) fn new(material: &Material, lambda: f64) -> Self {
-        match material {
-            Material::NeoHookean { shear_modulus_pa, compression_resistance_pa, inversion_threshold, .. }
-                if *compression_resistance_pa == 0.0 && *inversion_threshold == 0.0 =>
-            {
-                Self::NeoHookean { mu: *shear_modulus_pa, lambda }
-            }
-            _ => Self::General(material.law_with_lambda(lambda)),
+        let law = material.law_with_lambda(lambda);
+        match law.neo_hookean_moduli_pa() {
+            Some([mu, lambda]) => Self::NeoHookean { mu, lambda },
+            None => Self::General(law),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The quadratic tetrahedron with straight edges: linear gradients, four points of degree 2
 //! (Zienkiewicz and Taylor, "The Finite Element Method", vol. 1, table 5.3).
 
-use super::{Point, barycentric_gradients};
+use super::point::{Point, barycentric_gradients};
 
 /// Corner pairs of the six mid-edge nodes, in VTK order.
 pub(in super::super) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];

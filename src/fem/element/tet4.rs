@@ -1,6 +1,6 @@
 //! The linear tetrahedron: constant gradient, one point.
 
-use super::{Point, barycentric_gradients};
+use super::point::{Point, barycentric_gradients};
 
 /// The single point of every tetrahedron; nodes in m.
 pub(in super::super) fn tet4(nodes_m: &[[f64; 3]], tets: &[[u32; 4]]) -> Vec<[Point<4>; 1]> {

@@ -1,7 +1,7 @@
 //! Jacobi preconditioners: the inverse of the diagonal, entry by entry or 3 x 3 block by block.
 
-use super::Tangent;
 use super::operator::{Lanes, Real};
+use super::system::Tangent;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 

@@ -9,9 +9,9 @@
 
 use super::super::reduce::{by_rows, by_tasks};
 use super::super::sparse::{BlockMatrix, BlockPattern};
-use super::Tangent;
 use super::factor::{Factor, Symbolic};
 use super::operator::{Lanes, Real, dot};
+use super::system::Tangent;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 
 use super::super::reduce;
 use super::factor::{Factor, Symbolic};
-use super::{LinearReport, LinearSolver, Tangent};
+use super::system::{LinearReport, LinearSolver, Tangent};
 use std::sync::Arc;
 
 /// Iterations with an old factor that cost about as much as a new one.

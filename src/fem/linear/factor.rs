@@ -2,8 +2,8 @@
 
 use super::super::element::Rings;
 use super::super::sparse::BlockPattern;
-use super::Tangent;
 use super::dissection::nested_dissection;
+use super::system::Tangent;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::Perm;
 use faer::sparse::linalg::SupernodalThreshold;

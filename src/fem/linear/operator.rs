@@ -3,7 +3,7 @@
 use super::super::element::{NodalTangent, Rings};
 use super::super::reduce::by_rows;
 use super::super::sparse::BlockPattern;
-use super::Tangent;
+use super::system::Tangent;
 use std::sync::Arc;
 
 /// Arithmetic of an iteration.

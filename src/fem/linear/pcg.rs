@@ -6,7 +6,7 @@ use super::super::reduce::{self, by_row_pairs};
 use super::block_jacobi::BlockJacobi;
 use super::coarse::{Coarse, Rows};
 use super::operator::{Lanes, Operator, Real, dot};
-use super::{LinearReport, LinearSolver, Tangent};
+use super::system::{LinearReport, LinearSolver, Tangent};
 
 /// Conjugate gradients with a Jacobi or block-Jacobi preconditioner.
 pub(in super::super) struct Pcg {

@@ -1,6 +1,6 @@
 //! Why a NIfTI file is refused: always the file, the field and the remedy.
 
-use super::orientation::Orientation;
+use super::which::Orientation;
 use thiserror::Error;
 
 /// A refused file.

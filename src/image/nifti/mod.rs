@@ -9,10 +9,11 @@ mod error;
 mod gzip;
 mod header;
 mod orientation;
+mod which;
 
 pub use encode::{encode_f32, encode_i16, encode_mask, encode_u8, encode_vectors};
 pub use error::{NiftiError, NiftiProblem};
-pub use orientation::Orientation;
+pub use which::Orientation;
 
 use super::volume::{LabelMap, Mask, Volume};
 use crate::geometry::Native;

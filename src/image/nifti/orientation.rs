@@ -2,29 +2,10 @@
 
 use super::error::NiftiProblem;
 use super::header::Header;
+use super::which::Orientation;
 use crate::geometry::Native;
 use crate::image::Grid;
 use nalgebra::{Matrix3, Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
-
-/// One of the two affines a NIfTI header can hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Orientation {
-    /// The rows `srow_x`, `srow_y`, `srow_z`.
-    Sform,
-    /// The quaternion, the offset and `pixdim`.
-    Qform,
-}
-
-impl std::fmt::Display for Orientation {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Sform => "sform",
-            Self::Qform => "qform",
-        })
-    }
-}
 
 /// Differences below this come from storing the header in 32 bits.
 const ROUNDING_MM: f64 = 0.01;

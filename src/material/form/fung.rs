@@ -1,7 +1,8 @@
 //! Exponential forms: Demiray's, and the Fung variant of Mihai et al.
 
 use super::invariant::{first, first_uniaxial, isochoric};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = mu / (2 b) (exp(b (I1 - 3)) - 1). Demiray, J Biomech 5, 1972; fitted to brain by Budday et al. 2017.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,8 @@
 //! Gent's form of limited extensibility.
 
 use super::invariant::{first, first_uniaxial, isochoric};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = -(mu Jm / 2) ln(1 - (I1 - 3) / Jm). Gent, Rubber Chem Technol 69, 1996. Only where I1 - 3 < Jm: beyond, the
 /// energy is not a number. Mihai et al. 2015 report beta = 1 / Jm.

@@ -1,6 +1,6 @@
 //! The invariants that isochoric energies are written in, shifted to vanish at rest.
 
-use super::Number;
+use super::number::Number;
 
 /// I1 - 3 = l^2 + 2/l - 3 on the uniaxial isochoric path, as (l - 1)^2 (l + 2) / l: no cancellation near rest.
 pub fn first_uniaxial<N: Number>(stretch: N) -> N {

@@ -1,7 +1,8 @@
 //! Three-term Mooney-Rivlin form of Laksari et al. 2012, and the curve the published program made of it.
 
 use super::invariant::{first, first_uniaxial, isochoric, second, second_uniaxial};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::{StretchEnergy, of_volume};
 
 /// Psi = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3) + K / a^2 (a ln J + J^-a - 1) with isochoric invariants
 /// (Laksari, Shafieian and Darvish, J Biomech 45, 2012, with the volumetric term of Ogden). The volumetric term is
@@ -44,8 +45,11 @@ impl StretchEnergy for Laksari {
         2.0 * (self.c10_pa + self.c01_pa)
     }
 
-    fn carries_its_own_volume_term(&self) -> bool {
-        true
+    /// In place of its own volume term, whose published K is that of no tissue.
+    fn energy_with_lambda_pa<N: Number>(&self, stretches: [N; 3], lame_lambda_pa: f64) -> N {
+        let (iso, _) = isochoric(stretches);
+        let volumetric = of_volume(stretches, lame_lambda_pa, self.small_strain_shear_modulus_pa());
+        self.of_invariants(first(iso), second(iso)) + volumetric
     }
 }
 

@@ -1,6 +1,7 @@
 //! Small-strain Hooke law on Biot strains.
 
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = mu sum e_i^2 + (La/2) (sum e_i)^2 with e_i = l_i - 1 (rotation removed), mu = E / (2 (1 + nu)),
 /// La = E nu / ((1 + nu)(1 - 2 nu)). Form of the linear and elastography studies; on the isochoric path the trace is
@@ -28,16 +29,21 @@ impl StretchEnergy for Linear {
 
     fn energy_pa<N: Number>(&self, stretches: [N; 3]) -> N {
         let (mu, lambda) = self.lame_pa();
-        let [a, b, c] = stretches.map(|l| l - 1.0);
-        let trace = a + b + c;
-        (a * a + b * b + c * c) * mu + trace * trace * (0.5 * lambda)
+        hooke(stretches, mu, lambda)
     }
 
     fn small_strain_shear_modulus_pa(&self) -> f64 {
         self.lame_pa().0
     }
 
-    fn carries_its_own_volume_term(&self) -> bool {
-        true
+    /// mu stays, lambda is the one given.
+    fn energy_with_lambda_pa<N: Number>(&self, stretches: [N; 3], lame_lambda_pa: f64) -> N {
+        hooke(stretches, self.lame_pa().0, lame_lambda_pa)
     }
+}
+
+fn hooke<N: Number>(stretches: [N; 3], mu: f64, lambda: f64) -> N {
+    let [a, b, c] = stretches.map(|l| l - 1.0);
+    let trace = a + b + c;
+    (a * a + b * b + c * c) * mu + trace * trace * (0.5 * lambda)
 }

@@ -1,7 +1,8 @@
 //! Two-term Mooney-Rivlin form.
 
 use super::invariant::{first, first_uniaxial, isochoric, second, second_uniaxial};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = c1 (I1 - 3) + c2 (I2 - 3). Mooney, J Appl Phys 11, 1940; Rivlin 1948. Defined for every stretch. Mihai et
 /// al. 2015 report C/2 = c; Budday et al. 2017 report mu and c2 with c1 = mu/2 - c2.

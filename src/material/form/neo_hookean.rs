@@ -1,7 +1,8 @@
 //! Incompressible neo-Hookean form.
 
 use super::invariant::{first, first_uniaxial, isochoric};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = mu/2 (I1 - 3). Rivlin, Phil Trans R Soc A 240, 1948. Defined for every stretch; stable for mu > 0.
 #[derive(Clone, Copy, Debug, PartialEq)]

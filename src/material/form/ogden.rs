@@ -1,7 +1,8 @@
 //! Ogden forms in the two conventions of the brain literature.
 
 use super::invariant::{isochoric, ogden_uniaxial, power_sum};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = sum_p mu_p / (2 a_p) (sum_i l_i^(2 a_p) - 3), the convention of Mihai et al. 2015 and 2017: a = 1 is
 /// neo-Hookean mu/2 (I1 - 3), a = -1 is -mu/2 (I2 - 3). Large coefficients of opposite sign: trust it in its window only.

@@ -1,9 +1,14 @@
 //! Forms from a table's words: a form name and parameters such as `mu_pa=-3543|-2723; alpha=1|-1`.
 
-use super::{
-    Demiray, Form, FungMihai, Gent, Laksari, LaksariAsCoded, Linear, MooneyRivlin, NeoHookean, OgdenMihai,
-    OgdenModified, ReducedPolynomial,
-};
+use super::any::Form;
+use super::fung::{Demiray, FungMihai};
+use super::gent::Gent;
+use super::laksari::{Laksari, LaksariAsCoded};
+use super::linear::Linear;
+use super::mooney_rivlin::MooneyRivlin;
+use super::neo_hookean::NeoHookean;
+use super::ogden::{OgdenMihai, OgdenModified};
+use super::reduced_polynomial::ReducedPolynomial;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -124,10 +129,11 @@ impl Form {
     /// # Errors
     /// [`FormError`] names the word and what would be right.
     pub fn parse(name: &str, parameters: &str) -> Result<Self, FormError> {
-        let Some((_, wanted)) = FORM_NAMES.iter().find(|(known, _)| *known == name) else {
+        let unknown = || {
             let known = FORM_NAMES.map(|(known, _)| known).join(", ");
-            return Err(FormError::UnknownForm { name: name.to_owned(), known });
+            FormError::UnknownForm { name: name.to_owned(), known }
         };
+        let (_, wanted) = FORM_NAMES.iter().find(|(known, _)| *known == name).ok_or_else(unknown)?;
         let found = parse_parameters(parameters)?;
         if let Some(extra) = found.keys().find(|key| !wanted.contains(&key.as_str())) {
             return Err(FormError::UnknownParameter {
@@ -197,7 +203,8 @@ impl Form {
                 Self::ReducedPolynomial(ReducedPolynomial { c10_pa: one("c10_pa")?, c30_pa: one("c30_pa")? })
             }
             "laksari" => Self::Laksari(laksari()?),
-            _ => Self::LaksariAsCoded(LaksariAsCoded(laksari()?)),
+            "laksari-as-coded" => Self::LaksariAsCoded(LaksariAsCoded(laksari()?)),
+            _ => return Err(unknown()),
         })
     }
 }

@@ -1,7 +1,8 @@
 //! Reduced polynomial (Yeoh without its quadratic term).
 
 use super::invariant::{first, first_uniaxial, isochoric};
-use super::{Number, StretchEnergy};
+use super::number::Number;
+use super::stretch_energy::StretchEnergy;
 
 /// Psi = c10 (I1 - 3) + c30 (I1 - 3)^3. Yeoh, Rubber Chem Technol 63, 1990; fitted in vivo by Schiavone et al. 2009.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Added resistance against compression, around any law.
 
+use super::hyperelastic::{Hyperelastic, Tangent};
 use super::volume::{OfVolume, add_tangent_of_volume, cofactors, volume_change};
-use super::{Hyperelastic, Tangent};
 use nalgebra::Matrix3;
 
 /// Psi = Psi_inner - k/12 (J - 1)^3 for J < 1 and Psi_inner above: stiffer the more an element is squeezed, nothing
@@ -43,24 +43,6 @@ impl<L: Hyperelastic> Hyperelastic for CompressionResistance<L> {
 
     fn small_strain_shear_modulus_pa(&self) -> f64 {
         self.inner.small_strain_shear_modulus_pa()
-    }
-}
-
-impl Hyperelastic for Box<dyn Hyperelastic> {
-    fn energy_density_pa(&self, h: &Matrix3<f64>) -> f64 {
-        self.as_ref().energy_density_pa(h)
-    }
-
-    fn first_piola_kirchhoff_pa(&self, h: &Matrix3<f64>) -> Matrix3<f64> {
-        self.as_ref().first_piola_kirchhoff_pa(h)
-    }
-
-    fn tangent_pa(&self, h: &Matrix3<f64>) -> Tangent {
-        self.as_ref().tangent_pa(h)
-    }
-
-    fn small_strain_shear_modulus_pa(&self) -> f64 {
-        self.as_ref().small_strain_shear_modulus_pa()
     }
 }
 

@@ -1,13 +1,162 @@
 //! Compressible Ogden law of any number of terms, in principal stretches.
 
+use super::curve::{Data, Search, Slope, Start, UniaxialCurve};
+use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::hyperelastic::{Hyperelastic, Tangent};
+use super::stability::{Stability, StabilityRange};
 use super::volume::{OfVolume, VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
-use super::{Hyperelastic, Tangent};
+use crate::material::form::ogden_uniaxial;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
-use serde::{Deserialize, Serialize};
+
+/// The law for files, fits and sensitivities.
+pub struct Definition;
+
+impl Law for Definition {
+    fn card(&self) -> &'static Card {
+        &Card {
+            name: "ogden",
+            formula: "sum mu/alpha (l1^alpha + l2^alpha + l3^alpha - 3) - (sum mu) ln J + lambda/2 ln^2 J",
+            source: "Ogden, Proc. R. Soc. A 328, 1972; Holzapfel, Nonlinear Solid Mechanics, 2000, eq. 6.137",
+            parameters: &[
+                LawParameter {
+                    name: "alpha",
+                    meaning: "exponent of the term",
+                    role: Role::Shape,
+                    range: Range::NOT_ZERO,
+                    default: None,
+                },
+                LawParameter {
+                    name: "mu_pa",
+                    meaning: "mu of the term, Pa; mu alpha > 0 for a stable term",
+                    role: Role::Modulus,
+                    range: Range::ANY,
+                    default: None,
+                },
+            ],
+            of_terms: true,
+            shear_modulus: "half the sum of `mu_pa` times `alpha`",
+            continued: true,
+        }
+    }
+
+    fn shear_modulus_pa(&self, values: &[f64]) -> f64 {
+        terms(values).iter().map(|t| 0.5 * t.mu_pa * t.alpha).sum()
+    }
+
+    fn solid(&self, values: &[f64], volume: Volume) -> Box<dyn Hyperelastic> {
+        let Volume { lame_lambda_pa, inversion_threshold } = volume;
+        Box::new(Ogden { terms: terms(values), lame_lambda_pa, inversion_threshold })
+    }
+
+    fn curves(&self) -> &'static [&'static dyn UniaxialCurve] {
+        &[&UP_TO_5, &UP_TO_50]
+    }
+
+    fn measured(&self, _values: &[f64]) -> Option<([f64; 2], Stability)> {
+        None
+    }
+
+    fn examples(&self) -> Vec<Values> {
+        vec![vec![-4.0, -500.0], vec![-4.7, -300.0, 2.0, 200.0]]
+    }
+}
+
+fn terms(values: &[f64]) -> Vec<OgdenTerm> {
+    values.as_chunks().0.iter().map(|&[alpha, mu_pa]| OgdenTerm { alpha, mu_pa }).collect()
+}
+
+/// One term, fitted with exponents up to a limit.
+pub struct OneTerm {
+    name: &'static str,
+    limit: f64,
+    /// The published program tried these one after the other.
+    published_limits: &'static [f64],
+}
+
+/// |alpha| <= 5.
+pub const UP_TO_5: OneTerm = OneTerm { name: "ogden", limit: 5.0, published_limits: &[5.0] };
+/// |alpha| <= 50.
+pub const UP_TO_50: OneTerm = OneTerm { name: "ogden-high", limit: 50.0, published_limits: &[5.0, 10.0, 20.0, 50.0] };
+
+/// W = mu/alpha S(l, alpha) with S = l^alpha + 2 l^(-alpha/2) - 3.
+/// W'' = mu l^(-alpha/2 - 2) ((alpha - 1) l^(3 alpha/2) + alpha/2 + 1): convex at every stretch for mu > 0 with
+/// alpha >= 1 and for mu < 0 with alpha <= -2; the other two statements hold if and only if mu alpha > 0.
+impl UniaxialCurve for OneTerm {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn parameters(&self) -> &'static [&'static str] {
+        &["mu_pa", "alpha"]
+    }
+
+    fn energy_pa(&self, parameters: &[f64], stretch: f64) -> f64 {
+        parameters[0] / parameters[1] * ogden_uniaxial(stretch, parameters[1])
+    }
+
+    fn energy_slope_pa(&self, parameters: &[f64], stretch: f64) -> Slope {
+        let (mu, alpha) = (parameters[0], parameters[1]);
+        let sum = ogden_uniaxial(stretch, alpha);
+        let ln_l = stretch.ln();
+        let bend = ln_l * ((alpha * ln_l).exp() - (-0.5 * alpha * ln_l).exp());
+        [sum / alpha, mu / alpha * (bend - sum / alpha), 0.0]
+    }
+
+    fn stress_pa(&self, parameters: &[f64], l: f64) -> f64 {
+        let (mu, alpha) = (parameters[0], parameters[1]);
+        mu * (l.powf(alpha - 1.0) - l.powf(-0.5 * alpha - 1.0))
+    }
+
+    fn stress_slope_pa(&self, parameters: &[f64], l: f64) -> Slope {
+        let (mu, alpha) = (parameters[0], parameters[1]);
+        let (up, down) = (l.powf(alpha - 1.0), l.powf(-0.5 * alpha - 1.0));
+        [up - down, mu * l.ln() * (up + 0.5 * down), 0.0]
+    }
+
+    fn starts(&self, search: Search, data: &Data) -> Vec<Start> {
+        const INF: f64 = f64::INFINITY;
+        let mut starts = Vec::new();
+        match search {
+            Search::Published => {
+                let up = |limit: &f64| Start::new(&[1000.0, 0.1], &[0.1, 0.1], &[INF, *limit]);
+                let down = |limit: &f64| Start::new(&[-1000.0, -2.1], &[-INF, -limit], &[-0.1, -2.1]);
+                starts.extend(self.published_limits.iter().map(up));
+                starts.extend(self.published_limits.iter().map(down));
+            }
+            Search::Exact => {
+                let (modulus, limit) = (data.modulus_pa, self.limit);
+                // Convex at every stretch: mu > 0 with alpha >= 1, or mu < 0 with alpha <= -2. Two starts a branch,
+                // since the cost may have a valley at small and another at large exponents.
+                for share in [0.1, 0.6] {
+                    let (up, down) = (1.0 + share * (limit - 1.0), -2.0 - share * (limit - 2.0));
+                    starts.push(Start::new(&[2.0 * modulus / up, up], &[0.0, 1.0], &[INF, limit]));
+                    starts.push(Start::new(&[2.0 * modulus / down, down], &[-INF, -limit], &[0.0, -2.0]));
+                }
+            }
+        }
+        starts
+    }
+
+    fn stability(&self, parameters: &[f64], window: [f64; 2]) -> Stability {
+        let (mu, alpha) = (parameters[0], parameters[1]);
+        let sign = StabilityRange::of(mu * alpha > 0.0, false);
+        let everywhere = (mu > 0.0 && alpha >= 1.0) || (mu < 0.0 && alpha <= -2.0);
+        // Linear in z = l^(3 alpha / 2), so its sign at both ends decides.
+        let bend = |l: f64| mu * ((alpha - 1.0) * l.powf(1.5 * alpha) + 0.5 * alpha + 1.0) > 0.0;
+        Stability {
+            energy_grows: sign,
+            convex: StabilityRange::of(everywhere, window.into_iter().all(bend)),
+            true_stress_rises: sign,
+        }
+    }
+
+    fn values(&self, parameters: &[f64]) -> Vec<f64> {
+        vec![parameters[1], parameters[0]]
+    }
+}
 
 /// One term mu/alpha (l1^alpha + l2^alpha + l3^alpha - 3).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OgdenTerm {
     /// Exponent, not 0.
     pub alpha: f64,

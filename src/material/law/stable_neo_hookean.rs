@@ -1,8 +1,54 @@
 //! Stable neo-Hookean law.
 
+use super::curve::UniaxialCurve;
+use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::hyperelastic::{Hyperelastic, Tangent};
+use super::stability::Stability;
 use super::volume::{OfVolume, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
-use super::{Hyperelastic, Tangent};
 use nalgebra::Matrix3;
+
+/// The law for files and sensitivities. It is not fitted: a fitted neo-Hookean modulus is its modulus.
+pub struct Definition;
+
+impl Law for Definition {
+    fn card(&self) -> &'static Card {
+        &Card {
+            name: "stable-neo-hookean",
+            formula: "mu/2 (I1 - 3) - mu/2 ln((I1 + 1)/4) - 3 mu/4 (J - 1) + lambda/2 (J - 1)^2, mu and lambda the paper's",
+            source: "Smith, de Goes and Kim, Stable neo-Hookean flesh simulation, ACM TOG 37, 2018, eq. 14",
+            parameters: &[LawParameter {
+                name: "shear_modulus_pa",
+                meaning: "shear modulus of small strains, Pa",
+                role: Role::Modulus,
+                range: Range::POSITIVE,
+                default: None,
+            }],
+            of_terms: false,
+            shear_modulus: "`shear_modulus_pa`",
+            continued: false,
+        }
+    }
+
+    fn shear_modulus_pa(&self, values: &[f64]) -> f64 {
+        values[0]
+    }
+
+    fn solid(&self, values: &[f64], volume: Volume) -> Box<dyn Hyperelastic> {
+        Box::new(StableNeoHookean { shear_modulus_pa: values[0], lame_lambda_pa: volume.lame_lambda_pa })
+    }
+
+    fn curves(&self) -> &'static [&'static dyn UniaxialCurve] {
+        &[]
+    }
+
+    fn measured(&self, _values: &[f64]) -> Option<([f64; 2], Stability)> {
+        None
+    }
+
+    fn examples(&self) -> Vec<Values> {
+        vec![vec![1000.0], vec![333.28]]
+    }
+}
 
 /// Psi = mu/2 (I1 - 3) - mu/2 ln((I1 + 1)/4) - 3 mu/4 (J - 1) + lambda/2 (J - 1)^2: finite for every F, at rest only in
 /// rotations (Smith, de Goes and Kim, "Stable neo-Hookean flesh simulation", ACM TOG 2018, eq. 14, expanded so that

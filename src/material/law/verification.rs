@@ -1,7 +1,7 @@
 //! Stresses tabulated by hand and by other codes: mu = 1000 Pa, nu = .45; Mooney-Rivlin C1 = 300, C2 = 200 Pa; Ogden
 //! alpha = -4, mu1 = -500 Pa.
 
-use super::{Hyperelastic, MooneyRivlin, NeoHookean, Ogden, OgdenTerm};
+use super::{Hyperelastic, LAWS, Material, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, check_hyperelastic_within};
 use nalgebra::{Matrix3, Vector3};
 
 fn laws() -> [(&'static str, Box<dyn Hyperelastic>); 3] {
@@ -72,6 +72,20 @@ fn bars_with_free_sides_stretch_as_tabulated() {
             assert!((low - lateral).abs() < 1e-9, "{name} at {stretch}: {low} against {lateral}");
             let found = law.first_piola_kirchhoff_pa(&diagonal(stretch, low, low))[(0, 0)];
             assert!((found - stress).abs() < 1e-8 * stress.abs().max(1000.0), "{name}: {found} against {stress}");
+        }
+    }
+}
+
+#[test]
+fn every_law_of_the_list_obeys_the_laws_of_hyperelasticity() {
+    for law in LAWS {
+        assert!(!law.examples().is_empty(), "{law:?} has no numbers to be tested with");
+        for values in law.examples() {
+            let material = Material::new(law, values, 0.45);
+            assert_eq!(material.check(), Ok(()), "{material:?}");
+            // Half of what a law was measured at, the battery's own stretches being up to 1.2.
+            let size = material.measured().map_or(1.0, |([low, high], _)| (1.0 - low).max(high - 1.0) / 0.4);
+            check_hyperelastic_within(&material.law(), size.min(1.0));
         }
     }
 }

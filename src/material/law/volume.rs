@@ -1,6 +1,6 @@
 //! What every law needs of the volume ratio J = det F: its cofactors, and functions of J with two derivatives.
 
-use super::Tangent;
+use super::hyperelastic::Tangent;
 use nalgebra::Matrix3;
 
 /// det(I + H) - 1 without the cancellation of forming F.

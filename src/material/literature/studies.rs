@@ -5,7 +5,7 @@
 //! (`100`, or `50+50` when tension has its own parameters), `confidence`, `note`, `published_form` and
 //! `published_parameters` may be left out. Moduli are in Pa, stretches and the rest without unit.
 
-use super::{Branches, LiteratureModel, Points};
+use super::model::{Branches, Curves, LiteratureModel, Points};
 use crate::material::csv::{self, CsvError, Row};
 use crate::material::form::{Form, FormError};
 use crate::material::task::{Task, TaskError, stretches};
@@ -238,7 +238,6 @@ fn read_points(cell: &str, split: bool) -> Result<Points, Refusal> {
 const NEGATIVE_ROUNDING: f64 = 1e-9;
 
 fn check_energy(model: &LiteratureModel) -> Result<(), Refusal> {
-    use super::Curves;
     let [low, high] = model.stretch_window;
     // Besides the grid, a finer one: a pole or a negative stretch between two points is a bad model all the same.
     let fine = stretches(low, high, 401);

@@ -1,104 +1,118 @@
-//! The meta-models' curves and their derivatives in the parameters.
+//! The meta-models there are: the curves of the laws, in the order of the list of laws.
 
-use crate::material::form::{first_uniaxial, ogden_uniaxial, second_uniaxial};
-use serde::{Deserialize, Serialize};
+use crate::material::law::{LAWS, Law, Material, Slope, Stability, UniaxialCurve, mooney_rivlin, neo_hookean, ogden};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::cmp::Ordering;
 
 /// A law to fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MetaModel {
-    /// mu.
-    NeoHookean,
-    /// c1, c2.
-    MooneyRivlin,
-    /// mu, alpha with |alpha| <= 5.
-    Ogden,
-    /// mu, alpha with |alpha| <= 50.
-    OgdenHigh,
+#[derive(Clone, Copy)]
+pub struct MetaModel {
+    law: &'static dyn Law,
+    curve: &'static dyn UniaxialCurve,
 }
 
 impl MetaModel {
-    /// All meta-models, in the paper's order.
-    pub const ALL: [Self; 4] = [Self::NeoHookean, Self::MooneyRivlin, Self::Ogden, Self::OgdenHigh];
+    /// mu.
+    pub const NEO_HOOKEAN: Self = Self { law: &neo_hookean::Definition, curve: &neo_hookean::Definition };
+    /// c1, c2.
+    pub const MOONEY_RIVLIN: Self = Self { law: &mooney_rivlin::Definition, curve: &mooney_rivlin::Definition };
+    /// mu, alpha with |alpha| <= 5.
+    pub const OGDEN: Self = Self { law: &ogden::Definition, curve: &ogden::UP_TO_5 };
+    /// mu, alpha with |alpha| <= 50.
+    pub const OGDEN_HIGH: Self = Self { law: &ogden::Definition, curve: &ogden::UP_TO_50 };
+
+    /// The paper's four, in its order.
+    pub const PAPER: [Self; 4] = [Self::NEO_HOOKEAN, Self::MOONEY_RIVLIN, Self::OGDEN, Self::OGDEN_HIGH];
+
+    /// The meta-models of all laws.
+    pub fn all() -> impl Iterator<Item = Self> {
+        LAWS.into_iter().flat_map(|law| law.curves().iter().map(move |curve| Self { law, curve: *curve }))
+    }
+
+    /// The words of all meta-models in files and on the command line.
+    pub fn names() -> Vec<&'static str> {
+        Self::all().map(Self::name).collect()
+    }
 
     /// The word in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::NeoHookean => "neo-hookean",
-            Self::MooneyRivlin => "mooney-rivlin",
-            Self::Ogden => "ogden",
-            Self::OgdenHigh => "ogden-high",
-        }
+        self.curve.name()
     }
 
     /// Parameter names with units.
     pub fn parameter_names(self) -> &'static [&'static str] {
-        match self {
-            Self::NeoHookean => &["mu_pa"],
-            Self::MooneyRivlin => &["c1_pa", "c2_pa"],
-            Self::Ogden | Self::OgdenHigh => &["mu_pa", "alpha"],
-        }
+        self.curve.parameters()
     }
 
     /// W, Pa, at a stretch; parameters in the order of their names.
     pub fn energy_pa(self, parameters: &[f64], stretch: f64) -> f64 {
-        match self {
-            Self::NeoHookean => 0.5 * parameters[0] * first_uniaxial(stretch),
-            Self::MooneyRivlin => parameters[0] * first_uniaxial(stretch) + parameters[1] * second_uniaxial(stretch),
-            Self::Ogden | Self::OgdenHigh => parameters[0] / parameters[1] * ogden_uniaxial(stretch, parameters[1]),
-        }
+        self.curve.energy_pa(parameters, stretch)
     }
 
-    /// dW / d parameters; the second entry is unused by a law of one parameter.
-    pub(super) fn energy_slope_pa(self, parameters: &[f64], stretch: f64) -> [f64; 2] {
-        match self {
-            Self::NeoHookean => [0.5 * first_uniaxial(stretch), 0.0],
-            Self::MooneyRivlin => [first_uniaxial(stretch), second_uniaxial(stretch)],
-            Self::Ogden | Self::OgdenHigh => {
-                let (mu, alpha) = (parameters[0], parameters[1]);
-                let sum = ogden_uniaxial(stretch, alpha);
-                let ln_l = stretch.ln();
-                let bend = ln_l * ((alpha * ln_l).exp() - (-0.5 * alpha * ln_l).exp());
-                [sum / alpha, mu / alpha * (bend - sum / alpha)]
-            }
-        }
+    /// dW / d parameters; entries beyond the parameters are unused.
+    pub(super) fn energy_slope_pa(self, parameters: &[f64], stretch: f64) -> Slope {
+        self.curve.energy_slope_pa(parameters, stretch)
     }
 
     /// Nominal stress dW/dl, Pa.
     pub fn stress_pa(self, parameters: &[f64], stretch: f64) -> f64 {
-        let l = stretch;
-        match self {
-            Self::NeoHookean => parameters[0] * (l - l.powi(-2)),
-            Self::MooneyRivlin => 2.0 * (l - l.powi(-2)) * (parameters[0] + parameters[1] / l),
-            Self::Ogden | Self::OgdenHigh => {
-                let (mu, alpha) = (parameters[0], parameters[1]);
-                mu * (l.powf(alpha - 1.0) - l.powf(-0.5 * alpha - 1.0))
-            }
-        }
+        self.curve.stress_pa(parameters, stretch)
     }
 
-    /// d stress / d parameters; the second entry is unused by a law of one parameter.
-    pub(super) fn stress_slope_pa(self, parameters: &[f64], stretch: f64) -> [f64; 2] {
-        let l = stretch;
-        let neo_hookean = l - l.powi(-2);
-        match self {
-            Self::NeoHookean => [neo_hookean, 0.0],
-            Self::MooneyRivlin => [2.0 * neo_hookean, 2.0 * neo_hookean / l],
-            Self::Ogden | Self::OgdenHigh => {
-                let (mu, alpha) = (parameters[0], parameters[1]);
-                let (up, down) = (l.powf(alpha - 1.0), l.powf(-0.5 * alpha - 1.0));
-                [up - down, mu * l.ln() * (up + 0.5 * down)]
-            }
-        }
+    /// d stress / d parameters; entries beyond the parameters are unused.
+    pub(super) fn stress_slope_pa(self, parameters: &[f64], stretch: f64) -> Slope {
+        self.curve.stress_slope_pa(parameters, stretch)
     }
 
     /// Shear modulus at rest, Pa.
     pub fn small_strain_shear_modulus_pa(self, parameters: &[f64]) -> f64 {
-        match self {
-            Self::NeoHookean => parameters[0],
-            Self::MooneyRivlin => 2.0 * (parameters[0] + parameters[1]),
-            Self::Ogden | Self::OgdenHigh => 0.5 * parameters[0] * parameters[1],
-        }
+        self.law.shear_modulus_pa(&self.curve.values(parameters))
+    }
+
+    /// Where the law is stable, for parameters fitted over a window.
+    pub fn stability(self, parameters: &[f64], window: [f64; 2]) -> Stability {
+        self.curve.stability(parameters, window)
+    }
+
+    /// The law as a compressible material of a scenario.
+    pub fn material(self, parameters: &[f64], poisson_ratio: f64) -> Material {
+        Material::new(self.law, self.curve.values(parameters), poisson_ratio)
+    }
+
+    pub(super) fn curve(self) -> &'static dyn UniaxialCurve {
+        self.curve
+    }
+
+    /// Place in the list.
+    fn place(self) -> usize {
+        Self::all().position(|model| model.name() == self.name()).unwrap_or(usize::MAX)
+    }
+}
+
+impl PartialEq for MetaModel {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl Eq for MetaModel {}
+
+impl PartialOrd for MetaModel {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for MetaModel {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.place().cmp(&other.place())
+    }
+}
+
+impl std::fmt::Debug for MetaModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
     }
 }
 
@@ -111,9 +125,24 @@ impl std::fmt::Display for MetaModel {
 impl std::str::FromStr for MetaModel {
     type Err = String;
     fn from_str(word: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|model| model.name() == word).ok_or_else(|| {
-            let known = Self::ALL.map(Self::name).join(", ");
-            format!("law `{word}` is unknown: say one of {known}")
+        Self::all()
+            .find(|model| model.name() == word)
+            .ok_or_else(|| format!("law `{word}` is unknown: say one of {}", Self::names().join(", ")))
+    }
+}
+
+impl Serialize for MetaModel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for MetaModel {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Self::all().find(|model| model.name() == word).ok_or_else(|| {
+            let known = Self::names().iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            D::Error::custom(format!("unknown variant `{word}`, expected one of {known}"))
         })
     }
 }

@@ -1,25 +1,14 @@
 //! Fitting a meta-model: bounds, starts, and what is reported.
 
+use super::curve::MetaModel;
 use super::least_squares::{Bounds, Residuals, Solution, Tolerances, minimise};
-use super::{MetaModel, Stability};
-use crate::material::law::{Material, OgdenTerm};
+use crate::material::law::{Data, MOST_PARAMETERS, Material, Search, Slope, Stability, Start};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Added to W before the logarithm in the meta-model's residual, Pa, as in the paper.
 pub const META_MODEL_LOG_OFFSET_PA: f64 = 1e-3;
-
-/// How to search.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Search {
-    /// Exact Jacobians, tight tolerances, parameters where the law is stable at every stretch.
-    #[default]
-    Exact,
-    /// As the published program: its bounds and starts, its tolerances, and its neo-Hookean Jacobian, which lacks the
-    /// derivative of mu and leaves mu up to 3 % low.
-    Published,
-}
 
 /// Settings of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,19 +66,7 @@ pub struct Fit {
 impl Fit {
     /// The law as a compressible material of a scenario.
     pub fn material(&self, poisson_ratio: f64) -> Material {
-        let (compression_resistance_pa, inversion_threshold) = (0.0, 0.0);
-        match (self.model, self.parameters.as_slice()) {
-            (MetaModel::MooneyRivlin, &[c1_pa, c2_pa]) => {
-                Material::MooneyRivlin { c1_pa, c2_pa, poisson_ratio, compression_resistance_pa, inversion_threshold }
-            }
-            (MetaModel::Ogden | MetaModel::OgdenHigh, &[mu_pa, alpha]) => Material::Ogden {
-                terms: vec![OgdenTerm { alpha, mu_pa }],
-                poisson_ratio,
-                compression_resistance_pa,
-                inversion_threshold,
-            },
-            _ => Material::neo_hookean(self.shear_modulus_pa, poisson_ratio),
-        }
+        self.model.material(&self.parameters, poisson_ratio)
     }
 }
 
@@ -119,6 +96,14 @@ pub enum FitError {
         stretch: f64,
         /// Target.
         target: f64,
+    },
+    /// More parameters than the search is made for.
+    #[error("{model} has {count} parameters: laws of 1 to {MOST_PARAMETERS} can be fitted")]
+    TooManyParameters {
+        /// The law.
+        model: MetaModel,
+        /// Its parameters.
+        count: usize,
     },
     /// All at rest.
     #[error("all stretches are 1: nothing is deformed, so no modulus can be found; give rows of a deformed sample")]
@@ -177,11 +162,12 @@ fn fit_quantity(problem: &Problem) -> Result<Fit, FitError> {
     if stretches.iter().all(|l| (l - 1.0).abs() < 1e-9) {
         return Err(FitError::AllAtRest);
     }
-    Ok(match model {
-        MetaModel::NeoHookean => report(problem, best_of(problem, &neo_hookean_searches(problem))),
-        MetaModel::MooneyRivlin => report(problem, best_of(problem, &mooney_rivlin_searches(problem))),
-        MetaModel::Ogden | MetaModel::OgdenHigh => report(problem, best_of(problem, &ogden_searches(problem))),
-    })
+    match model.parameter_names().len() {
+        1 => Ok(report(problem, best_of::<1>(problem))),
+        2 => Ok(report(problem, best_of::<2>(problem))),
+        MOST_PARAMETERS => Ok(report(problem, best_of::<MOST_PARAMETERS>(problem))),
+        count => Err(FitError::TooManyParameters { model, count }),
+    }
 }
 
 /// What is compared with the targets.
@@ -211,7 +197,7 @@ impl Problem<'_> {
     }
 
     /// d predicted / d parameters.
-    fn slope(&self, parameters: &[f64], stretch: f64) -> [f64; 2] {
+    fn slope(&self, parameters: &[f64], stretch: f64) -> Slope {
         match self.quantity {
             Quantity::LogEnergy { offset_pa } => {
                 let denominator = self.model.energy_pa(parameters, stretch) + offset_pa;
@@ -225,9 +211,9 @@ impl Problem<'_> {
     fn modulus_of(&self, stretch: f64, target: f64) -> f64 {
         match self.quantity {
             Quantity::LogEnergy { offset_pa } => {
-                (target.exp() - offset_pa) / MetaModel::NeoHookean.energy_pa(&[1.0], stretch)
+                (target.exp() - offset_pa) / MetaModel::NEO_HOOKEAN.energy_pa(&[1.0], stretch)
             }
-            Quantity::Stress { rms_pa } => target * rms_pa / MetaModel::NeoHookean.stress_pa(&[1.0], stretch),
+            Quantity::Stress { rms_pa } => target * rms_pa / MetaModel::NEO_HOOKEAN.stress_pa(&[1.0], stretch),
         }
     }
 }
@@ -239,20 +225,16 @@ impl<const N: usize> Residuals<N> for Problem<'_> {
 
     fn jacobian(&self, parameters: &[f64; N], out: &mut Vec<[f64; N]>) {
         out.extend(self.stretches.iter().map(|l| {
-            if let (Search::Published, MetaModel::NeoHookean, Quantity::LogEnergy { offset_pa }) =
-                (self.search, self.model, self.quantity)
+            if let (Search::Published, Quantity::LogEnergy { offset_pa }) = (self.search, self.quantity)
+                && let Some(slope) = self.model.curve().published_slope(parameters, *l, offset_pa)
             {
-                // The published program's W' is W itself and its denominator mu W + offset.
-                let energy = self.model.energy_pa(parameters, *l);
-                return [energy / (parameters[0] * energy + offset_pa); N];
+                return [slope; N];
             }
             let slope = self.slope(parameters, *l);
             std::array::from_fn(|i| slope[i])
         }));
     }
 }
-
-type Start<const N: usize> = ([f64; N], Bounds<N>);
 
 /// A first modulus: the neo-Hookean one that fits the median point exactly, so that starts carry the data's scale.
 fn typical_modulus_pa(problem: &Problem) -> f64 {
@@ -262,64 +244,22 @@ fn typical_modulus_pa(problem: &Problem) -> f64 {
     moduli.get(moduli.len() / 2).copied().unwrap_or(1000.0)
 }
 
-const INF: f64 = f64::INFINITY;
-
-fn neo_hookean_searches(problem: &Problem) -> Vec<Start<1>> {
-    match problem.search {
-        Search::Published => vec![([1000.0], Bounds { low: [1e-3], high: [INF] })],
-        Search::Exact => vec![([typical_modulus_pa(problem)], Bounds { low: [0.0], high: [INF] })],
-    }
-}
-
-fn mooney_rivlin_searches(problem: &Problem) -> Vec<Start<2>> {
-    match problem.search {
-        Search::Published => vec![([1000.0, 1000.0], Bounds { low: [0.1, 0.1], high: [INF, INF] })],
-        Search::Exact => {
-            let quarter = 0.25 * typical_modulus_pa(problem);
-            // Both non-negative: stable at every stretch.
-            vec![([quarter, quarter], Bounds { low: [0.0, 0.0], high: [INF, INF] })]
-        }
-    }
-}
-
-fn ogden_searches(problem: &Problem) -> Vec<Start<2>> {
-    let limits: &[f64] = match (problem.search, problem.model) {
-        (Search::Published, MetaModel::OgdenHigh) => &[5.0, 10.0, 20.0, 50.0],
-        (_, MetaModel::OgdenHigh) => &[50.0],
-        _ => &[5.0],
-    };
-    let mut searches = Vec::new();
-    for limit in limits {
-        if problem.search == Search::Published {
-            searches.push(([1000.0, 0.1], Bounds { low: [0.1, 0.1], high: [INF, *limit] }));
-        } else {
-            let modulus = typical_modulus_pa(problem);
-            // Convex at every stretch: mu > 0 with alpha >= 1, or mu < 0 with alpha <= -2. Two starts a branch,
-            // since the cost may have a valley at small and another at large exponents.
-            for share in [0.1, 0.6] {
-                let (up, down) = (1.0 + share * (limit - 1.0), -2.0 - share * (limit - 2.0));
-                searches.push(([2.0 * modulus / up, up], Bounds { low: [0.0, 1.0], high: [INF, *limit] }));
-                searches.push(([2.0 * modulus / down, down], Bounds { low: [-INF, -limit], high: [0.0, -2.0] }));
-            }
-        }
-    }
-    if problem.search == Search::Published {
-        for limit in limits {
-            searches.push(([-1000.0, -2.1], Bounds { low: [-INF, -limit], high: [-0.1, -2.1] }));
-        }
-    }
-    searches
-}
-
-fn best_of<const N: usize>(problem: &Problem, searches: &[Start<N>]) -> (Solution<N>, Bounds<N>) {
+fn best_of<const N: usize>(problem: &Problem) -> (Solution<N>, Bounds<N>) {
     let (tolerances, evaluations) = match problem.search {
         Search::Published => (Tolerances { cost: 1e-8, step: 1e-8, gradient: 1e-8 }, 100 * N),
         Search::Exact => (Tolerances { cost: 1e-14, step: 1e-10, gradient: 1e-12 }, 1000),
     };
-    let solve = |(start, bounds): &Start<N>| (minimise(problem, start, bounds, &tolerances, evaluations), *bounds);
-    let mut best = solve(&searches[0]);
-    for search in &searches[1..] {
-        let found = solve(search);
+    let solve = |start: &Start| {
+        let [parameters, low, high] =
+            [&start.parameters, &start.low, &start.high].map(|of| std::array::from_fn(|i| of[i]));
+        let bounds = Bounds { low, high };
+        (minimise(problem, &parameters, &bounds, &tolerances, evaluations), bounds)
+    };
+    let data = Data { stretches: problem.stretches, modulus_pa: typical_modulus_pa(problem) };
+    let starts = problem.model.curve().starts(problem.search, &data);
+    let mut best = solve(&starts[0]);
+    for start in &starts[1..] {
+        let found = solve(start);
         if found.0.cost < best.0.cost {
             best = found;
         }
@@ -356,7 +296,15 @@ fn report<const N: usize>(problem: &Problem, (solution, bounds): (Solution<N>, B
             covariance[*i][*j] = -variance * normal[*i][*j] / det;
             covariance[*j][*i] = covariance[*i][*j];
         }
-        _ => {}
+        free => {
+            let part = DMatrix::from_fn(free.len(), free.len(), |row, col| normal[free[row]][free[col]]);
+            let inverse = part.try_inverse();
+            for (row, i) in free.iter().enumerate() {
+                for (col, j) in free.iter().enumerate() {
+                    covariance[*i][*j] = inverse.as_ref().map_or(f64::NAN, |inverse| variance * inverse[(row, col)]);
+                }
+            }
+        }
     }
     let mean = problem.targets.iter().sum::<f64>() / problem.targets.len() as f64;
     let spread: f64 = problem.targets.iter().map(|y| (y - mean).powi(2)).sum();
@@ -370,7 +318,7 @@ fn report<const N: usize>(problem: &Problem, (solution, bounds): (Solution<N>, B
         r_squared: if spread > 0.0 { 1.0 - 2.0 * solution.cost / spread } else { f64::NAN },
         covariance,
         at_bound: (0..N).filter(|i| stands_at(*i)).map(|i| names[i].to_owned()).collect(),
-        stability: Stability::of(problem.model, &parameters, window),
+        stability: problem.model.stability(&parameters, window),
         converged: solution.converged,
     }
 }

@@ -17,12 +17,12 @@ fn targets(model: MetaModel, parameters: &[f64], l: &[f64]) -> Vec<f64> {
 fn a_law_is_recovered_from_its_own_curve() {
     let l = stretches(0.7, 1.3, 61);
     let cases: [(MetaModel, &[f64]); 6] = [
-        (MetaModel::NeoHookean, &[333.28]),
-        (MetaModel::MooneyRivlin, &[140.0, 166.5]),
-        (MetaModel::Ogden, &[420.0, 2.7]),
-        (MetaModel::Ogden, &[-200.0, -3.4]),
-        (MetaModel::OgdenHigh, &[-93.9, -22.0]),
-        (MetaModel::OgdenHigh, &[61.0, 17.0]),
+        (MetaModel::NEO_HOOKEAN, &[333.28]),
+        (MetaModel::MOONEY_RIVLIN, &[140.0, 166.5]),
+        (MetaModel::OGDEN, &[420.0, 2.7]),
+        (MetaModel::OGDEN, &[-200.0, -3.4]),
+        (MetaModel::OGDEN_HIGH, &[-93.9, -22.0]),
+        (MetaModel::OGDEN_HIGH, &[61.0, 17.0]),
     ];
     for (model, parameters) in cases {
         let fit = fit(model, &l, &targets(model, parameters, &l), &exact()).unwrap();
@@ -37,10 +37,10 @@ fn a_law_is_recovered_from_its_own_curve() {
 fn a_law_is_recovered_from_its_own_stresses() {
     let l = stretches(0.8, 1.2, 31);
     let cases: [(MetaModel, &[f64]); 4] = [
-        (MetaModel::NeoHookean, &[333.28]),
-        (MetaModel::MooneyRivlin, &[140.0, 166.5]),
-        (MetaModel::Ogden, &[-200.0, -3.4]),
-        (MetaModel::OgdenHigh, &[61.0, 17.0]),
+        (MetaModel::NEO_HOOKEAN, &[333.28]),
+        (MetaModel::MOONEY_RIVLIN, &[140.0, 166.5]),
+        (MetaModel::OGDEN, &[-200.0, -3.4]),
+        (MetaModel::OGDEN_HIGH, &[61.0, 17.0]),
     ];
     for (model, parameters) in cases {
         let stresses: Vec<f64> = l.iter().map(|l| model.stress_pa(parameters, *l)).collect();
@@ -50,16 +50,16 @@ fn a_law_is_recovered_from_its_own_stresses() {
         }
         assert!(fit.converged && fit.r_squared > 1.0 - 1e-9 && fit.stability.everywhere());
     }
-    assert_eq!(fit_stress(MetaModel::NeoHookean, &l, &[0.0; 31], &exact()), Err(FitError::NoStress));
+    assert_eq!(fit_stress(MetaModel::NEO_HOOKEAN, &l, &[0.0; 31], &exact()), Err(FitError::NoStress));
 }
 
 #[test]
 fn energy_slopes_and_stress_are_the_derivatives() {
     for (model, p) in [
-        (MetaModel::NeoHookean, [500.0, 0.0]),
-        (MetaModel::MooneyRivlin, [140.0, 90.0]),
-        (MetaModel::Ogden, [300.0, 2.5]),
-        (MetaModel::OgdenHigh, [-100.0, -14.0]),
+        (MetaModel::NEO_HOOKEAN, [500.0, 0.0]),
+        (MetaModel::MOONEY_RIVLIN, [140.0, 90.0]),
+        (MetaModel::OGDEN, [300.0, 2.5]),
+        (MetaModel::OGDEN_HIGH, [-100.0, -14.0]),
     ] {
         for l in [0.8, 0.99, 1.2] {
             let slope = model.energy_slope_pa(&p, l);
@@ -94,11 +94,11 @@ fn verdicts_agree_with_the_curves_themselves() {
     let window = [0.8, 1.25];
     let l = stretches(window[0], window[1], 901);
     let mut seen = [0; 2];
-    for model in [MetaModel::MooneyRivlin, MetaModel::Ogden] {
+    for model in [MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN] {
         for a in [-300.0, -20.0, 25.0, 400.0] {
             for b in [-900.0_f64, -4.3, -1.7, 0.4, 1.6, 150.0] {
-                let p = [a, if model == MetaModel::Ogden { b.clamp(-4.3, 1.6) } else { b }];
-                let verdict = Stability::of(model, &p, window);
+                let p = [a, if model == MetaModel::OGDEN { b.clamp(-4.3, 1.6) } else { b }];
+                let verdict = model.stability(&p, window);
                 let stress: Vec<f64> = l.iter().map(|l| model.stress_pa(&p, *l)).collect();
                 let grows = l.iter().zip(&stress).all(|(l, s)| (l - 1.0) * s >= -1e-9);
                 let convex = stress.windows(2).all(|pair| pair[1] > pair[0]);
@@ -118,9 +118,9 @@ fn verdicts_agree_with_the_curves_themselves() {
 fn covariance_is_the_scatter_of_repeated_fits() {
     let l = stretches(0.7, 1.3, 41);
     let cases: [(MetaModel, &[f64]); 3] = [
-        (MetaModel::NeoHookean, &[600.0]),
-        (MetaModel::MooneyRivlin, &[140.0, 166.5]),
-        (MetaModel::Ogden, &[-200.0, -3.4]),
+        (MetaModel::NEO_HOOKEAN, &[600.0]),
+        (MetaModel::MOONEY_RIVLIN, &[140.0, 166.5]),
+        (MetaModel::OGDEN, &[-200.0, -3.4]),
     ];
     for (model, parameters) in cases {
         let clean = targets(model, parameters, &l);
@@ -148,8 +148,8 @@ fn covariance_is_the_scatter_of_repeated_fits() {
 #[test]
 fn a_parameter_at_its_bound_is_named_and_has_no_variance() {
     let l = stretches(0.7, 1.3, 41);
-    let y: Vec<f64> = targets(MetaModel::OgdenHigh, &[-40.0, -20.0], &l);
-    let fit = fit(MetaModel::Ogden, &l, &y, &exact()).unwrap();
+    let y: Vec<f64> = targets(MetaModel::OGDEN_HIGH, &[-40.0, -20.0], &l);
+    let fit = fit(MetaModel::OGDEN, &l, &y, &exact()).unwrap();
     assert_eq!(fit.at_bound, ["alpha"]);
     assert!((fit.parameters[1] + 5.0).abs() < 1e-5);
     assert!(fit.covariance[1][1] == 0.0 && fit.covariance[0][0] > 0.0);
@@ -157,7 +157,7 @@ fn a_parameter_at_its_bound_is_named_and_has_no_variance() {
 
 #[test]
 fn points_that_determine_nothing_are_refused() {
-    let model = MetaModel::MooneyRivlin;
+    let model = MetaModel::MOONEY_RIVLIN;
     assert!(matches!(fit(model, &[0.9, 1.1], &[1.0, 2.0], &exact()), Err(FitError::TooFew { .. })));
     assert_eq!(fit(model, &[1.0; 5], &[1.0; 5], &exact()), Err(FitError::AllAtRest));
     let bad = fit(model, &[0.9, 1.0, -1.1], &[1.0, 2.0, 3.0], &exact());
@@ -168,7 +168,7 @@ fn points_that_determine_nothing_are_refused() {
 fn a_fit_as_a_material_keeps_its_shear_modulus() {
     let l = stretches(0.7, 1.3, 41);
     for model in MetaModel::ALL {
-        let fit = fit(model, &l, &targets(MetaModel::MooneyRivlin, &[140.0, 166.5], &l), &exact()).unwrap();
+        let fit = fit(model, &l, &targets(MetaModel::MOONEY_RIVLIN, &[140.0, 166.5], &l), &exact()).unwrap();
         let material = fit.material(0.45);
         assert!((material.shear_modulus_pa() / fit.shear_modulus_pa - 1.0).abs() < 1e-12, "{model}");
         assert_eq!(material.poisson_ratio(), 0.45);

@@ -1,10 +1,10 @@
 //! CGAL's Mesh_3 as a separate program (`engines/cgal/`), over a pipe.
 
-use super::process::{self, Limits, ProcessError};
+use super::mesher::{Mesher, Program, Request};
+use super::process::{self, ProcessError};
 use super::sizing::EdgeField;
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::{Complex, Point};
-use std::path::Path;
 use std::process::Command;
 
 /// Facet angle (degrees), and facet size, facet distance, cell radius-edge ratio and cell size as multiples of the edge.
@@ -50,16 +50,40 @@ fn parse(bytes: &[u8], fields: usize) -> Option<Complex> {
     fine.then(|| Complex::new(x, tets, labels.to_vec()))
 }
 
-/// Runs the program. The mesh may be empty: nothing found.
-pub(crate) fn mesh(
-    program: &Path,
-    field: &LabelField,
-    edge: &EdgeField,
-    seeds: &[Point],
-    limits: &Limits,
-) -> Result<Complex, ProcessError> {
-    let answer = process::run(&Command::new(program), request(field, edge, seeds), limits)?;
-    parse(&answer, field.labels().len()).ok_or(ProcessError::Answer)
+/// The engine.
+pub(super) struct Cgal;
+
+impl Mesher for Cgal {
+    fn name(&self) -> &'static str {
+        "cgal"
+    }
+
+    fn program(&self) -> Option<&'static Program> {
+        Some(&Program {
+            name: "hgm-cgal-mesher",
+            used_for: "mesh engine `cgal` (without it: `lattice`)",
+            variable: Some("HGM_CGAL_MESHER"),
+            install: "./run engines",
+        })
+    }
+
+    fn mesh(&self, request: &Request, edge_mm: f64) -> Result<Complex, ProcessError> {
+        let edge = request.edges(edge_mm);
+        let run = |seeds: &[Point]| {
+            let input = self::request(request.field, &edge, seeds);
+            let answer = process::run(&Command::new(&request.program), input, request.limits)?;
+            parse(&answer, request.field.labels().len()).ok_or(ProcessError::Answer)
+        };
+        let found = run(request.seeds())?;
+        // A thin shell can lie between a few seeds without any facet of theirs across it: then they must be denser.
+        if found.count() == 0 { run(&request.dense_seeds()) } else { Ok(found) }
+    }
+
+    /// Brains again: the coarser the mesh, the larger the share of tets that interfaces make smaller than the edge asks
+    /// for. A good first guess spares a second run of the program.
+    fn first_guess(&self, edge_mm: f64) -> f64 {
+        1.0 + (0.0125 * (edge_mm - 4.0)).clamp(0.0, 0.05)
+    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! gmsh (Geuzaine and Remacle, IJNME 79, 2009) as a separate program.
 
-use super::process::{self, Limits, ProcessError, scratch_command};
+use super::mesher::{Mesher, Program, Request};
+use super::process::{self, ProcessError, scratch_command};
 use super::surface::InterfaceSurface;
 use crate::mesh::format::msh;
 use crate::mesh::optimise::{Complex, Point};
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
 
 /// Tets inside may have edges this many times the target.
 const EDGE: f64 = 1.25;
@@ -51,22 +51,38 @@ fn request(surface: &InterfaceSurface, edge_mm: f64) -> (String, String) {
     (msh, geo)
 }
 
-/// Runs the program: the surface stays as it is, the inside gets tets of about `edge_mm`.
-pub(crate) fn mesh(
-    program: &Path,
-    surface: &InterfaceSurface,
-    edge_mm: f64,
-    limits: &Limits,
-) -> Result<Complex, ProcessError> {
-    let (msh, geo) = request(surface, edge_mm);
-    // One stream in: the script, a line that ends it, the surface.
-    let script = "awk 'after { print > \"s.msh\"; next } /^END$/ { after = 1; next } { print > \"s.geo\" }' && \
-                  run \"$0\" -3 s.geo -nt 1 -v 2 -o out.msh >&2 && cat out.msh";
-    let input = format!("{geo}END\n{msh}").into_bytes();
-    let answer = process::run(&scratch_command(program, script, limits), input, limits)?;
-    let mesh = msh::decode(&answer, "gmsh").map_err(|_| ProcessError::Answer)?;
-    let x = mesh.nodes_mm().iter().map(|p| Point::from(*p)).collect();
-    Ok(surface.around(x, mesh.tets().to_vec(), mesh.labels().to_vec()))
+/// The engine: the surface stays as it is, the inside gets tets.
+pub(super) struct Gmsh;
+
+impl Mesher for Gmsh {
+    fn name(&self) -> &'static str {
+        "gmsh"
+    }
+
+    fn program(&self) -> Option<&'static Program> {
+        Some(&Program {
+            name: "gmsh",
+            used_for: "mesh engine `gmsh`",
+            variable: None,
+            install: "sudo apt-get install gmsh",
+        })
+    }
+
+    fn mesh(&self, request: &Request, edge_mm: f64) -> Result<Complex, ProcessError> {
+        let edge = request.edges(edge_mm);
+        let surface = request.surface(&edge);
+        let [_, largest_mm] = edge.range_mm();
+        let (msh, geo) = self::request(&surface, largest_mm);
+        // One stream in: the script, a line that ends it, the surface.
+        let script = "awk 'after { print > \"s.msh\"; next } /^END$/ { after = 1; next } { print > \"s.geo\" }' && \
+                      run \"$0\" -3 s.geo -nt 1 -v 2 -o out.msh >&2 && cat out.msh";
+        let input = format!("{geo}END\n{msh}").into_bytes();
+        let command = scratch_command(&request.program, script, request.limits);
+        let answer = process::run(&command, input, request.limits)?;
+        let mesh = msh::decode(&answer, "gmsh").map_err(|_| ProcessError::Answer)?;
+        let x = mesh.nodes_mm().iter().map(|p| Point::from(*p)).collect();
+        Ok(surface.around(x, mesh.tets().to_vec(), mesh.labels().to_vec()))
+    }
 }
 
 #[cfg(test)]

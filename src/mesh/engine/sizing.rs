@@ -1,6 +1,6 @@
 //! How large the tets shall be, where.
 
-use super::EngineError;
+use super::error::EngineError;
 use crate::geometry::Native;
 use crate::image::distance::signed_distance_mm;
 use crate::image::{Grid, Mask};

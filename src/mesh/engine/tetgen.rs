@@ -1,11 +1,11 @@
 //! TetGen (Si, "TetGen, a Delaunay-based quality tetrahedral mesh generator", ACM TOMS 41, 2015) as a separate program.
 
-use super::process::{self, Limits, ProcessError, scratch_command};
+use super::mesher::{Mesher, Program, Request, TET_SHARE};
+use super::process::{self, ProcessError, scratch_command};
 use super::surface::InterfaceSurface;
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::{Complex, Point};
 use std::fmt::Write;
-use std::path::Path;
 
 /// Radius-edge ratio and smallest dihedral angle that TetGen refines for.
 const QUALITY: &str = "1.6/12";
@@ -89,21 +89,36 @@ fn labelled(
     Complex::new(x.to_vec(), kept.iter().map(|&t| tets[t]).collect(), kept_fields).compacted()
 }
 
-/// Runs the program: the surface stays as it is, the inside gets tets of about `edge_mm`.
-pub(crate) fn mesh(
-    program: &Path,
-    surface: &InterfaceSurface,
-    field: &LabelField,
-    edge_mm: f64,
-    limits: &Limits,
-) -> Result<Complex, ProcessError> {
-    let most_mm3 = VOLUME * super::TET_SHARE * edge_mm.powi(3);
-    let switches = format!("-pYAzQFq{QUALITY}a{most_mm3:.6}");
-    let script = format!("cat > s.smesh && run \"$0\" {switches} s.smesh >&2 && cat s.1.node s.1.ele");
-    let answer = process::run(&scratch_command(program, &script, limits), request(surface), limits)?;
-    let (x, tets, regions) = parse(&String::from_utf8_lossy(&answer)).ok_or(ProcessError::Answer)?;
-    let (x, tets, fields) = labelled(&x, &tets, &regions, field);
-    if tets.is_empty() { Err(ProcessError::Answer) } else { Ok(surface.around(x, tets, fields)) }
+/// The engine: the surface stays as it is, the inside gets tets.
+pub(super) struct Tetgen;
+
+impl Mesher for Tetgen {
+    fn name(&self) -> &'static str {
+        "tetgen"
+    }
+
+    fn program(&self) -> Option<&'static Program> {
+        Some(&Program {
+            name: "tetgen",
+            used_for: "mesh engine `tetgen`",
+            variable: None,
+            install: "sudo apt-get install tetgen",
+        })
+    }
+
+    fn mesh(&self, request: &Request, edge_mm: f64) -> Result<Complex, ProcessError> {
+        let edge = request.edges(edge_mm);
+        let surface = request.surface(&edge);
+        let [_, largest_mm] = edge.range_mm();
+        let most_mm3 = VOLUME * TET_SHARE * largest_mm.powi(3);
+        let switches = format!("-pYAzQFq{QUALITY}a{most_mm3:.6}");
+        let script = format!("cat > s.smesh && run \"$0\" {switches} s.smesh >&2 && cat s.1.node s.1.ele");
+        let command = scratch_command(&request.program, &script, request.limits);
+        let answer = process::run(&command, self::request(&surface), request.limits)?;
+        let (x, tets, regions) = parse(&String::from_utf8_lossy(&answer)).ok_or(ProcessError::Answer)?;
+        let (x, tets, fields) = labelled(&x, &tets, &regions, request.field);
+        if tets.is_empty() { Err(ProcessError::Answer) } else { Ok(surface.around(x, tets, fields)) }
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! VTU, the unstructured grid of VTK's XML formats: what ParaView, pyvista and meshio open.
 //!
 //! Labels are the integer cell array `label`; every node set is a `UInt8` point array of 0 and 1 under its name,
-//! since VTU has no sets. A facet set is the `UInt8` cell array `facets:NAME`: bit `f` of a tetrahedron is set when
+//! since VTU has no sets. In our own files such an array says `hgm_set="nodes"` and the file `hgm_sets="marked"`, which
+//! other readers pass over: a result that happens to be 0 and 1 is then no set. A facet set is the `UInt8` cell array `facets:NAME`: bit `f` of a tetrahedron is set when
 //! its local face `f` (the one opposite corner `f`, see [`TET_FACES`]) belongs to the set. Fields are `Float64`.
 //! Reading takes text, base64 and raw bytes, inline or appended, plain or zlib, either byte order and header width.
 
@@ -15,6 +16,10 @@ use quick_xml::{Reader, XmlVersion};
 /// VTK's number of the linear tetrahedron.
 const VTK_TETRA: u8 = 10;
 const FACETS: &str = "facets:";
+/// Attribute of a file whose node sets are marked.
+const MARKED: &str = "hgm_sets";
+/// Attribute of an array that is a set, and what it is a set of.
+const SET: (&str, &str) = ("hgm_set", "nodes");
 
 /// The bytes of a VTU file: `mesh` with labels, sets and the given fields on nodes and tetrahedra.
 ///
@@ -29,7 +34,7 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
 
     let mut xml = format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n\
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\" {MARKED}=\"marked\">\n<UnstructuredGrid>\n\
          <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n<Points>\n"
     );
     xml += &array("Float64", "Points", 3, &float_bytes(mesh.nodes_mm().as_flattened()));
@@ -44,7 +49,7 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
         for &n in nodes {
             member[n as usize] = 1;
         }
-        xml += &array("UInt8", name, 1, &member);
+        xml += &array("UInt8", name, 1, &member).replacen(" Name=", &format!(" {}=\"{}\" Name=", SET.0, SET.1), 1);
     }
     for field in point_fields {
         xml += &array("Float64", &field.name, field.components, &float_bytes(&field.values));
@@ -84,8 +89,8 @@ fn bytes_of<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
 /// A mesh from the bytes of a VTU file; `name` is what messages call the file.
 ///
 /// The cell array `label` (or gmsh's `gmsh:physical`) gives the labels. A point array of one component that holds
-/// only 0 and 1 becomes a node set (a float array only if it holds a 1); all others are returned as fields, those
-/// of cells for the tetrahedra only. Vertices, lines and polygons are passed over; nodes keep the file's order, so
+/// only 0 and 1 becomes a node set: in our own files if it is marked as one, in others always (a float array only if it
+/// holds a 1). All others are returned as fields, those of cells for the tetrahedra only. Vertices, lines and polygons are passed over; nodes keep the file's order, so
 /// nodes of no tetrahedron stay.
 ///
 /// # Errors
@@ -103,7 +108,8 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<MeshWithFields, ReadError> {
     for raw in file.arrays.iter().filter(|a| a.section == "PointData") {
         let Some(field) = file.field(raw, file.points)? else { continue };
         let binary = field.components == 1 && field.values.iter().all(|&v| v == 0.0 || v == 1.0);
-        if binary && (raw.is_integer() || field.values.contains(&1.0)) {
+        let set = if file.marked { raw.is_set } else { raw.is_integer() || field.values.contains(&1.0) };
+        if binary && set {
             let nodes = (0..file.points).filter(|&n| field.values[n] == 1.0).map(|n| n as u32).collect();
             mesh.node_sets.insert(field.name, nodes);
         } else {
@@ -142,6 +148,8 @@ struct RawArray {
     components: usize,
     format: String,
     offset: usize,
+    /// Whether it is marked as a node set.
+    is_set: bool,
     text: String,
 }
 
@@ -154,6 +162,8 @@ impl RawArray {
 struct File<'a> {
     name: &'a str,
     storage: Storage,
+    /// Whether node sets are marked as such.
+    marked: bool,
     points: usize,
     cells: usize,
     arrays: Vec<RawArray>,
@@ -172,7 +182,7 @@ impl<'a> File<'a> {
 
     fn parse(bytes: &'a [u8], name: &'a str) -> Result<Self, ReadError> {
         let storage = Storage { big_endian: false, header_bytes: 4, zlib: false };
-        let mut file = Self { name, storage, points: 0, cells: 0, arrays: Vec::new(), appended: None };
+        let mut file = Self { name, storage, marked: false, points: 0, cells: 0, arrays: Vec::new(), appended: None };
         // What is appended need not be text, so the XML ends there for us.
         let marker = b"<AppendedData";
         let split = bytes.windows(marker.len()).position(|w| w == marker);
@@ -250,6 +260,7 @@ impl<'a> File<'a> {
         if kind != "UnstructuredGrid" {
             return Err(self.unsupported("VTKFile", format!("type `{kind}`: only UnstructuredGrid holds tetrahedra")));
         }
+        self.marked = get(MARKED)?.is_some();
         self.storage = Storage {
             big_endian: get("byte_order")?.as_deref() == Some("BigEndian"),
             header_bytes: if get("header_type")?.as_deref() == Some("UInt64") { 8 } else { 4 },
@@ -280,6 +291,7 @@ impl<'a> File<'a> {
             components: number("NumberOfComponents", 1)?.max(1),
             format: get("format")?.unwrap_or_else(|| "ascii".to_owned()),
             offset: number("offset", 0)?,
+            is_set: get(SET.0)?.as_deref() == Some(SET.1),
             text: String::new(),
             name,
         })
@@ -477,6 +489,21 @@ mod tests {
         );
         assert_eq!((back.point_fields, back.cell_fields), (vec![u, e], vec![j]));
         assert_eq!(encode(&mesh, &[], &[]), encode(&mesh, &[], &[]));
+    }
+
+    #[test]
+    fn zeros_and_ones_are_a_set_where_they_say_so_or_the_file_is_not_ours() {
+        let seen = Field::scalar("seen", vec![0.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+        let bytes = encode(&two_tets(), std::slice::from_ref(&seen), &[]).unwrap();
+        let ours = decode(&bytes, "a.vtu").unwrap();
+        assert_eq!((ours.point_fields, ours.mesh.node_sets.len()), (vec![seen], 2));
+        // As another program writes it again: without what it does not know.
+        let text = String::from_utf8(bytes).unwrap();
+        let foreign = text.replace(" hgm_sets=\"marked\"", "").replace(" hgm_set=\"nodes\"", "");
+        assert_ne!(foreign, text);
+        let foreign = decode(foreign.as_bytes(), "a.vtu").unwrap();
+        assert_eq!(foreign.mesh.node_sets["seen"], [1, 2, 5]);
+        assert_eq!((foreign.mesh.node_sets.len(), foreign.point_fields.len()), (3, 0));
     }
 
     #[test]

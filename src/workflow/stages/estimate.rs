@@ -194,7 +194,7 @@ pub(crate) fn estimate(
 ) -> Result<EstimateFacts, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
-    if prior.law != MetaModel::NeoHookean {
+    if prior.law != MetaModel::NEO_HOOKEAN {
         return Err(WorkflowError::EstimateLaw { law: prior.law.name().to_owned() });
     }
     let posed = serde_json::json!({

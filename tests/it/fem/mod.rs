@@ -2,6 +2,7 @@
 
 mod cook;
 mod inversion;
+mod laws;
 mod loads;
 mod meshes;
 mod motion;
