@@ -3,7 +3,7 @@
 use crate::layout;
 use crate::mesh::engine::EngineError;
 use crate::workflow::cohort::{CohortError, DatasetError};
-use crate::workflow::{CaseError, InputError, MaskRole, SimulationError, Subject, WorkflowError};
+use crate::workflow::{CaseError, InputError, MaskRole, MeshFileError, SimulationError, Subject, WorkflowError};
 
 /// What to add to the message; nothing where the message says it all.
 pub fn remedy(error: &anyhow::Error) -> Option<String> {
@@ -30,9 +30,9 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
              what differs)"
                 .to_owned()
         }
-        WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o".to_owned(),
+        WorkflowError::Mesh(MeshFileError::Output { .. }) | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o".to_owned(),
         WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out".to_owned(),
-        WorkflowError::Simulation(SimulationError::Noted { .. }) => "run again with --force".to_owned(),
+        WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => "run again with --force".to_owned(),
         WorkflowError::Settings(error) if error.file.is_none() && error.table.as_deref() == Some("mesh") => {
             "correct --cells, --edge-mm or the settings file".to_owned()
         }

@@ -2,6 +2,7 @@
 
 use super::case::CaseError;
 use super::inputs::InputError;
+use super::meshing::MeshFileError;
 use super::settings::SettingsError;
 use super::simulation::SimulationError;
 use crate::artefact::WriteError;
@@ -86,6 +87,8 @@ pub enum WorkflowError {
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
@@ -118,6 +121,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })
             | Self::Report(ReportError::Write(_))
             | Self::Engine { source: EngineError::Program { .. } | EngineError::Invalid { .. }, .. }
