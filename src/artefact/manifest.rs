@@ -60,6 +60,12 @@ impl Manifest {
         self.outputs.iter().filter_map(change).collect()
     }
 
+    /// Takes the stage's files away, its own manifest first: nothing is left that vouches for a part of them.
+    pub fn remove(&self, folder: &Path) {
+        std::fs::remove_file(Self::path_of_stage(folder, &self.stage)).ok();
+        self.outputs.keys().for_each(|name| remove_output(folder, name));
+    }
+
     /// One line per earlier stage whose files in `folder` are not those this stage was made from.
     pub fn changed_stages(&self, folder: &Path) -> Vec<String> {
         let change = |(role, sum): (&String, &String)| {
@@ -68,6 +74,12 @@ impl Manifest {
         };
         self.inputs.iter().filter_map(change).collect()
     }
+}
+
+/// Takes one output away with the manifest beside it.
+pub(super) fn remove_output(folder: &Path, name: &str) {
+    std::fs::remove_file(folder.join(format!("{name}.manifest.json"))).ok();
+    std::fs::remove_file(folder.join(name)).ok();
 }
 
 /// One output file.

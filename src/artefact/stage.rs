@@ -1,6 +1,6 @@
 //! A stage on disk: skipped when nothing that matters has changed.
 
-use super::manifest::{Manifest, OutputRecord, Provenance};
+use super::manifest::{Manifest, OutputRecord, Provenance, remove_output};
 use super::write::{WriteError, sha256_hex, write_whole};
 use serde::Serialize;
 use serde_json::Value;
@@ -93,6 +93,13 @@ impl Stage {
         self.input_sha256(&format!("stage {}", earlier.stage), &sum)
     }
 
+    /// The same masks that this stage was made with before: inputs whose role ends in `mask`.
+    #[must_use]
+    pub fn own_masks_of(self, earlier: &Manifest) -> Self {
+        let masks = earlier.inputs.iter().filter(|(role, _)| role.ends_with(" mask"));
+        masks.fold(self, |stage, (role, sum)| stage.input_sha256(role, sum))
+    }
+
     /// The stage's name.
     pub fn name(&self) -> &str {
         &self.name
@@ -166,8 +173,13 @@ impl Stage {
             return Ok(StageOutcome { skipped: true, reasons, manifest });
         }
         let produced = compute().map_err(StageError::Compute)?;
-        // The old manifest must not vouch for a mixture of old and new files.
+        // The old manifest must not vouch for a mixture of old and new files, nor may a file stay that is made no more.
+        let old = self.previous();
         std::fs::remove_file(self.manifest_path()).ok();
+        let made = |name: &String| produced.files.iter().any(|(file, _)| file == name);
+        for name in old.iter().flat_map(|old| old.outputs.keys()).filter(|name| !made(name)) {
+            remove_output(&self.folder, name);
+        }
         let mut outputs = BTreeMap::new();
         for (name, bytes) in &produced.files {
             write_whole(&self.folder.join(name), bytes)?;

@@ -3,7 +3,7 @@
 use crate::layout;
 use crate::mesh::engine::EngineError;
 use crate::workflow::cohort::{CohortError, DatasetError};
-use crate::workflow::{CaseError, InputError, MaskRole, Subject, WorkflowError};
+use crate::workflow::{CaseError, InputError, MaskRole, MeshFileError, SimulationError, Subject, WorkflowError};
 
 /// What to add to the message; nothing where the message says it all.
 pub fn remedy(error: &anyhow::Error) -> Option<String> {
@@ -30,6 +30,9 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
              what differs)"
                 .to_owned()
         }
+        WorkflowError::Mesh(MeshFileError::Output { .. }) | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o".to_owned(),
+        WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out".to_owned(),
+        WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => "run again with --force".to_owned(),
         WorkflowError::Settings(error) if error.file.is_none() && error.table.as_deref() == Some("mesh") => {
             "correct --cells, --edge-mm or the settings file".to_owned()
         }
@@ -57,6 +60,16 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::NoField { .. } => {
             format!("`hgm report` shows what is there; {} names the best sample", layout::OUTCOME)
         }
+        CaseError::Patient { .. } => "name another folder (-o)".to_owned(),
+        CaseError::OtherScan { .. } => {
+            "name another folder (-o), or say --force to make this one again from these scans".to_owned()
+        }
+        CaseError::Stale { folder, .. } => format!(
+            "run `hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate` on {} again with the settings that are meant (`hgm why` \
+             tells what differs)",
+            folder.display()
+        ),
+        CaseError::Held { .. } => "wait until it has ended".to_owned(),
         CaseError::Unreadable { .. } => return None,
     })
 }

@@ -40,10 +40,22 @@ pub enum CaseError {
     OtherMesh { folder: PathBuf, file: &'static str, mesh: &'static str, found: usize, nodes: usize },
     #[error("{}: this is a phantom, and a patient's case is asked for", folder.display())]
     Phantom { folder: PathBuf },
+    #[error("{}: this is a patient's case, and a phantom is asked for", folder.display())]
+    Patient { folder: PathBuf },
+    #[error("{}: the case was made from another {which} scan", folder.display())]
+    OtherScan { folder: PathBuf, which: &'static str },
+    #[error("{}: {what} is not of the present state: {}", folder.display(), reasons.join("; "))]
+    Stale { folder: PathBuf, what: String, reasons: Vec<String> },
+    #[error("{}: another job works in this folder{}", folder.display(), by(holder))]
+    Held { folder: PathBuf, holder: String },
     #[error("the phantom in this folder has {made} and {asked} were asked for", made = tissues(*made), asked = tissues(*asked))]
     OtherTissues { made: usize, asked: usize },
     #[error("{}: no result holds an array `{name}`", folder.display())]
     NoField { folder: PathBuf, name: String },
+}
+
+fn by(holder: &str) -> String {
+    if holder.is_empty() { " (a part of a sweep)".to_owned() } else { format!(" ({holder})") }
 }
 
 fn tissues(count: usize) -> String {
@@ -97,7 +109,9 @@ impl Case {
         if has(StageName::Registration) {
             Some(Subject::Patient)
         } else if has(StageName::Labels) {
-            Some(Subject::Phantom { every_task: false })
+            let every_task = StageName::Sample(String::new()).to_string() + "hyperelastic-";
+            let of_task = |manifest: &Manifest| manifest.stage.starts_with(&every_task);
+            Some(Subject::Phantom { every_task: self.recorded().iter().any(of_task) })
         } else {
             None
         }
@@ -106,8 +120,9 @@ impl Case {
     /// The experiment's numbers.
     ///
     /// # Errors
-    /// A file that is missing or damaged.
+    /// A file that is missing or damaged, or numbers of an earlier state of the folder.
     pub fn outcome(&self) -> Result<ExperimentOutcome, WorkflowError> {
+        self.check_outcome()?;
         Ok(ExperimentOutcome::from_json(&self.read_text(layout::OUTCOME)?, layout::OUTCOME)?)
     }
 

@@ -2,7 +2,9 @@
 
 use super::case::CaseError;
 use super::inputs::InputError;
+use super::meshing::MeshFileError;
 use super::settings::SettingsError;
+use super::simulation::SimulationError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
@@ -85,6 +87,10 @@ pub enum WorkflowError {
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    #[error(transparent)]
     Outcome(#[from] OutcomeError),
     #[error(transparent)]
     Report(#[from] ReportError),
@@ -115,11 +121,14 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
+            | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })
             | Self::Report(ReportError::Write(_))
             | Self::Engine { source: EngineError::Program { .. } | EngineError::Invalid { .. }, .. }
             | Self::Estimate(ProblemError::Instrument(_) | ProblemError::Estimate(EstimateError::Start(_))) => {
                 ErrorKind::Failed
             }
+            Self::Simulation(SimulationError::Fem { source, .. }) if !source.is_input() => ErrorKind::Failed,
             Self::Estimate(ProblemError::Body(BodyError::Fem(fem))) if !fem.is_input() => ErrorKind::Failed,
             _ => ErrorKind::Rejected,
         }

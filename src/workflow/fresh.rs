@@ -84,8 +84,7 @@ impl Case {
         let entries = std::fs::read_dir(self.path(".stages")).into_iter().flatten().flatten();
         let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
         let stages = names.filter_map(|name| name.strip_suffix(".manifest.json").map(str::to_owned));
-        let mut waiting: Vec<Manifest> =
-            stages.filter_map(|stage| Manifest::of_stage(self.folder(), &stage)).collect();
+        let mut waiting: Vec<Manifest> = stages.filter_map(|stage| Manifest::of_stage(self.folder(), &stage)).collect();
         waiting.sort_by(|a, b| a.stage.cmp(&b.stage));
         let mut ordered: Vec<Manifest> = Vec::new();
         while !waiting.is_empty() {

@@ -22,7 +22,10 @@
 
 mod case;
 mod error;
+mod fresh;
 mod inputs;
+mod lock;
+mod meshing;
 mod outcome;
 mod patient;
 mod phantom;
@@ -30,6 +33,7 @@ mod plan;
 mod programs;
 mod progress;
 mod settings;
+mod simulation;
 mod stages;
 mod why;
 mod work;
@@ -39,18 +43,21 @@ pub mod cohort;
 pub use case::{Case, CaseError};
 pub use error::{ErrorKind, WorkflowError};
 pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
+pub use meshing::{MeshFileError, MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
+pub use simulation::{Simulation, SimulationError, SimulationFiles, simulate};
 pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed, RegistrationFacts, mesh_outcome};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
 use crate::material::meta_model::MetaModel;
-use crate::report::case::write_report;
+use lock::Lock;
 use patient::{Images, Patient, Prepared};
+use phantom::Phantom;
 use stages::SampleMode;
 use work::Work;
 
@@ -83,18 +90,24 @@ pub fn run_to(
     can_be_done(&work, goal)?;
     if goal == Goal::Images {
         let images = Images::make(&work, inputs)?;
+        work.case.drop_stale();
         outcome::finish(&work, &images.outcome(), &images.manifests())?;
         return Ok(work.case);
     }
     let prepared = Prepared::make(&work, inputs)?;
-    match goal {
-        Goal::Images | Goal::Mesh => outcome::finish(&work, &prepared.outcome(), &prepared.manifests())?,
-        Goal::Sweep => Patient::new(&work, prepared)?.sweep(SampleMode::Run)?,
-        Goal::Estimate => {
-            Patient::new(&work, prepared)?.estimate(None)?;
-        }
+    work.case.drop_stale();
+    if goal == Goal::Mesh {
+        outcome::finish(&work, &prepared.outcome(), &prepared.manifests())?;
+        return Ok(work.case);
     }
-    Ok(work.case)
+    let patient = Patient::new(&work, prepared)?;
+    if goal == Goal::Sweep {
+        patient.samples(None, SampleMode::Run)?
+    } else {
+        patient.estimate()?
+    }
+    patient.gather()?;
+    Ok(work.case.clone())
 }
 
 /// What would be refused after minutes is refused now.
@@ -124,15 +137,20 @@ pub fn sweep(
     progress: &mut dyn Progress,
 ) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
-    let patient = Patient::new(&work, Prepared::read(&work.case)?)?;
-    if part.is_some() {
-        patient.samples(part, SampleMode::Run)?;
-        outcome::keep_settings(&work)?;
-    } else {
-        patient.sweep(SampleMode::Run)?;
+    prepared_case(&work, part.is_none())?;
+    let patient = Patient::new(&work, Prepared::read(&work)?)?;
+    outcome::keep_settings(&work)?;
+    patient.samples(part, SampleMode::Run)?;
+    if part.is_none() {
+        patient.gather()?;
     }
-    drop(patient);
-    Ok(work.case)
+    Ok(work.case.clone())
+}
+
+/// Takes a folder that holds a case.
+fn prepared_case(work: &Work<'_>, alone: bool) -> Result<(), WorkflowError> {
+    Case::open(work.case.folder())?;
+    work.hold(alone)
 }
 
 /// The parts of a sweep joined: outcome, table and page, the same bytes as one run.
@@ -141,8 +159,11 @@ pub fn sweep(
 /// As [`sweep`]; also a sample that is missing.
 pub fn reduce(place: &Place, settings: &Settings, progress: &mut dyn Progress) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
-    Patient::new(&work, Prepared::read(&work.case)?)?.sweep(SampleMode::Gather)?;
-    Ok(work.case)
+    prepared_case(&work, true)?;
+    let patient = Patient::new(&work, Prepared::read(&work)?)?;
+    patient.samples(None, SampleMode::Gather)?;
+    patient.gather()?;
+    Ok(work.case.clone())
 }
 
 /// The most probable moduli of a prepared case or of a phantom. The samples of an earlier sweep stay beside them.
@@ -152,14 +173,19 @@ pub fn reduce(place: &Place, settings: &Settings, progress: &mut dyn Progress) -
 pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress) -> Result<Case, WorkflowError> {
     let subject = Case::open(&place.folder)?.subject().unwrap_or(Subject::Patient);
     let work = Work::new(place, subject, settings, progress);
+    prepared_case(&work, true)?;
     if subject == Subject::Patient {
-        let patient = Patient::new(&work, Prepared::read(&work.case)?)?;
-        let earlier = work.case.path(crate::layout::OUTCOME).exists().then(|| work.case.outcome()).transpose()?;
-        patient.estimate(earlier)?;
+        let patient = Patient::new(&work, Prepared::read(&work)?)?;
+        outcome::keep_settings(&work)?;
+        patient.estimate()?;
+        patient.gather()?;
     } else {
-        phantom::estimate(&work)?;
+        let phantom = Phantom::read(&work)?;
+        outcome::keep_settings(&work)?;
+        phantom.estimate()?;
+        phantom.gather()?;
     }
-    Ok(work.case)
+    Ok(work.case.clone())
 }
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples.
@@ -174,8 +200,12 @@ pub fn phantom(
 ) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Phantom { every_task }, settings, progress);
     can_be_done(&work, Goal::Sweep)?;
-    phantom::make(&work)?;
-    Ok(work.case)
+    work.hold(true)?;
+    let phantom = Phantom::make(&work)?;
+    work.case.drop_stale();
+    phantom.samples()?;
+    phantom.gather()?;
+    Ok(work.case.clone())
 }
 
 /// The name of the sample whose moduli are nearest to a phantom's known ones.
@@ -191,9 +221,14 @@ pub fn nearest_sample(settings: &Settings, every_task: bool) -> Result<Option<St
 /// The page again from what is there.
 ///
 /// # Errors
-/// A file of the case that cannot be used.
+/// A file of the case that cannot be used, or an outcome of an earlier state of the folder.
 pub fn report(place: &Place) -> Result<Case, WorkflowError> {
-    let page = write_report(&place.folder);
-    page?;
-    Ok(Case::at(&place.folder))
+    let case = Case::at(&place.folder);
+    if case.subject().is_none() {
+        return Err(CaseError::NotACase { folder: place.folder.clone() }.into());
+    }
+    let _alone = Lock::take(&place.folder, true)?;
+    case.check_outcome()?;
+    outcome::write_page(&case)?;
+    Ok(case)
 }

@@ -1,12 +1,14 @@
 //! After the stages: the numbers gathered, the settings, the provenance and the page.
 
+use super::case::Case;
 use super::error::WorkflowError;
+use super::fresh::{GATHERED, Provenance, StageRecord};
 use super::stages::EstimateFacts;
 use super::work::Work;
-use crate::artefact::{Manifest, write_whole};
+use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
-use crate::report::case::write_report;
+use crate::report::case::report_files;
 
 /// Writes outcome, samples table, settings and provenance, then the page.
 pub(crate) fn finish(
@@ -17,8 +19,27 @@ pub(crate) fn finish(
     write_whole(&work.case.path(layout::OUTCOME), outcome.to_json(layout::OUTCOME)?.as_bytes())?;
     write_whole(&work.case.path(layout::SAMPLES_TABLE), samples_table(outcome).as_bytes())?;
     keep_settings(work)?;
-    write_whole(&work.case.path(layout::PROVENANCE), provenance(manifests).as_bytes())?;
-    write_report(work.case.folder())?;
+    write_whole(&work.case.path(layout::PROVENANCE), provenance(&work.case, manifests)?.as_bytes())?;
+    write_page(&work.case)
+}
+
+/// The page with the files for other viewers; those of an earlier page that this one has not are taken away.
+pub(crate) fn write_page(case: &Case) -> Result<(), WorkflowError> {
+    let files = report_files(case.folder())?;
+    for family in [layout::BEST_SURFACE, layout::BEST_ERRORS] {
+        for entry in std::fs::read_dir(case.path(family.folder())).into_iter().flatten().flatten() {
+            let name = format!("{}/{}", family.folder(), entry.file_name().to_string_lossy());
+            if family.member(&name).is_some() && !files.iter().any(|(file, _)| *file == name) {
+                std::fs::remove_file(entry.path()).ok();
+            }
+        }
+    }
+    if !files.iter().any(|(file, _)| file == layout::SAMPLES_SERIES) {
+        std::fs::remove_file(case.path(layout::SAMPLES_SERIES)).ok();
+    }
+    for (file, bytes) in files {
+        write_whole(&case.path(&file), &bytes)?;
+    }
     Ok(())
 }
 
@@ -27,14 +48,15 @@ pub(crate) fn keep_settings(work: &Work<'_>) -> Result<(), WorkflowError> {
     Ok(write_whole(&work.case.path(layout::SETTINGS), work.settings.to_toml().as_bytes())?)
 }
 
-/// `provenance.json`: program, stages, checksums of inputs and outputs.
-fn provenance(manifests: &[&Manifest]) -> String {
-    let stages: Vec<_> = manifests
-        .iter()
-        .map(|m| serde_json::json!({"stage": m.stage, "key": m.key, "inputs": m.inputs, "outputs": m.outputs}))
-        .collect();
-    let program = concat!("hgm ", env!("CARGO_PKG_VERSION"));
-    format!("{:#}", serde_json::json!({"program": program, "stages": stages}))
+/// `provenance.json`: program, stages, checksums of inputs and outputs, and of what was gathered from them.
+fn provenance(case: &Case, manifests: &[&Manifest]) -> Result<String, WorkflowError> {
+    let sum = |file: &str| Ok((file.to_owned(), sha256_hex(&case.read(file)?)));
+    let provenance = Provenance {
+        program: concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned(),
+        gathered: GATHERED.into_iter().map(sum).collect::<Result<_, WorkflowError>>()?,
+        stages: manifests.iter().map(|manifest| StageRecord::of(manifest)).collect(),
+    };
+    Ok(format!("{:#}", super::work::facts(&provenance)))
 }
 
 /// `sim/samples.csv`: a line per sample.

@@ -1,18 +1,18 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
-use super::case::{Case, CaseError};
+use super::case::CaseError;
 use super::error::WorkflowError;
-use super::inputs::{Inputs, OwnMasks, Scans};
-use super::outcome::{finish, with_estimate};
-use super::plan::{self, StageName, Subject};
+use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
+use super::outcome::{finish, keep_settings, with_estimate};
+use super::plan::{self, StageName};
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateFacts, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
-use crate::artefact::Manifest;
+use crate::artefact::{Manifest, Stage};
 use crate::experiment::observed::ObservedSurfaces;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor, SampleOutcome};
-use crate::experiment::sample::shard;
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
+use crate::experiment::sample::{Tissue, shard};
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
 use crate::layout::REST_MESH;
@@ -40,6 +40,9 @@ impl Images {
     pub fn make(work: &Work<'_>, inputs: &Inputs) -> Result<Self, WorkflowError> {
         let scans = Scans::read(inputs, &work.settings.image)?;
         let own = OwnMasks::read(inputs, &scans, work)?;
+        work.hold(true)?;
+        check_scans(work, &scans.sums)?;
+        keep_settings(work)?;
         let mut made = Made::default();
         let registration = stages::registration(work, &mut made, &scans)?;
         let anat = stages::anat(work, &mut made, &scans, &own)?;
@@ -55,6 +58,19 @@ impl Images {
     pub fn outcome(&self) -> ExperimentOutcome {
         outcome_of_images(&self.registration, &self.anat, &self.manifests())
     }
+}
+
+/// Other scans are another patient's, unless they are meant.
+fn check_scans(work: &Work<'_>, sums: &ScanSums) -> Result<(), WorkflowError> {
+    let Some(recorded) = Manifest::of_stage(work.case.folder(), &StageName::Registration.to_string()) else {
+        return Ok(());
+    };
+    for (role, which, sum) in [("pre", "pre-operative", &sums.pre), ("post", "post-operative", &sums.post)] {
+        if !work.place.force && recorded.inputs.get(role) != Some(sum) {
+            return Err(CaseError::OtherScan { folder: work.case.folder().to_path_buf(), which }.into());
+        }
+    }
+    Ok(())
 }
 
 fn in_order<'m>(made: &'m Made, stages: &[StageName]) -> Vec<&'m Manifest> {
@@ -90,20 +106,24 @@ impl Prepared {
         Ok(Self { made, registration, anat, mesh })
     }
 
-    /// What an earlier job left in the folder.
-    pub fn read(case: &Case) -> Result<Self, WorkflowError> {
-        if matches!(case.subject(), Some(Subject::Phantom { .. })) {
-            return Err(CaseError::Phantom { folder: case.folder().to_path_buf() }.into());
-        }
+    /// What an earlier job left in the folder, refused where it is not what these settings and the stages before it make.
+    pub fn read(work: &Work<'_>) -> Result<Self, WorkflowError> {
+        let case = &work.case;
         let mut made = Made::default();
-        let (manifest, registration) = case.stage(&StageName::Registration)?;
-        made.add(StageName::Registration, manifest);
-        let (manifest, anat) = case.stage(&StageName::Anat)?;
-        made.add(StageName::Anat, manifest);
-        let (manifest, mesh) = case.stage(&StageName::Mesh)?;
-        made.add(StageName::Mesh, manifest);
-        let (manifest, ()) = case.stage(&StageName::Reference)?;
-        made.add(StageName::Reference, manifest);
+        let (registered, registration): (Manifest, RegistrationFacts) = case.stage(&StageName::Registration)?;
+        let sum = |role: &str| registered.inputs.get(role).cloned().unwrap_or_default();
+        let sums = ScanSums { pre: sum("pre"), post: sum("post") };
+        is_present(work, &stages::registration_stage(work, &sums))?;
+        made.add(StageName::Registration, registered);
+        let (segmented, anat): (Manifest, AnatFacts) = case.stage(&StageName::Anat)?;
+        is_present(work, &stages::anat_stage(work, &made, &sums).own_masks_of(&segmented))?;
+        made.add(StageName::Anat, segmented);
+        let (meshed, mesh) = case.stage(&StageName::Mesh)?;
+        is_present(work, &stages::mesh_stage(work, &made).0)?;
+        made.add(StageName::Mesh, meshed);
+        let (observed, ()) = case.stage(&StageName::Reference)?;
+        is_present(work, &stages::reference_stage(work, &made))?;
+        made.add(StageName::Reference, observed);
         Ok(Self { made, registration, anat, mesh })
     }
 
@@ -121,6 +141,16 @@ impl Prepared {
             ..outcome_of_images(&self.registration, &self.anat, &self.manifests())
         }
     }
+}
+
+/// Refuses a stage that would be made again.
+pub(crate) fn is_present(work: &Work<'_>, stage: &Stage) -> Result<(), WorkflowError> {
+    let reasons = stage.why();
+    if reasons.is_empty() {
+        return Ok(());
+    }
+    let (folder, what) = (work.case.folder().to_path_buf(), format!("stage {}", stage.name()));
+    Err(CaseError::Stale { folder, what, reasons }.into())
 }
 
 /// Mesh, target and loads of a prepared case.
@@ -152,54 +182,66 @@ impl<'w, 'a> Patient<'w, 'a> {
     }
 
     /// Simulates the samples of one part, or all of them, and nothing else.
-    pub fn samples(
-        &self,
-        part: Option<Shard>,
-        mode: SampleMode,
-    ) -> Result<Vec<(SampleOutcome, Manifest)>, WorkflowError> {
+    pub fn samples(&self, part: Option<Shard>, mode: SampleMode) -> Result<(), WorkflowError> {
         let mut list = plan::samples(self.work.settings, self.work.subject)?;
         if let Some(Shard { number, of }) = part {
             list = shard(&list, number, of);
+        } else {
+            self.work.case.drop_samples_but(&list.iter().map(|sample| sample.id.as_str()).collect());
         }
         let tissues = plan::tissues(self.work.settings, self.work.subject);
-        let sweep = Sweep { mesh: &self.mesh, template: &self.scenario, tissues: &tissues, reference: &self.reference };
-        stages::samples(self.work, &self.prepared.made, &sweep, &list, mode)
+        stages::samples(self.work, &self.prepared.made, &self.posed(&tissues), &list, mode).map(|_| ())
     }
 
-    /// All samples, then outcome and page.
-    pub fn sweep(&self, mode: SampleMode) -> Result<(), WorkflowError> {
-        let (samples, made): (Vec<_>, Vec<_>) = self.samples(None, mode)?.into_iter().unzip();
-        let mut outcome = self.posed_outcome();
-        outcome.warnings.extend(made.iter().flat_map(|m| m.warnings.iter().cloned()));
-        let tissues = plan::tissues(self.work.settings, self.work.subject);
-        outcome.tissues = tissues.into_iter().map(|t| t.name).collect();
-        outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
-        outcome.samples = samples;
-        let manifests: Vec<&Manifest> = self.prepared.manifests().into_iter().chain(&made).collect();
-        finish(self.work, &outcome, &manifests)
+    fn posed<'s>(&'s self, tissues: &'s [Tissue]) -> Sweep<'s> {
+        Sweep { mesh: &self.mesh, template: &self.scenario, tissues, reference: &self.reference }
     }
 
-    /// Estimates the moduli against the post-operative surfaces. The samples of an `earlier` outcome stay beside it.
-    pub fn estimate(&self, earlier: Option<ExperimentOutcome>) -> Result<EstimateFacts, WorkflowError> {
-        let Self { work, mesh, prepared, .. } = self;
+    /// Estimates the moduli against what the post-operative scan shows.
+    pub fn estimate(&self) -> Result<(), WorkflowError> {
+        let Self { work, prepared, .. } = self;
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
-        let input = EstimateInput {
-            mesh: (mesh, &self.mesh_bytes),
+        let tissues = plan::tissues(work.settings, work.subject);
+        let input = EstimateInput { shift: Some(&shift), ..self.asked(&tissues) };
+        stages::estimate(work, &mut prepared.made.clone(), &input).map(|_| ())
+    }
+
+    fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
+        let settings = self.work.settings;
+        EstimateInput {
+            mesh: (&self.mesh, &self.mesh_bytes),
             scenario: &self.scenario,
-            tissues: &plan::tissues(work.settings, work.subject),
-            poisson_ratio: work.settings.resection.poisson_ratio,
+            tissues,
+            poisson_ratio: settings.resection.poisson_ratio,
             reference: &self.reference,
-            shift: Some(&shift),
-            noise_mm: self.floor().combined_mm().unwrap_or(work.settings.estimate.descent.noise_mm),
-        };
+            shift: None,
+            noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
+        }
+    }
+
+    /// Outcome and page of what is there for the settings of this job: samples, an estimate, or both.
+    pub fn gather(&self) -> Result<(), WorkflowError> {
+        let Self { work, prepared, .. } = self;
+        let tissues = plan::tissues(work.settings, work.subject);
+        let list = plan::samples(work.settings, work.subject)?;
+        let solved = stages::present_samples(work, &prepared.made, &self.posed(&tissues), &list)?;
+        let mut outcome = self.posed_outcome();
+        let mut manifests: Vec<Manifest> = Vec::new();
+        if let Some(solved) = solved {
+            let (samples, of_samples): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
+            manifests = of_samples;
+            outcome.warnings.extend(manifests.iter().flat_map(|m| m.warnings.iter().cloned()));
+            outcome.tissues = tissues.iter().map(|t| t.name.clone()).collect();
+            outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
+            outcome.samples = samples;
+        }
         let mut made = prepared.made.clone();
-        let facts = stages::estimate(work, &mut made, &input)?;
-        let mut outcome = earlier.filter(|o| !o.samples.is_empty()).unwrap_or_else(|| self.posed_outcome());
-        with_estimate(&mut outcome, &facts);
+        if let Some(facts) = stages::present_estimate(work, &mut made, &self.asked(&tissues))? {
+            with_estimate(&mut outcome, &facts);
+        }
         let own = made.get(&StageName::Estimate);
-        let manifests: Vec<&Manifest> = prepared.manifests().into_iter().chain(own).collect();
-        finish(work, &outcome, &manifests)?;
-        Ok(facts)
+        let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&manifests).chain(own).collect();
+        finish(work, &outcome, &all)
     }
 
     /// What is known before any material is tried.

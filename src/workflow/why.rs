@@ -40,7 +40,7 @@ pub struct Explained {
 /// A folder in which no stage has finished, or a scan that cannot be read.
 pub fn why(asked: &Asked, place: &Place, settings: &Settings) -> Result<Vec<Explained>, WorkflowError> {
     let case = Case::open(&place.folder)?;
-    let recorded = recorded(case.folder());
+    let recorded = case.recorded();
     let mut silent = Silent;
     let subject = case.subject().unwrap_or(Subject::Patient);
     let posed = posed(asked, &Work::new(place, subject, settings, &mut silent))?;
@@ -55,23 +55,6 @@ pub fn why(asked: &Asked, place: &Place, settings: &Settings) -> Result<Vec<Expl
 
 fn entry(stage: &str, reasons: Vec<String>) -> Explained {
     Explained { stage: stage.to_owned(), would_run: !reasons.is_empty(), reasons }
-}
-
-/// The manifests of a case, each after those of the stages it was made from.
-fn recorded(folder: &Path) -> Vec<Manifest> {
-    let entries = std::fs::read_dir(folder.join(".stages")).into_iter().flatten().flatten();
-    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let stages = names.filter_map(|name| name.strip_suffix(".manifest.json").map(str::to_owned));
-    let mut waiting: Vec<Manifest> = stages.filter_map(|stage| Manifest::of_stage(folder, &stage)).collect();
-    waiting.sort_by(|a, b| a.stage.cmp(&b.stage));
-    let mut ordered: Vec<Manifest> = Vec::new();
-    while !waiting.is_empty() {
-        let ready =
-            |m: &Manifest| !waiting.iter().any(|other| m.inputs.contains_key(&format!("stage {}", other.stage)));
-        let next = waiting.iter().position(ready).unwrap_or(0);
-        ordered.push(waiting.remove(next));
-    }
-    ordered
 }
 
 /// The stages of the plan as this job would pose them, each as if those before it were as they are recorded. Empty for a
@@ -103,14 +86,7 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     let pose = |step: &plan::Step| -> Option<Stage> {
         match &step.stage {
             StageName::Registration => Some(stages::registration_stage(work, &sums)),
-            StageName::Anat => {
-                let mut stage = stages::anat_stage(work, &made, &sums);
-                let recorded = &made.get(&StageName::Anat)?.inputs;
-                for (role, sum) in recorded.iter().filter(|(role, _)| role.ends_with(" mask")) {
-                    stage = stage.input_sha256(role, sum);
-                }
-                Some(stage)
-            }
+            StageName::Anat => Some(stages::anat_stage(work, &made, &sums).own_masks_of(made.get(&StageName::Anat)?)),
             StageName::Mesh => Some(stages::mesh_stage(work, &made).0),
             StageName::Reference => Some(stages::reference_stage(work, &made)),
             StageName::Sample(id) => {

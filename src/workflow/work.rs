@@ -2,6 +2,7 @@
 
 use super::case::{Case, CaseError};
 use super::error::WorkflowError;
+use super::lock::Lock;
 use super::plan::{StageName, Subject};
 use super::programs::Programs;
 use super::progress::{Progress, StageEnded};
@@ -9,7 +10,7 @@ use super::settings::Settings;
 use crate::artefact::{Manifest, Produced, Stage, StageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -37,6 +38,7 @@ pub(crate) struct Work<'a> {
     pub settings: &'a Settings,
     pub place: &'a Place,
     progress: RefCell<&'a mut dyn Progress>,
+    held: OnceCell<Lock>,
 }
 
 /// The manifests of the stages that are there, by name.
@@ -70,12 +72,28 @@ impl Made {
 
 impl<'a> Work<'a> {
     pub fn new(place: &'a Place, subject: Subject, settings: &'a Settings, progress: &'a mut dyn Progress) -> Self {
-        Self { case: Case::at(&place.folder), subject, settings, place, progress: RefCell::new(progress) }
+        Self {
+            case: Case::at(&place.folder),
+            subject,
+            settings,
+            place,
+            progress: RefCell::new(progress),
+            held: OnceCell::new(),
+        }
     }
 
     /// A stage of this name after those it is made from.
     pub fn stage(&self, made: &Made, name: &StageName, version: u32, settings: &impl Serialize) -> Stage {
         made.stage((&self.case, self.subject), name, version, settings)
+    }
+
+    /// Takes the folder until the job has ended, for this job alone or together with the other parts of a sweep; refused
+    /// where another job works in it, or where it was made from something else.
+    pub fn hold(&self, alone: bool) -> Result<(), WorkflowError> {
+        let lock = Lock::take(self.case.folder(), alone)?;
+        // A job takes its folder once.
+        self.held.set(lock).ok();
+        self.case.check_subject(self.subject)
     }
 
     /// Tells whoever listens.

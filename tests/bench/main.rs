@@ -16,6 +16,9 @@ mod patients;
 #[path = "../it/python.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod python;
+#[path = "../it/sequences.rs"]
+mod sequences;
+mod stale;
 
 use bar::Bar;
 
@@ -31,6 +34,7 @@ fn main() {
         ("patients", patients::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),
+        ("stale", stale::bars),
         ("job", job::bars),
         ("cohort", cohort::bars),
     ];

@@ -1,7 +1,7 @@
 //! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
 
 use super::brain_shift::SeenShift;
-use crate::artefact::Produced;
+use crate::artefact::{Produced, Stage};
 use crate::experiment::estimate::{
     DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
     Turn, Unknown, moved_by, solve_problem,
@@ -186,12 +186,8 @@ pub struct EstimateFacts {
     pub record: SampleOutcome,
 }
 
-/// Runs (or skips) the estimate.
-pub(crate) fn estimate(
-    work: &Work<'_>,
-    made: &mut Made,
-    input: &EstimateInput<'_>,
-) -> Result<EstimateFacts, WorkflowError> {
+/// The stage with its settings and inputs.
+pub(crate) fn estimate_stage(work: &Work<'_>, made: &Made, input: &EstimateInput<'_>) -> Result<Stage, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
     if prior.law != MetaModel::NEO_HOOKEAN {
@@ -201,7 +197,33 @@ pub(crate) fn estimate(
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
         "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
     });
-    let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME);
+    Ok(work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME))
+}
+
+/// The estimate of this case and these settings, where it is there.
+pub(crate) fn present_estimate(
+    work: &Work<'_>,
+    made: &mut Made,
+    input: &EstimateInput<'_>,
+) -> Result<Option<EstimateFacts>, WorkflowError> {
+    // What cannot be posed is not there.
+    let Ok(stage) = estimate_stage(work, made, input) else { return Ok(None) };
+    if !stage.why().is_empty() {
+        return Ok(None);
+    }
+    let (manifest, facts) = work.case.stage(&NAME)?;
+    made.add(NAME, manifest);
+    Ok(Some(facts))
+}
+
+/// Runs (or skips) the estimate.
+pub(crate) fn estimate(
+    work: &Work<'_>,
+    made: &mut Made,
+    input: &EstimateInput<'_>,
+) -> Result<EstimateFacts, WorkflowError> {
+    let (options, prior) = (&work.settings.estimate, &work.settings.prior);
+    let stage = estimate_stage(work, made, input)?;
     work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("estimate", 1));
         let mesh = input.mesh.0;

@@ -46,11 +46,17 @@ pub(crate) fn reference(work: &Work<'_>, made: &mut Made, anatomy: &Anatomy) -> 
     })
 }
 
+/// The stage of a phantom with its settings.
+pub(crate) fn phantom_reference_stage(work: &Work<'_>, made: &Made) -> Stage {
+    let settings = &work.settings.phantom;
+    work.stage(made, &NAME, PHANTOM_VERSION, &(&settings.scenario(), &settings.reference_sample()))
+}
+
 /// Simulates a phantom's reference and writes its state.
 pub(crate) fn phantom_reference(work: &Work<'_>, made: &mut Made, mesh: &TetMesh) -> Result<(), WorkflowError> {
     let settings = &work.settings.phantom;
     let (scenario, truth) = (settings.scenario(), settings.reference_sample());
-    let stage = work.stage(made, &NAME, PHANTOM_VERSION, &(&scenario, &truth));
+    let stage = phantom_reference_stage(work, made);
     let _: SampleOutcome = work.run(made, &NAME, &stage, || {
         let rest = Reference::Nodes(vec![[0.0; 3]; mesh.nodes_mm().len()]);
         let solved = solve_sample(mesh, &scenario, &settings.tissue_list(), &truth, &rest, &|_| {})

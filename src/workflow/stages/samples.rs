@@ -88,6 +88,24 @@ pub(crate) fn samples(
     Ok(records)
 }
 
+/// The samples of this case and these settings, where all of them are there.
+pub(crate) fn present_samples(
+    work: &Work<'_>,
+    made: &Made,
+    sweep: &Sweep<'_>,
+    list: &[Sample],
+) -> Result<Option<Vec<(SampleOutcome, Manifest)>>, WorkflowError> {
+    let there = |sample: &Sample| sample_stage(work, made, sweep.template, sweep.tissues, sample).why().is_empty();
+    if !list.iter().all(there) {
+        return Ok(None);
+    }
+    let read = |sample: &Sample| {
+        let (manifest, record) = work.case.stage(&StageName::Sample(sample.id.clone()))?;
+        Ok((record, manifest))
+    };
+    list.iter().map(read).collect::<Result<_, WorkflowError>>().map(Some)
+}
+
 fn produced(work: &Work<'_>, mesh: &TetMesh, solved: SolvedSample) -> Result<Produced, WorkflowError> {
     let mut produced = Produced::default();
     let mut record = solved.record;

@@ -1,0 +1,178 @@
+//! A label map in a file to a mesh in a file, with its boundary sets where it is in MNI space.
+
+use super::error::WorkflowError;
+use super::inputs::{InputError, read_input};
+use super::programs::Programs;
+use super::progress::Progress;
+use super::settings::Settings;
+use super::stages::mesh_outcome;
+use super::work::facts;
+use crate::artefact::{Produced, Stage, StageError, write_whole};
+use crate::experiment::outcome::MeshOutcome;
+use crate::geometry::Native;
+use crate::image::{LabelMap, nifti};
+use crate::mesh::engine::{EnginePrograms, MeshSettings, mesh_labels};
+use crate::mesh::format::{WriteError, feb, gifti, inp, msh, ply, stl, vtu};
+use crate::mesh::{TetMesh, TriMesh};
+use crate::report::mesh_figure::preview;
+use crate::segment::label;
+use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Raised when the code changes the mesh of the same labels and settings.
+const VERSION: u32 = 4;
+/// Width of the preview in pixels.
+const PREVIEW_PIXELS: usize = 1600;
+const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
+
+/// The files of a mesh.
+#[derive(Clone, Debug, Default)]
+pub struct MeshFiles {
+    /// Label map (NIfTI).
+    pub labels: PathBuf,
+    /// Where to write: .vtu, .msh (gmsh 4.1), .inp (Abaqus) or .feb (FEBio).
+    pub output: PathBuf,
+    /// Whether the labels are in MNI space, which boundary sets and the sheet of the falx need; what the file says where it
+    /// is not known.
+    pub in_mni: Option<bool>,
+    /// Cut views as PNG.
+    pub preview: Option<PathBuf>,
+    /// Folder for the closed surfaces pial, white, ventricle and margin as GIFTI, STL and PLY.
+    pub surfaces: Option<PathBuf>,
+}
+
+/// What a mesh has turned out to be, as its manifest keeps it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MeshedFile {
+    /// Size and quality.
+    #[serde(flatten)]
+    pub mesh: MeshOutcome,
+    /// Target edge that gave the mesh, mm.
+    pub edge_mm: f64,
+    /// Parts of the label map that were too small.
+    pub islands: usize,
+    /// The boundary sets.
+    pub sets: Vec<SetReport>,
+    /// Why the quality gate refuses the mesh.
+    pub refused: Vec<String>,
+}
+
+/// Why a label map in a file cannot be meshed.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum MeshFileError {
+    #[error("{}: the name of a mesh ends in .vtu, .msh, .inp or .feb", output.display())]
+    Output { output: PathBuf },
+    #[error("{file}: {source}")]
+    Format { file: String, source: WriteError },
+    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
+    Noted { file: String },
+    #[error(transparent)]
+    Input(#[from] InputError),
+}
+
+/// Meshes a label map, or skips what is there. A mesh whose sets are not to be believed is written all the same
+/// ([`MeshedFile::refused`]).
+///
+/// # Errors
+/// A label map or a name that cannot be used, an engine that fails, the disk's.
+pub fn mesh_file(
+    files: &MeshFiles,
+    settings: &Settings,
+    programs: &Programs,
+    force: bool,
+    progress: &mut dyn Progress,
+) -> Result<MeshedFile, WorkflowError> {
+    let extension = files.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if !FORMATS.contains(&extension.as_str()) {
+        return Err(MeshFileError::Output { output: files.output.clone() }.into());
+    }
+    let name = files.labels.display().to_string();
+    let bytes = read_input(&files.labels)?;
+    let (mut posed, tags, programs) = (settings.mesh.clone(), &settings.tag, programs.engines());
+    let refused = |source| WorkflowError::Engine { labels: name.clone(), source };
+    programs.check(posed.engine).map_err(refused)?;
+    let (labels, odd) = nifti::decode_labels(&bytes, &name, &settings.image)?;
+    odd.iter().for_each(|what| progress.odd(&name, what));
+    let in_mni = files.in_mni.unwrap_or_else(|| name.contains("space-MNI") || nifti::says_mni(&bytes));
+    if in_mni && tags.falx && posed.split.is_none() {
+        posed.split = Some(falx_sheet());
+    }
+
+    let folder = files.output.parent().map(Path::to_path_buf).unwrap_or_default();
+    let file = files.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let frame = if in_mni { "MNI" } else { "native" };
+    let stage = Stage::new(&format!("mesh-{file}"), VERSION, &folder, &(&posed, in_mni.then_some(tags)));
+    let stage = stage.input("labels", &bytes).frame(frame);
+    // Pictures and surfaces are made from the mesh at hand, so asking for them is asking for the mesh.
+    let force = force || files.preview.is_some() || files.surfaces.is_some();
+    let outcome = stage.run(force, || {
+        let (mesh, meshed) = make(&labels, &posed, in_mni.then_some(tags), (&name, &programs))?;
+        if let Some(path) = &files.preview {
+            write_whole(path, &preview(&mesh, None, PREVIEW_PIXELS))?;
+        }
+        if let Some(folder) = &files.surfaces {
+            write_surfaces(&mesh, folder)?;
+        }
+        let bytes = encode(&mesh, &extension).map_err(|source| MeshFileError::Format { file: file.clone(), source })?;
+        Ok(Produced { files: vec![(file.clone(), bytes)], facts: facts(&meshed), warnings: meshed.refused })
+    });
+    let outcome = outcome.map_err(|error| match error {
+        StageError::Compute(error) => error,
+        StageError::Write(error) => WorkflowError::Write(error),
+    })?;
+    Ok(serde_json::from_value(outcome.manifest.facts).map_err(|_| MeshFileError::Noted { file })?)
+}
+
+/// Meshes and, with `tags`, tags.
+fn make(
+    labels: &LabelMap<Native>,
+    settings: &MeshSettings,
+    tags: Option<&TagSettings>,
+    (name, programs): (&str, &EnginePrograms),
+) -> Result<(TetMesh, MeshedFile), WorkflowError> {
+    let (mut mesh, record) = mesh_labels(labels, settings, programs)
+        .map_err(|source| WorkflowError::Engine { labels: name.to_owned(), source })?;
+    let (mut sets, mut refused) = (Vec::new(), Vec::new());
+    if let Some(tags) = tags {
+        match tag_boundary_sets(&mut mesh, tags) {
+            Ok(report) => (sets, refused) = (report.sets, report.warnings),
+            Err(error) => refused.push(error.to_string()),
+        }
+    }
+    let figures = mesh_outcome(&mesh, &mesh, labels, settings);
+    let islands = record.islands.len();
+    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, sets, refused }))
+}
+
+fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
+    Ok(match extension {
+        "msh" => msh::encode(mesh)?,
+        "inp" => inp::encode(mesh)?,
+        "feb" => feb::encode(mesh, &BTreeMap::new())?,
+        _ => vtu::encode(mesh, &[], &[])?,
+    })
+}
+
+/// The closed, outward surfaces that the mesh has, each in three formats.
+fn write_surfaces(mesh: &TetMesh, folder: &Path) -> Result<(), WorkflowError> {
+    let all = mesh.boundary_facets(|_| true);
+    let of = |l: u8| mesh.boundary_facets(|own| own == l);
+    let surfaces = [
+        ("pial", all),
+        ("white", of(label::WHITE_MATTER)),
+        ("ventricle", of(label::VENTRICLE)),
+        ("margin", of(label::RESECTED)),
+    ];
+    for (name, facets) in surfaces.into_iter().filter(|s| !s.1.is_empty()) {
+        let (surface, _) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
+        let gii = gifti::encode_surface(&surface, gifti::Space::Mni152, name);
+        write_whole(&folder.join(format!("{name}.surf.gii")), &gii)?;
+        write_whole(&folder.join(format!("{name}.stl")), &stl::encode(&surface))?;
+        write_whole(&folder.join(format!("{name}.ply")), &ply::encode(&surface, &[])?)?;
+    }
+    Ok(())
+}

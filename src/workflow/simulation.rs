@@ -1,0 +1,246 @@
+//! One deformation, or one motion, of a mesh in a file by the scenario in another.
+
+use super::error::WorkflowError;
+use super::inputs::{InputError, read_input, read_text};
+use super::progress::Progress;
+use super::settings::in_words;
+use super::work::facts;
+use crate::artefact::{Produced, Stage, StageError};
+use crate::experiment::rmse::{node_errors_mm, root_mean_square};
+use crate::fem::{self, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from};
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, ReadError, WriteError, msh, pvd, vtu};
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Raised when the solver's code changes its results.
+const VERSION: u32 = 1;
+
+/// The files of a simulation.
+#[derive(Clone, Debug, Default)]
+pub struct SimulationFiles {
+    /// Tetrahedral mesh with labels and sets (.vtu or .msh).
+    pub mesh: PathBuf,
+    /// Materials, loads, held sets and solver settings (TOML).
+    pub scenario: PathBuf,
+    /// Where to write the deformed state (.vtu).
+    pub output: PathBuf,
+    /// An earlier result on the same mesh to start from.
+    pub start: Option<PathBuf>,
+    /// A result to compare with.
+    pub reference: Option<PathBuf>,
+}
+
+/// Why a mesh in a file cannot be simulated.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum SimulationError {
+    #[error("{}: the name of a deformed state ends in .vtu", output.display())]
+    Output { output: PathBuf },
+    #[error("{name}: the name of a mesh ends in .vtu or .msh; convert the file first, for example with meshio")]
+    MeshName { name: String },
+    #[error("{name}: {reason}")]
+    Scenario { name: String, reason: String },
+    #[error("a motion (`method = \"backward-euler\"`) starts at rest: it takes no state to start from")]
+    StartOfMotion,
+    #[error("{name}: no point array `displacement` of three components; give the result of a simulation")]
+    NoDisplacement { name: String },
+    #[error("{name}: has {found} nodes, the mesh {nodes}: give a result on the same mesh")]
+    OtherMesh { name: String, found: usize, nodes: usize },
+    #[error("{names}: {source}")]
+    Fem { names: String, source: FemError },
+    #[error("{name}: {source}")]
+    Format { name: String, source: WriteError },
+    #[error("`{field}` is not a finite number everywhere: the result is not written")]
+    NotFinite { field: String },
+    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
+    Noted { file: String },
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error(transparent)]
+    Mesh(#[from] ReadError),
+}
+
+/// What a simulation has found, as its manifest keeps it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Simulation {
+    /// The file of the deformed state.
+    pub output: String,
+    /// The series of a motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub series: Option<String>,
+    /// The element.
+    pub element: ElementKind,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Tetrahedra of the mesh.
+    pub tets: usize,
+    /// Largest displacement, mm.
+    pub displacement_max_mm: f64,
+    /// Root mean square of the displacement over the nodes, mm.
+    pub displacement_rms_mm: f64,
+    /// Sum of the supports' forces, N.
+    pub reaction_n: [f64; 3],
+    /// Root mean square error against the reference, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_mm: Option<f64>,
+    /// The solver's record.
+    pub convergence: ConvergenceRecord,
+    /// The record of a motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+}
+
+/// Simulates, or skips what is there, and returns what was found with whether it was there already.
+///
+/// # Errors
+/// [`WorkflowError::Simulation`] for files that do not fit and bodies without equilibrium; the disk's.
+pub fn simulate(
+    files: &SimulationFiles,
+    force: bool,
+    progress: &mut dyn Progress,
+) -> Result<(Simulation, bool), WorkflowError> {
+    let (folder, file) = destination(&files.output)?;
+    let mesh_bytes = read_input(&files.mesh)?;
+    let mesh = mesh(&files.mesh, &mesh_bytes)?;
+    let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
+        name: files.scenario.display().to_string(),
+        reason: in_words(&e.to_string()),
+    })?;
+    let start = files.start.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
+    if start.is_some() && scenario.solver.method == Method::BackwardEuler {
+        return Err(SimulationError::StartOfMotion.into());
+    }
+    let reference = files.reference.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
+
+    let stem = file.trim_end_matches(".vtu").to_owned();
+    let mut stage = Stage::new(&format!("simulate-{stem}"), VERSION, &folder, &scenario).input("mesh", &mesh_bytes);
+    for (role, field) in [("start", &start), ("reference", &reference)] {
+        if let Some(field) = field {
+            let bytes: Vec<u8> = field.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+            stage = stage.input(role, &bytes);
+        }
+    }
+    let names = || format!("{} on {}", files.scenario.display(), files.mesh.display());
+    let compute = || -> Result<Produced, SimulationError> {
+        let progress = RefCell::new(progress);
+        progress.borrow_mut().begin("simulation", 100);
+        let shown = RefCell::new(0);
+        let show = |p: &fem::Progress| {
+            // A static solve closes in on its residual by orders of magnitude; a motion goes through its time.
+            let closed = p.relative_residual.max(p.goal).ln() / p.goal.ln();
+            let done = if scenario.solver.method == Method::Static { closed } else { p.fraction };
+            let percent = (100.0 * done.clamp(0.0, 1.0)) as usize;
+            let mut progress = progress.borrow_mut();
+            (shown.replace_with(|before| percent.max(*before))..percent).for_each(|_| progress.step());
+            progress.doing(&format!("iteration {} residual {:.1e}", p.iteration, p.relative_residual));
+        };
+        let found = match &start {
+            Some(start) => simulate_from(&mesh, &scenario, start, &show),
+            None => fem::simulate(&mesh, &scenario, &show),
+        };
+        progress.borrow_mut().end();
+        let outcome = found.map_err(|source| SimulationError::Fem { names: names(), source })?;
+        produced(&mesh, &scenario, outcome, reference.as_deref(), &stem)
+    };
+    let outcome = stage.run(force, compute).map_err(|error| match error {
+        StageError::Compute(error) => WorkflowError::from(error),
+        StageError::Write(error) => error.into(),
+    })?;
+    let noted = |_| SimulationError::Noted { file: file.clone() };
+    Ok((serde_json::from_value(outcome.manifest.facts).map_err(noted)?, outcome.skipped))
+}
+
+/// Folder and name of the output.
+fn destination(output: &Path) -> Result<(PathBuf, String), SimulationError> {
+    let named = output.file_name().map(|name| name.to_string_lossy().into_owned());
+    match named {
+        Some(name) if name.ends_with(".vtu") && !output.is_dir() => {
+            let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
+            Ok((folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf), name))
+        }
+        _ => Err(SimulationError::Output { output: output.to_path_buf() }),
+    }
+}
+
+fn mesh(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
+    let name = path.display().to_string();
+    match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
+        Some("vtu") => Ok(vtu::decode(bytes, &name)?.mesh),
+        Some("msh") => Ok(msh::decode(bytes, &name)?),
+        _ => Err(SimulationError::MeshName { name }),
+    }
+}
+
+/// The array `displacement` of a result.
+fn displacement(path: &Path, mesh: &TetMesh) -> Result<Vec<[f64; 3]>, SimulationError> {
+    let name = path.display().to_string();
+    let state = vtu::decode(&read_input(path)?, &name)?;
+    let Some(vectors) = state.point_field("displacement").and_then(Field::vectors) else {
+        return Err(SimulationError::NoDisplacement { name });
+    };
+    let (found, nodes) = (vectors.len(), mesh.nodes_mm().len());
+    if found == nodes { Ok(vectors) } else { Err(SimulationError::OtherMesh { name, found, nodes }) }
+}
+
+fn produced(
+    mesh: &TetMesh,
+    scenario: &Scenario,
+    mut outcome: Outcome,
+    reference: Option<&[[f64; 3]]>,
+    stem: &str,
+) -> Result<Produced, SimulationError> {
+    let output = format!("{stem}.vtu");
+    let refused = |name: &str| {
+        let name = name.to_owned();
+        move |source| SimulationError::Format { name, source }
+    };
+    let mut files = Vec::new();
+    let errors = reference.map(|reference| node_errors_mm(&outcome.displacement_mm, reference));
+    let mut points =
+        vec![Field::vector("displacement", &outcome.displacement_mm), Field::vector("reaction_n", &outcome.reaction_n)];
+    points.extend(errors.iter().map(|e| Field::scalar("rmse_mm", e.clone())));
+    let cells = [
+        Field::scalar("jacobian", outcome.jacobian),
+        Field::scalar("strain_energy_density_pa", outcome.strain_energy_density_pa),
+    ];
+    if let Some(field) = points.iter().chain(&cells).find(|f| f.values.iter().any(|v| !v.is_finite())) {
+        return Err(SimulationError::NotFinite { field: field.name.clone() });
+    }
+    let mut series = Vec::new();
+    if let Some(motion) = &mut outcome.motion {
+        for (n, frame) in std::mem::take(&mut motion.frames).into_iter().enumerate() {
+            let name = format!("{stem}-{:04}.vtu", n + 1);
+            let field = [Field::vector("displacement", &frame.displacement_mm)];
+            let bytes = vtu::encode(mesh, &field, &[]).map_err(refused(&name))?;
+            files.push((name.clone(), bytes));
+            series.push((frame.time_s, name));
+        }
+    }
+    let sizes: Vec<f64> = outcome.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
+    let summary = Simulation {
+        output: output.clone(),
+        series: (!series.is_empty()).then(|| format!("{stem}.pvd")),
+        element: scenario.solver.element,
+        nodes: mesh.nodes_mm().len(),
+        tets: mesh.tets().len(),
+        displacement_max_mm: sizes.iter().copied().fold(0.0, f64::max),
+        displacement_rms_mm: root_mean_square(&sizes).unwrap_or(0.0),
+        reaction_n: [0, 1, 2].map(|i| outcome.reaction_n.iter().map(|r| r[i]).sum()),
+        rmse_mm: errors.as_deref().and_then(root_mean_square),
+        convergence: outcome.convergence,
+        motion: outcome.motion,
+        warnings: outcome.warnings.clone(),
+    };
+    let bytes = vtu::encode(mesh, &points, &cells).map_err(refused(&output))?;
+    files.push((output, bytes));
+    if let Some(name) = &summary.series {
+        let list: Vec<(f64, &str)> = series.iter().map(|(time, file)| (*time, file.as_str())).collect();
+        files.push((name.clone(), pvd::encode(&list)));
+    }
+    Ok(Produced { files, warnings: outcome.warnings, facts: facts(&summary) })
+}
