@@ -4,9 +4,10 @@
 //! file came from is written in `atlases/mni152/PROVENANCE.md`.
 
 use super::atlas_labels::derive_labels;
-use crate::geometry::{Mni, Position};
+use crate::geometry::{AffineTransform, Mni, Position};
+use crate::image::resample::resample_nearest;
 use crate::image::{Grid, LabelMap, Mask, Volume};
-use nalgebra::Matrix4;
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use std::io::Read;
 use std::sync::OnceLock;
 
@@ -54,6 +55,37 @@ pub fn template() -> &'static Atlas {
         white: decode(include_bytes!("../../atlases/mni152/mni_icbm152_wm_tal_nlin_sym_09a_converted.nii.gz")),
         labels: decode(include_bytes!("../../atlases/mni152/labels.nii.gz")),
     })
+}
+
+/// The mean of many whole heads, in natural size, in the template's frame: scalp, skull, eyes and brain at 2 mm.
+///
+/// Where it came from is written in `atlases/head/PROVENANCE.md`.
+///
+/// # Panics
+/// Never for the embedded file; a test decodes it.
+pub fn mean_head() -> &'static MeanHead {
+    static HEAD: OnceLock<MeanHead> = OnceLock::new();
+    HEAD.get_or_init(|| {
+        let t1 = decode(include_bytes!("../../atlases/head/head.nii.gz")).map(f32::from);
+        let template_from_head = head_from_template().inverse().expect("a stretch can be inverted");
+        let brain = resample_nearest(&template().t1, &t1.grid, &template_from_head, 0).map(|x| x > 0);
+        MeanHead { t1, brain }
+    })
+}
+
+/// The whole head that poses and sizes are measured against.
+#[derive(Clone, Debug)]
+pub struct MeanHead {
+    /// T1 intensity, 0 to 255.
+    pub t1: Volume<f32, Mni>,
+    /// The template's brain on it.
+    pub brain: Mask<Mni>,
+}
+
+/// From the template, which is larger than people are, to the mean head in its natural size.
+pub fn head_from_template() -> AffineTransform<Mni, Mni> {
+    let linear = Matrix3::new(0.8731, 0.0, 0.0, 0.0, 0.8968, -0.0195, 0.0, -0.0195, 0.8124);
+    AffineTransform::from_parts(linear, Vector3::new(0.0, -2.0966, 1.3455))
 }
 
 impl Atlas {
@@ -120,6 +152,21 @@ mod tests {
         assert_eq!(atlas.grid().spacing_mm(), [1.0; 3]);
         assert_eq!(atlas.t1.nearest(Position::new(0.0, -20.0, 0.0)).map(|v| v > 0), Some(true));
         assert!((1850.0..1920.0).contains(&atlas.brain().volume_cc()), "{}", atlas.brain().volume_cc());
+    }
+
+    #[test]
+    fn the_mean_head_is_symmetric_of_natural_size_and_its_brain_lies_inside_its_scalp() {
+        let head = mean_head();
+        assert!((1100.0..1300.0).contains(&head.brain.volume_cc()), "{}", head.brain.volume_cc());
+        let [nx, ny, nz] = head.t1.grid.dims;
+        for (i, j, k) in (0..nx * ny * nz).step_by(997).map(|n| (n % nx, n / nx % ny, n / (nx * ny))) {
+            assert!((head.t1.at(i, j, k) - head.t1.at(nx - 1 - i, j, k)).abs() <= 1.0, "{i} {j} {k}");
+        }
+        let at = |x, y, z| head.t1.nearest(Position::new(x, y, z)).unwrap_or(0.0);
+        let along_the_vertex: Vec<f32> = (50..95).map(|z| at(0.0, -20.0, f64::from(z))).collect();
+        let brightest = along_the_vertex.iter().copied().fold(0.0, f32::max);
+        assert!(at(24.0, -20.0, 30.0) > 150.0 && brightest > 80.0, "white matter, scalp");
+        assert!(at(0.0, -20.0, 99.0) < 20.0, "air above the scalp");
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, segment_with_priors};
-use crate::geometry::{Frame, Mni, Position, RigidTransform};
-use crate::image::Volume;
+use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
+use crate::image::{Mask, Volume};
 use crate::image::resample::{Interpolation, resample};
+use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use thiserror::Error;
 
@@ -21,6 +22,15 @@ pub enum HeadError {
     Segment(#[from] SegmentError),
 }
 
+/// The pose of a head in the template's frame, found against the mean of whole heads.
+///
+/// # Errors
+/// [`RegisterError`].
+pub fn pose_of_head<F: Frame>(t1: &Volume<f32, F>) -> Result<RigidFit<F, Mni>, RegisterError> {
+    let head = atlas::mean_head();
+    register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain })
+}
+
 /// The template deformed onto a head; both in the MNI frame reached rigidly.
 ///
 /// # Errors
@@ -33,7 +43,16 @@ pub fn fit_template<F: Frame>(
     let template = atlas::template().t1_f32();
     let affine = mni_from_t1.inverse().to_affine();
     let on_grid = resample(t1, &template.grid, &affine, Interpolation::Linear, f32::NAN);
-    fit_atlas(&on_grid.volume, &template, None, settings)
+    let start = if settings.affine { stretch(&on_grid.volume, &on_grid.inside) } else { AffineTransform::identity() };
+    fit_atlas(&on_grid.volume, &template, &start, None, settings)
+}
+
+/// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
+fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
+    let head = atlas::mean_head();
+    let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
+    let mean = MeanHead { t1: &head.t1, brain: &head.brain };
+    atlas::head_from_template().then(&subject_from_mean_head(&finite, &mean, Some(known)))
 }
 
 /// The template's maps read through `template_from_patient`, a map that [`fit_template`] made.
