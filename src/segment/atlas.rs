@@ -7,7 +7,7 @@ use super::atlas_labels::derive_labels;
 use crate::geometry::{AffineTransform, Mni, Position};
 use crate::image::resample::resample_nearest;
 use crate::image::{Grid, LabelMap, Mask, Volume};
-use nalgebra::{Matrix3, Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 use std::io::Read;
 use std::sync::OnceLock;
 
@@ -110,6 +110,30 @@ impl Atlas {
     }
 }
 
+/// Thalamus, putamen and pallidum of the template: ellipsoids placed by eye, of which what is darker than the capsules.
+///
+/// Iron and fibres make these nuclei nearly as bright as white matter, in many scans quite as bright: only their place tells
+/// them apart. The caudate nucleus, hippocampus and amygdala look like cortex and need no help.
+pub fn deep_grey() -> Mask<Mni> {
+    /// Centre and radii in mm of the right side's ellipsoid; how far its axis moves outwards for each mm backwards;
+    /// the template's intensities in it.
+    type Nucleus = ([f64; 3], [f64; 3], f64, std::ops::Range<u8>);
+    const NUCLEI: [Nucleus; 3] = [
+        ([11.5, -18.0, 8.0], [11.5, 15.5, 11.0], 0.3, 150..208),
+        ([25.5, 2.0, 2.0], [8.0, 20.0, 13.0], 0.28, 160..202),
+        ([19.5, -4.0, -1.0], [6.5, 11.0, 7.0], 0.3, 160..212),
+    ];
+    let t1 = &template().t1;
+    Mask::from_fn(t1.grid, |n| {
+        let p = t1.grid.position(Point3::from(t1.grid.voxel(n).map(|v| v as f64))).mm;
+        NUCLEI.iter().any(|(centre, radii, outwards, range)| {
+            let x = p.x.abs() - centre[0] + outwards * (p.y - centre[1]);
+            let along = [x / radii[0], (p.y - centre[1]) / radii[1], (p.z - centre[2]) / radii[2]];
+            along.iter().map(|a| a * a).sum::<f64>() < 1.0 && range.contains(&t1.data[n])
+        })
+    })
+}
+
 /// The temporal lobe that holds a point, by planes placed by eye on the template: below the Sylvian fissure, above the
 /// tentorium, lateral of the brainstem. Rough: for naming and ranking, not for measuring.
 pub fn temporal_lobe(p: Position<Mni>) -> Option<Side> {
@@ -167,6 +191,20 @@ mod tests {
         let brightest = along_the_vertex.iter().copied().fold(0.0, f32::max);
         assert!(at(24.0, -20.0, 30.0) > 150.0 && brightest > 80.0, "white matter, scalp");
         assert!(at(0.0, -20.0, 99.0) < 20.0, "air above the scalp");
+    }
+
+    #[test]
+    fn the_deep_nuclei_have_their_volumes_and_leave_the_internal_capsule_out() {
+        let deep = deep_grey();
+        // Both sides of a template half as large again as a head.
+        assert!((25.0..36.0).contains(&deep.volume_cc()), "{}", deep.volume_cc());
+        let at = |x, y, z| deep.nearest(Position::new(x, y, z)).unwrap_or(false);
+        for (x, y, z) in [(14.0, -18.0, 8.0), (27.0, 2.0, 2.0), (20.0, -6.0, -1.0)] {
+            assert!(at(x, y, z) && at(-x, y, z), "{x} {y} {z}");
+        }
+        for (x, y, z) in [(18.0, 8.0, 8.0), (27.0, -25.0, 12.0), (13.0, 12.0, 10.0), (0.0, -20.0, 26.0)] {
+            assert!(!at(x, y, z) && !at(-x, y, z), "{x} {y} {z}");
+        }
     }
 
     #[test]
