@@ -7,8 +7,8 @@ use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::nifti::{self, NiftiImage};
 use crate::image::{Mask, Volume};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
-use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid, register_to_template};
-use crate::segment::atlas;
+use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid};
+use crate::segment::pose_of_head;
 use crate::workflow::{Settings, read_input};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
@@ -70,7 +70,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 "--moving-mask and --fixed-mask do not go with MNI: the template's own brain is used; leave them out"
             )));
         }
-        parts(register_to_template(&moving, &atlas::template().t1_f32(), settings).with_context(names).reject()?)
+        parts(pose_of_head(&moving).with_context(names).reject()?)
     } else {
         let (fixed, fixed_bytes) = image(&args.fixed, &whole, &mut warnings)?;
         if fixed_bytes == moving_bytes {

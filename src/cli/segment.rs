@@ -6,8 +6,7 @@ use crate::artefact::write_whole;
 use crate::geometry::Native;
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::image::{Mask, Volume};
-use crate::register::register_to_template;
-use crate::segment::{SegmentOverrides, TissueVolumes, atlas, segment_head};
+use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
 use crate::workflow::{Settings, read_input};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
@@ -60,9 +59,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
     let bar = session.progress(2, "segment");
     bar.set_message("to MNI");
-    let fit = register_to_template(&t1, &atlas::template().t1_f32(), &settings.register)
-        .with_context(|| name.clone())
-        .reject()?;
+    let fit = pose_of_head(&t1).with_context(|| name.clone()).reject()?;
     bar.inc(1);
     bar.set_message("labels");
     let overrides = SegmentOverrides { brain: brain.as_ref(), ..SegmentOverrides::default() };

@@ -18,8 +18,14 @@ pub(super) fn foreground(image: &Volume<f32, Native>) -> Mask<Native> {
 /// Bins of Otsu's histogram.
 const BINS: usize = 256;
 
-/// Half way from the smallest value to the threshold that best separates two classes (Otsu 1979).
+/// Half way from the smallest value to Otsu's threshold.
 fn half_otsu(values: &[f32]) -> f32 {
+    let [low, threshold] = otsu(values);
+    low + 0.5 * (threshold - low)
+}
+
+/// The smallest value and the threshold that best separates two classes (Otsu 1979).
+pub(super) fn otsu(values: &[f32]) -> [f32; 2] {
     let [low, high] = range_of(values.iter().copied(), 0.0, 0.999);
     let mut histogram = [0f64; BINS];
     for &x in values {
@@ -40,7 +46,7 @@ fn half_otsu(values: &[f32]) -> f32 {
             }
         }
     }
-    low + 0.5 * (best.1 as f32 + 1.0) / BINS as f32 * (high - low)
+    [low, low + (best.1 as f32 + 1.0) / BINS as f32 * (high - low)]
 }
 
 /// Two quantiles of the values, always apart; at most about 200 000 values are looked at.
@@ -59,8 +65,13 @@ pub(super) fn range_of(values: impl Iterator<Item = f32>, low: f64, high: f64) -
     if b > a { [a, b] } else { [a, sorted[sorted.len() - 1].max(a + 1e-3 * a.abs().max(1.0))] }
 }
 
-/// Quantiles of the values inside a region (given on any grid).
+/// The range of nearly all values inside a region (given on any grid).
 pub(super) fn range_inside(image: &Volume<f32, Native>, region: &Mask<Native>) -> [f32; 2] {
+    range_within(image, region, 0.002, 0.998)
+}
+
+/// Two quantiles of the values inside a region (given on any grid).
+pub(super) fn range_within(image: &Volume<f32, Native>, region: &Mask<Native>, low: f64, high: f64) -> [f32; 2] {
     let to_region = region.grid.voxel_from_mm() * image.grid.mm_from_voxel;
     let stride = (image.grid.len() / 400_000).max(1);
     let values = (0..image.grid.len()).step_by(stride).filter_map(|index| {
@@ -69,7 +80,7 @@ pub(super) fn range_inside(image: &Volume<f32, Native>, region: &Mask<Native>) -
         let inside = region.get(p.x.round() as isize, p.y.round() as isize, p.z.round() as isize);
         inside.unwrap_or(false).then_some(image.data[index])
     });
-    range_of(values, 0.002, 0.998)
+    range_of(values, low, high)
 }
 
 /// Centre of the region's upper part, in mm.

@@ -36,12 +36,35 @@ pub(super) struct Optimum {
 }
 
 /// What the pose may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Freedom {
     /// Turn and move: 6 parameters.
     Rigid,
-    /// Any linear map: 12 parameters.
-    Affine,
+    /// Any linear map: 12 parameters, held back from stretches that no head has.
+    Affine(Tether),
+}
+
+/// What a pose that stretches loses: a Gaussian prior of the stretch, in the measure's own unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tether {
+    /// Standard deviation of the stretch along an axis (logarithm).
+    pub stretch: f64,
+    /// Standard deviation of a shear.
+    pub shear: f64,
+    /// How much mutual information a stretch of one standard deviation may cost, twice, in nats.
+    pub weight: f64,
+}
+
+impl Tether {
+    /// The loss at a linear map and its derivative with respect to the map. The strain is Green's, (L^T L - I) / 2: blind
+    /// to turns, and the logarithm of the stretch to first order.
+    fn loss(&self, linear: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
+        let strain = 0.5 * (linear.transpose() * linear - Matrix3::identity());
+        let precision =
+            Matrix3::from_fn(|a, b| self.weight / if a == b { self.stretch } else { self.shear }.powi(2));
+        let stress = strain.component_mul(&precision);
+        (0.5 * stress.dot(&strain), linear * stress)
+    }
 }
 
 impl Freedom {
@@ -51,7 +74,7 @@ impl Freedom {
         let target = base.target + parameters.fixed_rows::<3>(0);
         let linear = match self {
             Self::Rigid => *Rotation3::from_scaled_axis(parameters.fixed_rows::<3>(3) / radius_mm).matrix(),
-            Self::Affine => Matrix3::identity() + Matrix3::from_column_slice(&parameters.as_slice()[3..12]) / radius_mm,
+            Self::Affine(_) => Matrix3::identity() + Matrix3::from_column_slice(&parameters.as_slice()[3..12]) / radius_mm,
         };
         Pose { linear: linear * base.linear, target, ..*base }
     }
@@ -78,7 +101,7 @@ impl Freedom {
                 let w: Vector3<f64> = parameters.fixed_rows::<3>(3) / radius_mm;
                 (left_jacobian(w).transpose() * torque).as_slice().to_vec()
             }
-            Self::Affine => (s.moment * base.linear.transpose()).as_slice().to_vec(),
+            Self::Affine(_) => (s.moment * base.linear.transpose()).as_slice().to_vec(),
         };
         DVector::from_iterator(3 + linear.len(), s.force.iter().copied().chain(linear.iter().map(|x| x / radius_mm)))
     }
@@ -86,7 +109,7 @@ impl Freedom {
     fn parameters(self) -> usize {
         match self {
             Self::Rigid => 6,
-            Self::Affine => 12,
+            Self::Affine(_) => 12,
         }
     }
 }
@@ -115,10 +138,15 @@ pub(super) fn optimise(
     let floor = 0.25 * level.at(base).known;
     let minimum = bfgs::minimise(DVector::zeros(freedom.parameters()), inverse_hessian, stopping, |parameters| {
         let pose = freedom.moved(base, radius_mm, parameters);
-        let s = similarity(&level.samples, &level.other, level.bins, &pose, true);
+        let mut s = similarity(&level.samples, &level.other, level.bins, &pose, true);
         if s.known < floor {
             // Sliding out of the other image is not a match.
             return (f64::INFINITY, DVector::zeros(freedom.parameters()));
+        }
+        if let Freedom::Affine(tether) = freedom {
+            let (loss, slope) = tether.loss(&pose.linear);
+            s.mutual_information -= loss;
+            s.moment -= slope;
         }
         (-s.mutual_information, -freedom.gradient(base, radius_mm, parameters, &pose, &s))
     });
@@ -131,10 +159,22 @@ pub(super) fn optimise(
 
 /// The reach of a coarse search around its guess.
 pub(super) struct Reach {
-    /// Rotations about each axis, radians.
-    pub turns_rad: Vec<f64>,
+    /// Turns of the guess.
+    pub turns: Vec<Rotation3<f64>>,
     /// Shifts along x, y and z, mm.
     pub shifts_mm: [Vec<f64>; 3],
+}
+
+/// No turn, or one by `step_rad` to either side, about each axis.
+pub(super) fn turns_about_axes(step_rad: f64) -> Vec<Rotation3<f64>> {
+    let steps = [-step_rad, 0.0, step_rad];
+    let mut turns = Vec::with_capacity(27);
+    for a in steps {
+        for b in steps {
+            turns.extend(steps.map(|c| Rotation3::from_euler_angles(a, b, c)));
+        }
+    }
+    turns
 }
 
 /// Tries every turn and shift around the guesses, refines the best few, and returns them, best first. The second
@@ -142,16 +182,12 @@ pub(super) struct Reach {
 pub(super) fn coarse(level: &Level<'_>, guesses: &[Pose], reach: &Reach, keep: usize) -> (Vec<Pose>, f64) {
     let mut poses = guesses.to_vec();
     let guess = guesses[0];
-    for &a in &reach.turns_rad {
-        for &b in &reach.turns_rad {
-            for &c in &reach.turns_rad {
-                let linear = *Rotation3::from_euler_angles(a, b, c).matrix() * guess.linear;
-                for &x in &reach.shifts_mm[0] {
-                    for &y in &reach.shifts_mm[1] {
-                        for &z in &reach.shifts_mm[2] {
-                            poses.push(Pose { linear, target: guess.target + Vector3::new(x, y, z), ..guess });
-                        }
-                    }
+    for turn in &reach.turns {
+        let linear = *turn.matrix() * guess.linear;
+        for &x in &reach.shifts_mm[0] {
+            for &y in &reach.shifts_mm[1] {
+                for &z in &reach.shifts_mm[2] {
+                    poses.push(Pose { linear, target: guess.target + Vector3::new(x, y, z), ..guess });
                 }
             }
         }
@@ -181,4 +217,30 @@ pub(super) fn rank(level: &Level<'_>, poses: Vec<Pose>) -> Vec<(f64, Pose)> {
     let mut ranked: Vec<(f64, Pose)> = poses.into_par_iter().map(|p| (level.score(&p), p)).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tether_is_blind_to_turns_and_its_slope_is_its_derivative() {
+        let tether = Tether { stretch: 0.08, shear: 0.05, weight: 0.01 };
+        let turn = *Rotation3::from_euler_angles(0.4, -0.7, 1.1).matrix();
+        assert!(tether.loss(&turn).0 < 1e-20);
+        // One standard deviation along one axis costs half the weight (to first order of the logarithm).
+        let stretched = turn * Matrix3::from_diagonal(&Vector3::new(0.08f64.exp(), 1.0, 1.0));
+        assert!((tether.loss(&stretched).0 / 0.005 - 1.0).abs() < 0.2);
+        let linear = stretched + Matrix3::new(0.01, 0.02, -0.03, 0.04, 0.0, 0.01, -0.02, 0.03, 0.05);
+        let (_, slope) = tether.loss(&linear);
+        for (a, b) in [(0, 0), (1, 2), (2, 1)] {
+            let value = |h: f64| {
+                let mut moved = linear;
+                moved[(a, b)] += h;
+                tether.loss(&moved).0
+            };
+            let difference = (value(1e-5) - value(-1e-5)) / 2e-5;
+            assert!((difference - slope[(a, b)]).abs() < 1e-6 * slope.norm().max(1.0), "{difference} {slope}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The sag of the brain from one scan to the other.
 
 use super::cavity::both;
-use crate::geometry::Mni;
+use crate::geometry::{AffineTransform, Mni};
 use crate::image::morphology::dilate;
 use crate::image::{Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, DisplacementField, fit_atlas};
@@ -37,7 +37,7 @@ pub fn fit_sag(scans: &SagScans<'_>, settings: &DeformableSettings) -> Result<At
     let post =
         scans.post.data.iter().zip(&scans.post_known.data).map(|(t1, known)| if *known { *t1 } else { f32::NAN });
     let (pre, post) = (Volume::from_data(near.grid, pre.collect()), Volume::from_data(near.grid, post.collect()));
-    fit_atlas(&post, &pre, Some(&dilate(scans.cavity, EDGE_MM)), settings)
+    fit_atlas(&post, &pre, &AffineTransform::identity(), Some(&dilate(scans.cavity, EDGE_MM)), settings)
 }
 
 /// The pre-operative scan as it would look had its brain moved: `rest_from_moved` says where the tissue at a point was.

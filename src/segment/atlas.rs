@@ -4,9 +4,10 @@
 //! file came from is written in `atlases/mni152/PROVENANCE.md`.
 
 use super::atlas_labels::derive_labels;
-use crate::geometry::{Mni, Position};
+use crate::geometry::{AffineTransform, Mni, Position};
+use crate::image::resample::resample_nearest;
 use crate::image::{Grid, LabelMap, Mask, Volume};
-use nalgebra::Matrix4;
+use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 use std::io::Read;
 use std::sync::OnceLock;
 
@@ -56,6 +57,37 @@ pub fn template() -> &'static Atlas {
     })
 }
 
+/// The mean of many whole heads, in natural size, in the template's frame: scalp, skull, eyes and brain at 2 mm.
+///
+/// Where it came from is written in `atlases/head/PROVENANCE.md`.
+///
+/// # Panics
+/// Never for the embedded file; a test decodes it.
+pub fn mean_head() -> &'static MeanHead {
+    static HEAD: OnceLock<MeanHead> = OnceLock::new();
+    HEAD.get_or_init(|| {
+        let t1 = decode(include_bytes!("../../atlases/head/head.nii.gz")).map(f32::from);
+        let template_from_head = head_from_template().inverse().expect("a stretch can be inverted");
+        let brain = resample_nearest(&template().t1, &t1.grid, &template_from_head, 0).map(|x| x > 0);
+        MeanHead { t1, brain }
+    })
+}
+
+/// The whole head that poses and sizes are measured against.
+#[derive(Clone, Debug)]
+pub struct MeanHead {
+    /// T1 intensity, 0 to 255.
+    pub t1: Volume<f32, Mni>,
+    /// The template's brain on it.
+    pub brain: Mask<Mni>,
+}
+
+/// From the template, which is larger than people are, to the mean head in its natural size.
+pub fn head_from_template() -> AffineTransform<Mni, Mni> {
+    let linear = Matrix3::new(0.8731, 0.0, 0.0, 0.0, 0.8968, -0.0195, 0.0, -0.0195, 0.8124);
+    AffineTransform::from_parts(linear, Vector3::new(0.0, -2.0966, 1.3455))
+}
+
 impl Atlas {
     /// The grid all maps share.
     pub fn grid(&self) -> Grid<Mni> {
@@ -76,6 +108,30 @@ impl Atlas {
     pub fn derived_labels(&self) -> LabelMap<Mni> {
         derive_labels(&self.t1, &self.grey, &self.white)
     }
+}
+
+/// Thalamus, putamen and pallidum of the template: ellipsoids placed by eye, of which what is darker than the capsules.
+///
+/// Iron and fibres make these nuclei nearly as bright as white matter, in many scans quite as bright: only their place tells
+/// them apart. The caudate nucleus, hippocampus and amygdala look like cortex and need no help.
+pub fn deep_grey() -> Mask<Mni> {
+    /// Centre and radii in mm of the right side's ellipsoid; how far its axis moves outwards for each mm backwards;
+    /// the template's intensities in it.
+    type Nucleus = ([f64; 3], [f64; 3], f64, std::ops::Range<u8>);
+    const NUCLEI: [Nucleus; 3] = [
+        ([11.5, -18.0, 8.0], [11.5, 15.5, 11.0], 0.3, 150..208),
+        ([25.5, 2.0, 2.0], [8.0, 20.0, 13.0], 0.28, 160..202),
+        ([19.5, -4.0, -1.0], [6.5, 11.0, 7.0], 0.3, 160..212),
+    ];
+    let t1 = &template().t1;
+    Mask::from_fn(t1.grid, |n| {
+        let p = t1.grid.position(Point3::from(t1.grid.voxel(n).map(|v| v as f64))).mm;
+        NUCLEI.iter().any(|(centre, radii, outwards, range)| {
+            let x = p.x.abs() - centre[0] + outwards * (p.y - centre[1]);
+            let along = [x / radii[0], (p.y - centre[1]) / radii[1], (p.z - centre[2]) / radii[2]];
+            along.iter().map(|a| a * a).sum::<f64>() < 1.0 && range.contains(&t1.data[n])
+        })
+    })
 }
 
 /// The temporal lobe that holds a point, by planes placed by eye on the template: below the Sylvian fissure, above the
@@ -120,6 +176,35 @@ mod tests {
         assert_eq!(atlas.grid().spacing_mm(), [1.0; 3]);
         assert_eq!(atlas.t1.nearest(Position::new(0.0, -20.0, 0.0)).map(|v| v > 0), Some(true));
         assert!((1850.0..1920.0).contains(&atlas.brain().volume_cc()), "{}", atlas.brain().volume_cc());
+    }
+
+    #[test]
+    fn the_mean_head_is_symmetric_of_natural_size_and_its_brain_lies_inside_its_scalp() {
+        let head = mean_head();
+        assert!((1100.0..1300.0).contains(&head.brain.volume_cc()), "{}", head.brain.volume_cc());
+        let [nx, ny, nz] = head.t1.grid.dims;
+        for (i, j, k) in (0..nx * ny * nz).step_by(997).map(|n| (n % nx, n / nx % ny, n / (nx * ny))) {
+            assert!((head.t1.at(i, j, k) - head.t1.at(nx - 1 - i, j, k)).abs() <= 1.0, "{i} {j} {k}");
+        }
+        let at = |x, y, z| head.t1.nearest(Position::new(x, y, z)).unwrap_or(0.0);
+        let along_the_vertex: Vec<f32> = (50..95).map(|z| at(0.0, -20.0, f64::from(z))).collect();
+        let brightest = along_the_vertex.iter().copied().fold(0.0, f32::max);
+        assert!(at(24.0, -20.0, 30.0) > 150.0 && brightest > 80.0, "white matter, scalp");
+        assert!(at(0.0, -20.0, 99.0) < 20.0, "air above the scalp");
+    }
+
+    #[test]
+    fn the_deep_nuclei_have_their_volumes_and_leave_the_internal_capsule_out() {
+        let deep = deep_grey();
+        // Both sides of a template half as large again as a head.
+        assert!((25.0..36.0).contains(&deep.volume_cc()), "{}", deep.volume_cc());
+        let at = |x, y, z| deep.nearest(Position::new(x, y, z)).unwrap_or(false);
+        for (x, y, z) in [(14.0, -18.0, 8.0), (27.0, 2.0, 2.0), (20.0, -6.0, -1.0)] {
+            assert!(at(x, y, z) && at(-x, y, z), "{x} {y} {z}");
+        }
+        for (x, y, z) in [(18.0, 8.0, 8.0), (27.0, -25.0, 12.0), (13.0, 12.0, 10.0), (0.0, -20.0, 26.0)] {
+            assert!(!at(x, y, z) && !at(-x, y, z), "{x} {y} {z}");
+        }
     }
 
     #[test]

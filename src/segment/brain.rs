@@ -25,17 +25,46 @@ pub struct BrainSettings {
 
 impl Default for BrainSettings {
     fn default() -> Self {
-        Self { reach_mm: 7.0, opening_mm: 2.0, closing_mm: 5.0, trusted_depth_mm: 5.0 }
+        Self { reach_mm: 5.0, opening_mm: 2.0, closing_mm: 5.0, trusted_depth_mm: 5.0 }
     }
 }
 
 /// CSF of the template at least this deep, in mm, is a cistern; sulci are narrower than twice this.
 const CISTERN_DEPTH_MM: f32 = 2.0;
 
+/// Intensities that tissue may have, by the distance outside the template's surface.
+///
+/// Inside, from the border of CSF and grey matter to three deviations above white matter (fat and enhanced vessels are
+/// brighter). The brain's outermost layer is cortex: what lies outside the expected surface and is brighter than grey matter is
+/// marrow, fat or scalp, however well it hangs together with the brain; what is darker, dura or the wall of a sinus.
+struct Window {
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl Window {
+    /// Over this distance, in mm, the inner window becomes the outer one: the misfit of a good fit.
+    const NARROWS_MM: f32 = 2.5;
+
+    fn of(model: &Mixture) -> Self {
+        let [_, grey, white] = model.means;
+        let border = model.csf_grey_border();
+        Self {
+            low: [border, border + 0.25 * (grey - border)].map(|x| x as f32),
+            high: [white + 3.0 * model.deviations[2], 0.5 * (grey + white) + 0.5 * model.deviations[1]].map(|x| x as f32),
+        }
+    }
+
+    fn holds(&self, value: f32, outside_mm: f32) -> bool {
+        let share = (outside_mm / Self::NARROWS_MM).clamp(0.0, 1.0);
+        let at = |ends: [f32; 2]| ends[0] + share * (ends[1] - ends[0]);
+        (at(self.low)..at(self.high)).contains(&value)
+    }
+}
+
 /// The mask of the brain (tissue, ventricles and sulci) on the working grid; may be empty.
 ///
-/// `t1` has its bias taken out. Tissue lies between the border of CSF and grey matter and three deviations above white
-/// matter (fat and enhanced vessels are brighter).
+/// `t1` has its bias taken out. Tissue has an intensity in a window that narrows outwards, see [`Window`].
 pub(super) fn brain_mask(
     t1: &Volume<f32, Mni>,
     known: &Mask<Mni>,
@@ -43,10 +72,13 @@ pub(super) fn brain_mask(
     priors: &AtlasPriors,
     settings: &BrainSettings,
 ) -> Mask<Mni> {
-    let (low, high) = (model.csf_grey_border() as f32, (model.means[2] + 3.0 * model.deviations[2]) as f32);
+    let window = Window::of(model);
     let reach = settings.reach_mm as f32;
     let depth = settings.trusted_depth_mm as f32;
-    let tissue = at_each(t1, |n| known.data[n] && priors.brain_mm.data[n] < reach && (low..high).contains(&t1.data[n]));
+    let tissue = at_each(t1, |n| {
+        let outside_mm = priors.brain_mm.data[n];
+        known.data[n] && outside_mm < reach && window.holds(t1.data[n], outside_mm)
+    });
     let core = largest_component(&erode(&tissue, settings.opening_mm), Connectivity::Faces);
     if core.count() == 0 {
         return core;

@@ -1,9 +1,10 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, segment_with_priors};
-use crate::geometry::{Frame, Mni, Position, RigidTransform};
-use crate::image::Volume;
+use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
+use crate::image::{Mask, Volume};
 use crate::image::resample::{Interpolation, resample};
+use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use thiserror::Error;
 
@@ -19,6 +20,43 @@ pub enum HeadError {
     /// The labels are refused.
     #[error(transparent)]
     Segment(#[from] SegmentError),
+    /// The deformed template does not look like the head.
+    #[error(
+        "the template does not fit this head (local correlation {correlation:.2}, at least {least:.2} is needed): the scan must \
+         be T1-weighted and show the whole brain; look at the pose, or give a brain mask (--brain-mask) of an unusual brain"
+    )]
+    PoorFit {
+        /// Mean local correlation over the brain after the fit.
+        correlation: f64,
+        /// What is needed.
+        least: f64,
+    },
+    /// The brain found is not the one that the fitted template expects.
+    #[error(
+        "the brain found has {found_cc:.0} cc where the fitted template expects {expected_cc:.0} cc: scalp or neck was taken for \
+         brain, or a part is missing; look at the labels, and for the pre-operative scan give a brain mask (--brain-mask)"
+    )]
+    UnlikeTemplate {
+        /// Volume found.
+        found_cc: f64,
+        /// Volume of the carried template.
+        expected_cc: f64,
+    },
+}
+
+/// Local correlation under which the fit is tried again without the stretch that was found, and under which it is refused.
+const DOUBTFUL: f64 = 0.5;
+const LEAST: f64 = 0.3;
+/// The brain found over the brain expected; hydrocephalus and atrophy change both.
+const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
+
+/// The pose of a head in the template's frame, found against the mean of whole heads.
+///
+/// # Errors
+/// [`RegisterError`].
+pub fn pose_of_head<F: Frame>(t1: &Volume<f32, F>) -> Result<RigidFit<F, Mni>, RegisterError> {
+    let head = atlas::mean_head();
+    register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain })
 }
 
 /// The template deformed onto a head; both in the MNI frame reached rigidly.
@@ -33,7 +71,21 @@ pub fn fit_template<F: Frame>(
     let template = atlas::template().t1_f32();
     let affine = mni_from_t1.inverse().to_affine();
     let on_grid = resample(t1, &template.grid, &affine, Interpolation::Linear, f32::NAN);
-    fit_atlas(&on_grid.volume, &template, None, settings)
+    let start = if settings.affine { stretch(&on_grid.volume, &on_grid.inside) } else { AffineTransform::identity() };
+    let fit = fit_atlas(&on_grid.volume, &template, &start, None, settings)?;
+    if !settings.affine || fit.quality.correlation[1] >= DOUBTFUL {
+        return Ok(fit);
+    }
+    let plain = fit_atlas(&on_grid.volume, &template, &atlas::head_from_template(), None, settings)?;
+    Ok(if plain.quality.correlation[1] > fit.quality.correlation[1] { plain } else { fit })
+}
+
+/// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
+fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
+    let head = atlas::mean_head();
+    let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
+    let mean = MeanHead { t1: &head.t1, brain: &head.brain };
+    atlas::head_from_template().then(&subject_from_mean_head(&finite, &mean, Some(known)))
 }
 
 /// The template's maps read through `template_from_patient`, a map that [`fit_template`] made.
@@ -53,7 +105,73 @@ pub fn segment_head<F: Frame>(
     settings: &SegmentSettings,
 ) -> Result<(Segmentation<F>, AtlasFit<Mni>), HeadError> {
     let fit = fit_template(t1, mni_from_t1, deformable)?;
+    let correlation = fit.quality.correlation[1];
+    if correlation < LEAST {
+        return Err(HeadError::PoorFit { correlation, least: LEAST });
+    }
     let priors = carried_priors(|p| fit.atlas_from_subject.apply(p));
     let segmentation = segment_with_priors(t1, mni_from_t1, &priors, overrides, settings)?;
+    let known = &segmentation.known_mni.data;
+    let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
+    let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());
+    if overrides.brain.is_none() && !VOLUME_RATIO.contains(&(found_cc / expected_cc.max(1.0))) {
+        return Err(HeadError::UnlikeTemplate { found_cc, expected_cc });
+    }
     Ok((segmentation, fit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pre;
+    use crate::image::Grid;
+    use crate::image::resample::resample_through;
+    use nalgebra::{Matrix3, Point3, Vector3};
+
+    /// The mean head a tenth smaller, turned by half a radian and moved, under a coil that sees one side twice as bright.
+    fn a_child_askew() -> (Volume<f32, Pre>, RigidTransform<Pre, Mni>) {
+        let mean = atlas::mean_head();
+        let pose = RigidTransform::<Pre, Mni>::about(
+            Point3::new(0.0, -20.0, 10.0),
+            Vector3::new(0.35, -0.3, 0.2),
+            Vector3::new(12.0, -20.0, 30.0),
+        );
+        let grid = Grid::<Pre>::axis_aligned([70, 76, 70], [3.0; 3], [-115.0, -120.0, -130.0]);
+        let middle = Point3::new(0.0, -20.0, 8.0);
+        let larger = Matrix3::identity() / 0.9;
+        let seen = resample_through(
+            &mean.t1,
+            &grid,
+            |p| Some(Position::from_point(middle + larger * (pose.apply(p).mm - middle))),
+            Interpolation::Linear,
+            0.0,
+        );
+        let shaded = Volume::from_fn(grid, |n| {
+            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+            seen.volume.data[n] * (0.004 * p.x + 0.002 * p.z).exp() as f32
+        });
+        (shaded, pose)
+    }
+
+    #[test]
+    fn slow_a_small_head_far_askew_under_a_surface_coil_is_found() {
+        let (scan, truth) = a_child_askew();
+        let found = pose_of_head(&scan).unwrap().fixed_from_moving;
+        for corner in [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -90.0, 0.0], [0.0, -20.0, 70.0]] {
+            let p = truth.inverse().apply(Position::new(corner[0], corner[1], corner[2]));
+            let apart = found.apply(p).distance_mm(&truth.apply(p));
+            assert!(apart < 1.5, "{apart} mm at {corner:?}");
+        }
+    }
+
+    #[test]
+    fn an_image_without_a_head_is_refused_with_its_likeness() {
+        let grid = Grid::<Pre>::axis_aligned([48, 48, 48], [4.0; 3], [-94.0, -94.0, -94.0]);
+        let stripes = Volume::from_fn(grid, |n| {
+            let [i, j, k] = grid.voxel(n).map(|v| v as f64);
+            (100.0 + 80.0 * (0.9 * i).sin() * (1.1 * j).cos() * (0.7 * k).sin()) as f32
+        });
+        let message = pose_of_head(&stripes).unwrap_err().to_string();
+        assert!(message.contains("looks like a head") && message.contains("likeness"), "{message}");
+    }
 }

@@ -11,6 +11,8 @@ use crate::image::{Mask, Volume};
 use rayon::prelude::*;
 
 const CHUNK: usize = 8192;
+/// Iterations of the Markov field on all voxels once means and bias are known from fewer.
+const LAST_ITERATIONS: usize = 5;
 /// No voxel: marks neighbours outside the region.
 const NONE: u32 = u32::MAX;
 
@@ -50,11 +52,15 @@ impl Mixture {
 }
 
 /// Fits the mixture to the voxels of `region`; `None` when there are fewer than 1000 or the classes collapse.
+///
+/// From a mixture `begun` on fewer voxels its bias is kept and few iterations are needed. The deep nuclei say nothing of what
+/// grey matter looks like: they have an intensity of their own.
 pub(super) fn fit_mixture(
     t1: &Volume<f32, Mni>,
     region: &Mask<Mni>,
     priors: &AtlasPriors,
     settings: &MixtureSettings,
+    begun: Option<&Mixture>,
 ) -> Option<Mixture> {
     let grid = t1.grid;
     let on_stride = |n: usize| settings.stride == 1 || grid.voxel(n).iter().all(|&x| x % settings.stride == 0);
@@ -72,13 +78,19 @@ pub(super) fn fit_mixture(
         Vec::new()
     };
 
-    let (mut means, mut deviations) = start(&raw, &believed);
-    let mut bias = LogBias::flat(grid.dims);
-    let mut corrected = raw.clone();
+    let typical: Vec<bool> = voxels.iter().map(|&n| priors.deep_grey.data[n as usize] < 0.25).collect();
+    let (mut means, mut deviations) = begun.map_or_else(|| start(&raw, &believed), |b| (b.means, b.deviations));
+    let mut bias = begun.map_or_else(|| LogBias::flat(grid.dims), |b| b.bias.clone());
+    let mut corrected: Vec<f32> = if begun.is_some() {
+        (raw.par_iter().zip(&places)).map(|(&x, &v)| (f64::from(x) * (-bias.at(v)).exp()) as f32).collect()
+    } else {
+        raw.clone()
+    };
     let mut contents = believed.clone();
-    for iteration in 0..settings.iterations {
+    let iterations = if begun.is_some() { settings.iterations.min(LAST_ITERATIONS) } else { settings.iterations };
+    for iteration in 0..iterations {
         let before = means;
-        let smoothing = !neighbours.is_empty() && iteration >= settings.bias_starts_at;
+        let smoothing = !neighbours.is_empty() && iteration >= if begun.is_some() { 1 } else { settings.bias_starts_at };
         let previous = contents.clone();
         let appearance = Appearance::new(&means, &deviations);
         let seen = |n: usize| {
@@ -98,7 +110,9 @@ pub(super) fn fit_mixture(
                     let n = chunk * CHUNK + i;
                     let Seen { pure, content } = seen(n);
                     *out = content.map(|p| p as f32);
-                    sums.add(f64::from(corrected[n]), &pure);
+                    if typical[n] {
+                        sums.add(f64::from(corrected[n]), &pure);
+                    }
                 }
                 sums
             })
@@ -107,8 +121,9 @@ pub(super) fn fit_mixture(
         if !(means[CSF] < means[GREY] && means[GREY] < means[WHITE]) {
             return None;
         }
-        if settings.bias_order > 0 && iteration + 1 >= settings.bias_starts_at {
-            let observations = log_ratios(&places, &raw, |n| seen(n).pure, &means, &deviations);
+        if begun.is_none() && settings.bias_order > 0 && iteration + 1 >= settings.bias_starts_at {
+            let pure = |n: usize| if typical[n] { seen(n).pure } else { [0.0; CLASSES] };
+            let observations = log_ratios(&places, &raw, pure, &means, &deviations);
             bias = LogBias::fit(grid.dims, settings.bias_order, &observations, &places);
             corrected.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
                 for (i, value) in out.iter_mut().enumerate() {
@@ -126,8 +141,12 @@ pub(super) fn fit_mixture(
 }
 
 fn prior_at(priors: &AtlasPriors, n: usize, disbelief: f64) -> [f32; CLASSES] {
-    let p = [0, 1, 2].map(|k| f64::from(priors.tissue[k].data[n]).max(0.0));
+    let deep = f64::from(priors.deep_grey.data[n]).clamp(0.0, 1.0);
+    let mut p = [0, 1, 2].map(|k| f64::from(priors.tissue[k].data[n]).max(0.0));
+    let white_to_grey = deep * p[WHITE];
+    (p[GREY], p[WHITE]) = (p[GREY] + white_to_grey, p[WHITE] - white_to_grey);
     let sum: f64 = p.iter().sum();
+    let disbelief = disbelief * (1.0 - deep);
     p.map(|p| {
         let template = if sum > 1e-3 { p / sum } else { 1.0 / CLASSES as f64 };
         ((1.0 - disbelief) * template + disbelief / CLASSES as f64) as f32
@@ -288,6 +307,7 @@ mod tests {
             brain_mm: far.clone(),
             tissue: shares.each_ref().map(|s| gaussian_along_axes(s, [3.0, 0.0, 0.0])),
             ventricle_mm: far.clone(),
+            deep_grey: far.clone(),
             cistern_mm: far,
         };
         let settings = MixtureSettings {
@@ -298,7 +318,7 @@ mod tests {
             disbelief: 0.3,
             stride: 1,
         };
-        let found = fit_mixture(&t1, &t1.map(|_| true), &priors, &settings).unwrap();
+        let found = fit_mixture(&t1, &t1.map(|_| true), &priors, &settings, None).unwrap();
         // The sulci are three quarters full at most, so CSF cannot come out quite as dark as it is.
         for (k, tolerance) in [(CSF, 20.0), (GREY, 6.0), (WHITE, 6.0)] {
             assert!((found.means[k] - f64::from(MEANS[k])).abs() < tolerance, "{:?}", found.means);

@@ -16,7 +16,7 @@ mod ventricle;
 
 pub use bias::LogBias;
 pub use brain::BrainSettings;
-pub use carried::{HeadError, carried_priors, fit_template, segment_head};
+pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};
 pub use priors::AtlasPriors;
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,

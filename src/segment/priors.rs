@@ -7,7 +7,8 @@ use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::close;
 use crate::image::resample::resample_together;
-use crate::image::{Grid, Volume};
+use crate::image::{Grid, Volume, VoxelBox};
+use nalgebra::Point3;
 use std::sync::OnceLock;
 
 /// Widest distance outside the brain that the fields know, in mm.
@@ -25,6 +26,8 @@ pub struct AtlasPriors {
     pub ventricle_mm: Volume<f32, Mni>,
     /// Signed distance to CSF that is no ventricle: sulci, fissures, cisterns, fourth ventricle; negative inside.
     pub cistern_mm: Volume<f32, Mni>,
+    /// Probability of thalamus, putamen and pallidum, 0 to 1.
+    pub deep_grey: Volume<f32, Mni>,
 }
 
 /// The fields on the template's own grid, before any warp.
@@ -33,6 +36,7 @@ struct TemplateFields {
     tissue: [Volume<f32, Mni>; 3],
     ventricle_mm: Volume<f32, Mni>,
     cistern_mm: Volume<f32, Mni>,
+    deep_grey: Volume<f32, Mni>,
 }
 
 fn template_fields() -> &'static TemplateFields {
@@ -61,8 +65,30 @@ fn template_fields() -> &'static TemplateFields {
             ],
             ventricle_mm: distance(label::VENTRICLE),
             cistern_mm: distance(label::CSF),
+            deep_grey: gaussian(&atlas::deep_grey().map(|inside| f32::from(u8::from(inside))), 1.0),
         }
     })
+}
+
+/// The part of the grid where the template's brain comes to lie, with room for whatever is looked at around it.
+fn where_brain_may_be(
+    brain_mm: &Volume<f32, Mni>,
+    grid: &Grid<Mni>,
+    template_from_patient: &(impl Fn(Position<Mni>) -> Position<Mni> + Sync),
+) -> VoxelBox {
+    /// Farther out nothing is asked of the priors: reach, closing and blur together.
+    const ROOM_MM: f64 = 20.0;
+    const STEP: usize = 4;
+    let near = Volume::from_fn(*grid, |n| {
+        let voxel = grid.voxel(n);
+        if voxel.iter().any(|v| v % STEP != 0) {
+            return false;
+        }
+        let p = template_from_patient(grid.position(Point3::from(voxel.map(|v| v as f64))));
+        brain_mm.nearest(p).is_some_and(|d| d < 0.0)
+    });
+    let whole = VoxelBox { first: [0; 3], end: grid.dims };
+    near.bounding_box().map_or(whole, |found| found.grown(grid, ROOM_MM))
 }
 
 impl AtlasPriors {
@@ -75,13 +101,25 @@ impl AtlasPriors {
         misfit_mm: f64,
     ) -> Self {
         let fields = template_fields();
+        let around = where_brain_may_be(&fields.brain_mm, grid, &template_from_patient);
+        let near = grid.cropped(&around);
         let [csf, grey, white] = &fields.tissue;
-        let maps = [csf, grey, white, &fields.brain_mm, &fields.ventricle_mm, &fields.cistern_mm];
-        let outside = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM];
-        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm] =
-            resample_together(maps, grid, template_from_patient, outside);
-        let tissue = [csf, grey, white].map(|map| gaussian(&map, misfit_mm));
-        Self { brain_mm, tissue, ventricle_mm, cistern_mm }
+        let maps = [csf, grey, white, &fields.brain_mm, &fields.ventricle_mm, &fields.cistern_mm, &fields.deep_grey];
+        let outside = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM, 0.0];
+        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey] =
+            resample_together(maps, &near, template_from_patient, outside);
+        let whole = |part: &Volume<f32, Mni>, value: f32| {
+            let mut all = Volume::filled(*grid, value);
+            all.paste(part, &around);
+            all
+        };
+        Self {
+            tissue: [csf, grey, white].map(|map| whole(&gaussian(&map, misfit_mm), 0.0)),
+            brain_mm: whole(&brain_mm, FAR_MM),
+            ventricle_mm: whole(&ventricle_mm, FAR_MM),
+            cistern_mm: whole(&cistern_mm, FAR_MM),
+            deep_grey: whole(&deep_grey, 0.0),
+        }
     }
 
     /// The template as it stands, for a patient who has only been aligned rigidly: misfits of several millimetres are

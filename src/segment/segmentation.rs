@@ -6,7 +6,7 @@ use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
 use super::priors::AtlasPriors;
-use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles};
+use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall};
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
@@ -228,13 +228,17 @@ pub fn segment_with_priors<F: Frame>(
     }
 
     let inside = at_each(&raw, |n| brain.data[n] && known.data[n]);
-    let model =
-        fit_mixture(&raw, &inside, priors, &mixture_settings(settings, 1)).ok_or(SegmentError::NoTissueContrast)?;
+    let fitted = |stride: usize, begun: Option<&Mixture>| {
+        fit_mixture(&raw, &inside, priors, &mixture_settings(settings, stride), begun)
+            .ok_or(SegmentError::NoTissueContrast)
+    };
+    // An eighth of the voxels knows the means and the bias as well as all of them.
+    let model = fitted(1, Some(&fitted(2, None)?))?;
     let ratio = 2.0 * (model.means[2] - model.means[1]) / (model.deviations[1] + model.deviations[2]);
     if ratio < 1.5 {
         warnings.push(SegmentWarning::LowContrast { ratio });
     }
-    let mut labels_mni = most_probable(&raw, &model);
+    let mut labels_mni = most_probable(&model, priors);
     let csf = labels_mni.map(|l| l == label::CSF);
     let t1_mni = without_bias(&raw, &model);
     let ventricle = if let Some(mask) = overrides.ventricle {
@@ -242,7 +246,8 @@ pub fn segment_with_priors<F: Frame>(
         at_each(&raw, |n| given.data[n] && brain.data[n])
     } else {
         let plexus = enhanced_plexus(&t1_mni, model.means[2], priors);
-        ventricles(&csf, &plexus, &brain, priors, &settings.ventricle)
+        let found = ventricles(&csf, &plexus, &brain, priors, &settings.ventricle);
+        with_shared_wall(&found, &t1_mni, &brain, &model)
     };
     if ventricle.count() == 0 {
         warnings.push(SegmentWarning::NoVentricle);
@@ -336,7 +341,7 @@ fn computed_brain(
 ) -> Result<Mask<Mni>, SegmentError> {
     let deep = at_each(raw, |n| known.data[n] && priors.brain_mm.data[n] < -4.0);
     let model =
-        fit_mixture(raw, &deep, priors, &mixture_settings(settings, 2)).ok_or(SegmentError::NoTissueContrast)?;
+        fit_mixture(raw, &deep, priors, &mixture_settings(settings, 2), None).ok_or(SegmentError::NoTissueContrast)?;
     Ok(brain_mask(&without_bias(raw, &model), known, &model, priors, &settings.brain))
 }
 
@@ -345,12 +350,13 @@ fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture) -> Volume<f32, Mni> {
     Volume::from_fn(grid, |n| (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32)
 }
 
-fn most_probable(like: &Volume<f32, Mni>, model: &Mixture) -> LabelMap<Mni> {
-    let mut labels = Volume::filled(like.grid, label::BACKGROUND);
+fn most_probable(model: &Mixture, priors: &AtlasPriors) -> LabelMap<Mni> {
+    let mut labels = Volume::filled(priors.brain_mm.grid, label::BACKGROUND);
     for (&n, p) in model.voxels.iter().zip(&model.contents) {
+        let deep = priors.deep_grey.data[n as usize] > 0.5;
         labels.data[n as usize] = if p[0] > p[1] && p[0] > p[2] {
             label::CSF
-        } else if p[1] >= p[2] {
+        } else if deep || p[1] >= p[2] {
             label::GREY_MATTER
         } else {
             label::WHITE_MATTER

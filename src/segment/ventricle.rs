@@ -1,9 +1,11 @@
 //! Lateral and third ventricles: CSF that is nearer, through CSF, to the template's ventricles than to its cisterns.
 
 use super::brain::at_each;
+use super::mixture::Mixture;
 use super::priors::AtlasPriors;
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, fill_holes, without_islands};
+use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode};
 use crate::image::{Mask, Volume};
 
@@ -21,7 +23,7 @@ pub struct VentricleSettings {
 
 impl Default for VentricleSettings {
     fn default() -> Self {
-        Self { reach_mm: 10.0, cistern_clearance_mm: 4.0, closing_mm: 1.0 }
+        Self { reach_mm: 16.0, cistern_clearance_mm: 4.0, closing_mm: 1.0 }
     }
 }
 
@@ -98,4 +100,40 @@ pub(super) fn ventricles(
         csf.grid,
         (0..owner.len()).map(|n| closed.data[n] && brain.data[n] && owner[n] != CISTERN).collect(),
     )
+}
+
+/// The ventricles with the voxels of their wall that are more than half full of CSF.
+///
+/// A voxel shared by CSF and white matter looks like grey matter, and the mixture, which knows no border of CSF and white matter,
+/// calls it so. Here the tissue beyond the wall says what a half-full voxel looks like.
+pub(super) fn with_shared_wall(
+    ventricle: &Mask<Mni>,
+    t1: &Volume<f32, Mni>,
+    brain: &Mask<Mni>,
+    model: &Mixture,
+) -> Mask<Mni> {
+    const SIGMA_MM: f64 = 1.5;
+    let Some(found) = ventricle.bounding_box() else { return ventricle.clone() };
+    let around = found.grown(&ventricle.grid, 8.0);
+    let (inside, t1, brain) = (ventricle.cropped(&around), t1.cropped(&around), brain.cropped(&around));
+    let deep = erode(&inside, 1.0);
+    let full: Vec<f32> = (0..t1.data.len()).filter(|&n| deep.data[n]).map(|n| t1.data[n]).collect();
+    let csf = if full.len() < 500 {
+        model.means[0] as f32
+    } else {
+        full.iter().sum::<f32>() / full.len() as f32
+    };
+    let rim = dilate(&inside, 1.9);
+    let border = model.csf_grey_border() as f32;
+    let beyond = at_each(&t1, |n| brain.data[n] && !rim.data[n] && t1.data[n] > border);
+    let count = gaussian(&beyond.map(|x| f32::from(u8::from(x))), SIGMA_MM);
+    let sum = gaussian(&Volume::from_fn(t1.grid, |n| if beyond.data[n] { t1.data[n] } else { 0.0 }), SIGMA_MM);
+    let next = dilate(&inside, 1.0);
+    let wide = at_each(&t1, |n| {
+        let half = 0.5 * (csf + sum.data[n] / count.data[n].max(1e-6));
+        inside.data[n] || (next.data[n] && brain.data[n] && count.data[n] > 0.02 && t1.data[n] < half)
+    });
+    let mut out = ventricle.clone();
+    out.paste(&wide, &around);
+    out
 }

@@ -8,10 +8,10 @@ use hgm::image::nifti::{ReadOptions, decode, decode_labels};
 use hgm::image::resample::{Interpolation, resample};
 use hgm::image::{Grid, LabelMap, Mask, Volume};
 use hgm::material::random::CounterRng;
-use hgm::register::{RigidMasks, RigidSettings, register_rigid, register_to_template};
+use hgm::register::{RigidMasks, RigidSettings, register_rigid};
 use hgm::resect::{GivenMasks, PairSettings, take_pair_apart};
 use hgm::segment::native::mask_on;
-use hgm::segment::{SegmentOverrides, SegmentSettings, atlas, label, segment_t1};
+use hgm::segment::{SegmentOverrides, SegmentSettings, atlas, label, pose_of_head, segment_t1};
 use nalgebra::{Matrix4, Point3, Vector3};
 use std::path::Path;
 
@@ -123,15 +123,14 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
     );
     bar("rigid post to pre, time", "<= 6 CPU-s".into(), format!("{rigid_cpu:.1} CPU-s"), rigid_cpu <= 6.0);
 
-    let template = atlas::template().t1_f32();
-    let mni_from_pre = register_to_template(&pre, &template, &settings).unwrap().fixed_from_moving;
+    let mni_from_pre = pose_of_head(&pre).unwrap().fixed_from_moving;
     for (seed, what) in [(1, "to MNI from two poses"), (2, "to MNI from two poses, again")] {
         let (moved, pre_from_moved) = in_another_pose(&pre, seed);
-        let mni_from_moved = register_to_template(&moved, &template, &settings).unwrap().fixed_from_moving;
+        let mni_from_moved = pose_of_head(&moved).unwrap().fixed_from_moving;
         let apart = disagreement_mm(&mni_from_pre, &mni_from_moved, &pre_from_moved, &brain);
         bar(what, "<= .2 mm".into(), format!("{apart:.3} mm"), apart <= 0.2);
     }
-    let mni_from_post = register_to_template(&post, &template, &settings).unwrap().fixed_from_moving;
+    let mni_from_post = pose_of_head(&post).unwrap().fixed_from_moving;
     let apart = disagreement_mm(&mni_from_pre, &mni_from_post, &pre_from_post, &brain);
     println!("{letter}: to MNI from pre and from the operated head through pre: {apart:.2} mm apart");
 

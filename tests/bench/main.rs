@@ -7,6 +7,7 @@ mod cluster;
 mod cohort;
 mod experiment;
 mod fem;
+mod heads;
 mod imaging;
 mod job;
 mod kills;
@@ -27,6 +28,7 @@ type Room = (&'static str, fn() -> Vec<Bar>);
 fn main() {
     let rooms: Vec<Room> = vec![
         ("imaging", imaging::bars),
+        ("heads", heads::bars),
         ("mesh", mesh::bars),
         ("material", material::bars),
         ("fem", fem::bars),

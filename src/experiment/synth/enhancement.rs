@@ -196,7 +196,7 @@ mod tests {
     use super::*;
     use crate::experiment::synth::{Contrast, SynthSettings, SyntheticPatient, synthesize};
     use crate::geometry::{Post, Pre, RigidTransform};
-    use crate::register::{RigidMasks, RigidSettings, register_rigid, register_to_template};
+    use crate::register::{RigidMasks, RigidSettings, register_rigid};
     use crate::resect::{GivenMasks, PairSettings, take_pair_apart};
     use crate::segment::atlas;
     use crate::segment::native::mask_on;
@@ -219,7 +219,7 @@ mod tests {
         let settings = RigidSettings::default();
         let pre_from_post = register_rigid(&post, &pre, RigidMasks::default(), &settings).unwrap().fixed_from_moving;
         let mni_from_pre =
-            register_to_template(&pre, &atlas::template().t1_f32(), &settings).unwrap().fixed_from_moving;
+            pose_of_head(&pre).unwrap().fixed_from_moving;
         let (none, settings) = (GivenMasks::default(), PairSettings::default());
         let found = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &none, &settings, |_| {}).unwrap();
         let cavity = mask_on(&found.finding.cavity, &post.grid, &pre_from_post.then(&mni_from_pre));

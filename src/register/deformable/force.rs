@@ -47,6 +47,17 @@ fn window_sums(data: Vec<f32>, dims: [usize; 3]) -> Vec<f32> {
     out
 }
 
+/// The mean local correlation alone; arguments as those of [`force`].
+pub(in crate::register) fn local_correlation(
+    grid: &Grid<Native>,
+    fixed: &[f32],
+    moving: &[f32],
+    weight: &[f32],
+    noise: [f32; 2],
+) -> f64 {
+    force(grid, fixed, moving, weight, noise).1
+}
+
 /// The update that brings the moving image (already seen through the present map) closer to the fixed one, in voxels, and
 /// the mean local correlation over the known voxels.
 ///

@@ -1,15 +1,13 @@
 //! Deformable registration of a template to a head that lies rigidly aligned with it.
 
 mod field;
-mod force;
+pub(super) mod force;
 mod velocity;
 
 pub use field::DisplacementField;
 
-use super::affine;
-use super::mutual_information::Pose;
 use super::pyramid::{on_grid_of, reduced_to};
-use crate::geometry::{Frame, Native, Position};
+use crate::geometry::{AffineTransform, Frame, Native, Position};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -115,8 +113,8 @@ pub enum DeformableError {
 ///
 /// `subject` and `atlas` share a frame: the subject has been brought to the atlas by a rigid registration. Voxels of
 /// `left_out` (on any grid in that frame), such as a cavity, and voxels that are not finite say nothing; the map there
-/// follows its surroundings. First an affine fit by mutual information, then a stationary velocity field driven by local
-/// correlation over the atlas's brain and a narrow rim, coarse to fine. The skull is never compared with the atlas's empty
+/// follows its surroundings. From the affine map `start` (subject from atlas) on, a stationary velocity field is driven by
+/// local correlation over the atlas's brain and a narrow rim, coarse to fine. The skull is never compared with the atlas's empty
 /// outside beyond that rim.
 ///
 /// # Errors
@@ -124,6 +122,7 @@ pub enum DeformableError {
 pub fn fit_atlas<F: Frame>(
     subject: &Volume<f32, F>,
     atlas: &Volume<f32, F>,
+    start: &AffineTransform<F, F>,
     left_out: Option<&Mask<F>>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<F>, DeformableError> {
@@ -143,12 +142,7 @@ pub fn fit_atlas<F: Frame>(
     let known: Mask<Native> = Volume::from_fn(subject.grid, is_known);
     let subject = subject.map(|x| if x.is_finite() { x } else { 0.0 });
 
-    let pose = if settings.affine {
-        affine::head_from_template(&atlas, &wide, &subject, Some(&known))
-    } else {
-        Pose { linear: Matrix3::identity(), centre: Vector3::zeros(), target: Vector3::zeros() }
-    };
-    let shift = pose.target - pose.linear * pose.centre;
+    let (linear, shift) = (start.linear, start.translation_mm);
 
     let mut velocity: Option<VectorField> = None;
     let finest_mm = settings.levels_mm.iter().copied().fold(f64::INFINITY, f64::min);
@@ -162,14 +156,14 @@ pub fn fit_atlas<F: Frame>(
     };
     for (level, (&spacing_mm, &iterations)) in settings.levels_mm.iter().zip(&settings.iterations).enumerate() {
         let fixed = reduced_to(&atlas, spacing_mm);
-        let near = near_brain(&near_subject, &wide, velocity.as_ref(), &pose.linear, &shift);
+        let near = near_brain(&near_subject, &wide, velocity.as_ref(), &linear, &shift);
         let moving = reduced_to(&near, spacing_mm);
         let inside = on_grid_of(&region, &fixed);
         let grid = fixed.grid;
         let mut v = velocity.take().map_or_else(|| VectorField::zeros(&grid), |v| v.on(&grid));
 
         // Level voxel -> affine -> subject voxel, as a linear map on (voxel + displacement).
-        let mut head_from_atlas = pose.linear.to_homogeneous();
+        let mut head_from_atlas = linear.to_homogeneous();
         head_from_atlas.fixed_view_mut::<3, 1>(0, 3).copy_from(&shift);
         let to_moving = moving.grid.voxel_from_mm() * head_from_atlas * grid.mm_from_voxel;
         let to_known = known.grid.voxel_from_mm() * head_from_atlas * grid.mm_from_voxel;
@@ -224,8 +218,8 @@ pub fn fit_atlas<F: Frame>(
     let v = velocity.unwrap_or_else(|| VectorField::zeros(&atlas.grid));
     let forward = v.exponential(0.1);
     let backward = v.scaled(-1.0).exponential(0.1);
-    let subject_from_atlas = DisplacementField::<F>::after_flow(&forward, &pose.linear, &shift);
-    let atlas_from_subject = DisplacementField::<F>::before_flow(&backward, &pose.linear, &shift);
+    let subject_from_atlas = DisplacementField::<F>::after_flow(&forward, &linear, &shift);
+    let atlas_from_subject = DisplacementField::<F>::before_flow(&backward, &linear, &shift);
     let brain = on_grid_of(&brain, &Volume::filled(forward.grid, 0f32));
     let range = subject_from_atlas.jacobian_range(&brain);
     (quality.smallest_jacobian, quality.largest_jacobian) = range;
@@ -319,6 +313,11 @@ mod tests {
         q + Vector3::new(-5.0, 3.0, 2.0) * bulge
     }
 
+    /// The affine part of it, as a start.
+    fn larger() -> AffineTransform<Mni, Mni> {
+        AffineTransform::from_parts(Matrix3::identity() * 1.05, Vector3::zeros())
+    }
+
     fn imaged(grid: &Grid<Mni>, value: impl Fn(Point3<f64>) -> f64) -> Volume<f32, Mni> {
         let data =
             (0..grid.len()).map(|n| value(grid.position(Point3::from(grid.voxel(n).map(|i| i as f64))).mm) as f32);
@@ -347,7 +346,7 @@ mod tests {
     fn slow_a_larger_bulging_head_is_found_through_its_skull_and_around_a_cavity() {
         let (atlas, mut subject) = atlas_and_subject();
         let settings = DeformableSettings::default();
-        let fit = fit_atlas(&subject, &atlas, None, &settings).unwrap();
+        let fit = fit_atlas(&subject, &atlas, &larger(), None, &settings).unwrap();
         let error = mean_error_mm(&atlas, &fit, |_| false);
         let q = &fit.quality;
         assert!(error < 0.7, "{error} mm {q:?}");
@@ -359,7 +358,7 @@ mod tests {
         for (x, _) in subject.data.iter_mut().zip(&left_out.data).filter(|(_, out)| **out) {
             *x = 1500.0;
         }
-        let around = fit_atlas(&subject, &atlas, Some(&left_out), &settings).unwrap();
+        let around = fit_atlas(&subject, &atlas, &larger(), Some(&left_out), &settings).unwrap();
         let error = mean_error_mm(&atlas, &around, hole);
         assert!(error < 0.8, "{error} mm {:?}", around.quality);
     }
@@ -371,7 +370,7 @@ mod tests {
             DeformableSettings { levels_mm: vec![8.0, 4.0], iterations: vec![6, 4], ..DeformableSettings::default() };
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| fit_atlas(&subject, &atlas, None, &settings)).unwrap()
+            pool.install(|| fit_atlas(&subject, &atlas, &larger(), None, &settings)).unwrap()
         };
         let (one, three) = (on(1), on(3));
         assert_eq!(one.quality, three.quality);
@@ -385,11 +384,11 @@ mod tests {
         let flat = Volume::filled(grid, 0f32);
         let ball = imaged(&grid, |p| if p.coords.norm() < 30.0 { 100.0 + p.x } else { 0.0 });
         let usual = DeformableSettings::default();
-        assert_eq!(fit_atlas(&ball, &flat, None, &usual).unwrap_err(), DeformableError::EmptyAtlas);
+        assert_eq!(fit_atlas(&ball, &flat, &larger(), None, &usual).unwrap_err(), DeformableError::EmptyAtlas);
         let all = Volume::filled(grid, true);
-        let blind = fit_atlas(&ball, &ball, Some(&all), &usual).unwrap_err();
+        let blind = fit_atlas(&ball, &ball, &larger(), Some(&all), &usual).unwrap_err();
         assert!(matches!(blind, DeformableError::TooLittleKnown { .. }), "{blind}");
         let wrong = DeformableSettings { iterations: vec![1], ..usual };
-        assert!(fit_atlas(&ball, &ball, None, &wrong).unwrap_err().to_string().contains("`iterations` is 1"));
+        assert!(fit_atlas(&ball, &ball, &larger(), None, &wrong).unwrap_err().to_string().contains("`iterations` is 1"));
     }
 }

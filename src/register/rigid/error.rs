@@ -56,4 +56,15 @@ pub enum RegisterError {
     /// The images do not overlap at any pose tried.
     #[error("no pose was found at which the images share information: are both T1 images of a head?")]
     NoOverlap,
+    /// No pose makes a head of it.
+    #[error(
+        "no pose was found at which the image looks like a head (likeness {likeness:.2}, at least {least:.2} is needed): it must \
+         be a T1-weighted scan that shows most of the brain; check its orientation in a viewer"
+    )]
+    NoHead {
+        /// Mean local correlation with the mean head at the best pose.
+        likeness: f64,
+        /// What is needed.
+        least: f64,
+    },
 }

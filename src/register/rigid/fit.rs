@@ -10,7 +10,7 @@ use crate::register::head;
 use crate::register::mutual_information::{Bins, Interpolated, Pose};
 use crate::register::pyramid::{on_grid_of, reduced_to};
 use crate::register::sample::{Draw, draw};
-use crate::register::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank};
+use crate::register::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank, turns_about_axes};
 use nalgebra::Matrix3;
 
 /// An image and its foreground at one resolution.
@@ -86,9 +86,9 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
     }
     let aligned = Pose { linear: Matrix3::identity(), centre, target };
     let as_they_lie = Pose { target: centre, ..aligned };
-    let turn = 20f64.to_radians();
+    let turns = turns_about_axes(20f64.to_radians());
     let reach = Reach {
-        turns_rad: vec![-turn, 0.0, turn],
+        turns: turns.clone(),
         shifts_mm: [vec![-20.0, 0.0, 20.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
     };
     let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], &reach, 4);
@@ -107,7 +107,7 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
         mirror[(0, 0)] = -1.0;
         let mirrored = Pose { linear: pose.linear * mirror, ..pose };
         let shifts_mm = [vec![-10.0, 0.0, 10.0], vec![0.0], vec![0.0]];
-        let narrow = Reach { turns_rad: reach.turns_rad.clone(), shifts_mm };
+        let narrow = Reach { turns: turns.clone(), shifts_mm };
         let (starts, _) = coarse(&start_level, &[mirrored], &narrow, 2);
         let best = rank(&first, refine_all(&first, &starts)).first().map_or(0.0, |r| r.0);
         best / rank(&first, vec![pose])[0].0.max(1e-12)

@@ -13,10 +13,11 @@ pub use quality::{FitQuality, FitWarning};
 pub use settings::RigidSettings;
 
 use crate::geometry::{Frame, Native, RigidTransform};
-use crate::image::{Mask, Volume, morphology};
+use crate::image::{Mask, Volume};
 use fit::fit;
 use nalgebra::{Rotation3, UnitQuaternion};
-use side::{Side, side};
+use side::Side;
+pub(super) use side::side;
 
 /// Where the images count; `None` lets the head itself decide.
 #[derive(Clone, Copy, Debug)]
@@ -81,22 +82,4 @@ pub fn register_rigid<M: Frame, F: Frame>(
     let fixed_from_moving = if sample_moving { other_from_sampled } else { other_from_sampled.inverse() };
 
     Ok(RigidFit { fixed_from_moving: fixed_from_moving.relabelled(), quality, warnings: quality.warnings() })
-}
-
-/// Finds the rigid motion that takes a head onto a skull-stripped template.
-///
-/// As [`register_rigid`], over the template's brain (all that is not zero, 6 mm widened), without a mirrored trial: the
-/// template is taken to be symmetric.
-///
-/// # Errors
-/// As [`register_rigid`].
-pub fn register_to_template<M: Frame, F: Frame>(
-    moving: &Volume<f32, M>,
-    template: &Volume<f32, F>,
-    settings: &RigidSettings,
-) -> Result<RigidFit<M, F>, RegisterError> {
-    const MARGIN_MM: f64 = 6.0;
-    let region = morphology::dilate(&template.map(|x| x > 0.0), MARGIN_MM);
-    let masks = RigidMasks { moving: None, fixed: Some(&region) };
-    register_rigid(moving, template, masks, &RigidSettings { try_mirror: false, ..settings.clone() })
 }

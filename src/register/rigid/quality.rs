@@ -23,7 +23,7 @@ pub struct FitQuality {
 
 impl FitQuality {
     /// What the figures give reason to look at.
-    pub(super) fn warnings(&self) -> Vec<FitWarning> {
+    pub(in crate::register) fn warnings(&self) -> Vec<FitWarning> {
         let mut warnings = Vec::new();
         let Self { normalised_information, overlap, distinctness, mirrored_ratio, .. } = *self;
         if normalised_information < 0.05 || distinctness < 1.5 {

@@ -5,13 +5,13 @@ use crate::geometry::{Frame, Native};
 use crate::image::{Mask, Volume};
 
 /// One image of the pair, without its frame.
-pub(super) struct Side {
+pub(in crate::register) struct Side {
     pub image: Volume<f32, Native>,
     pub mask: Option<Mask<Native>>,
 }
 
 /// An image that can be registered, with its mask.
-pub(super) fn side<F: Frame>(
+pub(in crate::register) fn side<F: Frame>(
     which: &'static str,
     image: &Volume<f32, F>,
     mask: Option<&Mask<F>>,

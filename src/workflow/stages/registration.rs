@@ -8,8 +8,8 @@ use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::Grid;
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
-use crate::register::{RigidFit, RigidMasks, register_rigid, register_to_template};
-use crate::segment::atlas;
+use crate::register::{RigidFit, RigidMasks, register_rigid};
+use crate::segment::pose_of_head;
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::inputs::{ScanSums, Scans};
@@ -19,7 +19,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const NAME: StageName = StageName::Registration;
 
 /// What the report says of the two fits.
@@ -53,7 +53,7 @@ pub(crate) fn registration(
             .map_err(refused("the post-operative scan (moving) onto the pre-operative one (fixed)"))?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing("pre to MNI"));
-        let mni_from_pre = register_to_template(&scans.pre, &atlas::template().t1_f32(), settings)
+        let mni_from_pre = pose_of_head(&scans.pre)
             .map_err(refused("the pre-operative scan (moving) onto the MNI template (fixed)"))?;
         work.tell(|p| p.end());
         let mut produced = Produced::default();

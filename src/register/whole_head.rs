@@ -1,0 +1,280 @@
+//! The pose of a whole head: against the mean of many heads with their scalp and skull, never against a bare brain.
+//!
+//! A stripped template says nothing of what surrounds the brain, and mutual information then gains by sliding the bright
+//! template over scalp and neck. Here bone is dark and scalp bright in both images. What is compared has its slow gain taken
+//! out first (a surface coil makes the scalp ten times as bright as the thalamus), sizes may differ within what heads do, and
+//! of several starts the winner is the one whose anatomy agrees locally, not the one whose histogram is best.
+
+use super::affine::TETHER;
+use super::bfgs::Stopping;
+use super::bspline::prefilter;
+use super::deformable::force::local_correlation;
+use super::head;
+use super::mutual_information::{Bins, Interpolated, Pose};
+use super::pyramid::{on_grid_of, reduced_to};
+use super::rigid::{FitQuality, RegisterError, RigidFit, side};
+use super::sample::{Draw, draw};
+use super::search::{Freedom, Level, Reach, coarse, optimise, rank, turns_about_axes};
+use crate::geometry::{Frame, Native, RigidTransform};
+use crate::image::{Mask, Volume, morphology};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+
+/// Resolutions: for the starts, for the judgement, for the result.
+const LEVELS_MM: [f64; 3] = [8.0, 4.0, 2.0];
+/// The head is compared over its brain widened by this much: scalp and skull, not the face (cut off in shared scans), not
+/// the neck (which bends).
+const AROUND_MM: f64 = 20.0;
+const BINS: usize = 40;
+/// Local correlation with the mean head above which no other start is tried.
+const CLEAR: f64 = 0.5;
+/// Local correlation below which no head was found.
+const LEAST: f64 = 0.25;
+
+/// The mean of many heads, on one grid with the brain inside it.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanHead<'a, F: Frame> {
+    /// T1 intensity.
+    pub t1: &'a Volume<f32, F>,
+    /// The brain.
+    pub brain: &'a Mask<F>,
+}
+
+/// The mean head, ready to be compared with.
+pub(super) struct Prepared {
+    levels: Vec<Volume<f32, Native>>,
+    region: Mask<Native>,
+    /// Where the judge looks, on the grid of the second level.
+    near_brain: Mask<Native>,
+    pub centre_mm: Vector3<f64>,
+}
+
+impl<F: Frame> MeanHead<'_, F> {
+    pub(super) fn prepared(&self) -> Prepared {
+        let t1 = without_gain(&self.t1.clone().relabelled());
+        let brain: Mask<Native> = self.brain.clone().relabelled();
+        let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&t1, mm)).collect();
+        let near_brain = on_grid_of(&morphology::dilate(&brain, 6.0), &levels[1]);
+        let centre_mm = head::centre_mm(&brain);
+        Prepared { region: morphology::dilate(&brain, AROUND_MM), levels, near_brain, centre_mm }
+    }
+}
+
+/// The scan, ready to be compared with.
+pub(super) struct Subject {
+    levels: Vec<Volume<f32, Native>>,
+    coefficients: Vec<Volume<f32, Native>>,
+    known: Vec<Option<Mask<Native>>>,
+    pub foreground: Mask<Native>,
+}
+
+impl Subject {
+    pub(super) fn new(image: Volume<f32, Native>, known: Option<Mask<Native>>) -> Self {
+        let flat = without_gain(&reduced_to(&image, LEVELS_MM[2]));
+        let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&flat, mm)).collect();
+        let known = levels.iter().map(|l| known.as_ref().map(|k| on_grid_of(k, l))).collect();
+        let coefficients = levels.iter().map(along_thick_axes).collect();
+        let foreground = head::foreground(&levels[1]);
+        Self { levels, coefficients, known, foreground }
+    }
+}
+
+/// Spline coefficients along axes that are much coarser than the finest; along the others the smoothing spline is read.
+fn along_thick_axes(image: &Volume<f32, Native>) -> Volume<f32, Native> {
+    let mut coefficients = image.clone();
+    let spacing = image.grid.spacing_mm();
+    let thinnest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    for axis in (0..3).filter(|&a| spacing[a] > 1.5 * thinnest) {
+        prefilter(&mut coefficients, axis);
+    }
+    coefficients
+}
+
+/// One resolution of the comparison.
+pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
+    let (template, image) = (&head.levels[n], &subject.levels[n]);
+    let bins = if n == 0 { 24 } else { BINS };
+    let request = Draw {
+        most,
+        // The mean head is read at its own voxels, whatever the scan's.
+        other_spacing_mm: LEVELS_MM[n],
+        bins,
+        range: head::range_inside(template, &head.region),
+        centre_mm: head.centre_mm,
+        seed: 1 + n as u64,
+    };
+    Level {
+        samples: draw(template, &head.region, &request),
+        other: Interpolated {
+            image: &subject.coefficients[n],
+            mask: subject.known[n].as_ref(),
+            // Fat is brighter than all else and says little more than that it is fat.
+            range: head::range_within(image, &subject.foreground, 0.002, 0.97),
+        },
+        bins: Bins { sampled: bins, interpolated: bins + 4 },
+        spacing_mm: LEVELS_MM[n],
+    }
+}
+
+/// The image over its own slow gain: every neighbourhood of the head becomes equally bright on average.
+fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
+    use crate::image::gaussian::gaussian;
+    /// Wider than the brain's own regions, narrower than a coil's reach.
+    const SIGMA_MM: f64 = 30.0;
+    /// What stands for the head's brightness where there is no head nearby.
+    const FLOOR: f32 = 0.02;
+    let lowest = head::range_of(image.data.iter().copied(), 0.0, 1.0)[0].min(0.0);
+    let image = image.map(|x| x - lowest);
+    let mut flat = reduced_to(&image, LEVELS_MM[1]);
+    let coarse = flat.clone();
+    let mut gain = coarse.map(|_| 1.0);
+    // The second time the foreground is that of the flattened image: a coil's shadow has become head.
+    for _ in 0..2 {
+        // In logarithms the air stays apart from a brain that is a tenth as bright as the scalp.
+        let unit = 0.01 * head::range_of(flat.data.iter().copied(), 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
+        let logarithm = flat.map(|x| (1.0 + x / unit).ln());
+        let [_, threshold] = head::otsu(&logarithm.data);
+        let inside = logarithm.map(|x| f32::from(u8::from(x > threshold)));
+        let share = gaussian(&inside, SIGMA_MM);
+        let bright = Volume::from_fn(coarse.grid, |n| inside.data[n] * coarse.data[n]);
+        let count = inside.data.iter().sum::<f32>().max(1.0);
+        let mean = bright.data.iter().sum::<f32>() / count;
+        let sum = gaussian(&bright, SIGMA_MM);
+        gain = Volume::from_fn(coarse.grid, |n| (sum.data[n] + FLOOR * mean) / (share.data[n] + FLOOR));
+        let least = 0.02 * mean.max(f32::MIN_POSITIVE);
+        flat = Volume::from_fn(coarse.grid, |n| coarse.data[n] / gain.data[n].max(least));
+    }
+    let least = 0.02 * gain.data.iter().copied().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+    let to_gain = gain.grid.voxel_from_mm() * image.grid.mm_from_voxel;
+    let last = gain.grid.dims.map(|n| n as f64 - 1.0);
+    Volume::from_fn(image.grid, |n| {
+        let p = to_gain.transform_point(&Point3::from(image.grid.voxel(n).map(|i| i as f64)));
+        let inside = Point3::new(p.x.clamp(0.0, last[0]), p.y.clamp(0.0, last[1]), p.z.clamp(0.0, last[2]));
+        let gain = gain.trilinear(gain.grid.position(inside)).unwrap_or(1.0);
+        image.data[n] / gain.max(least)
+    })
+}
+
+/// Finds the rigid motion that takes a head onto the mean head.
+///
+/// Starts from aligned centres and from where the scan lies, turned by up to 30 degrees; when none of them is clearly a
+/// head, turned by up to 75 degrees about any axis. Each is refined with 12 parameters held to the sizes of heads, at 4 mm; the best
+/// by local correlation over the brain is finished at 2 mm. The motion is the polar part of the affine map.
+///
+/// # Errors
+/// [`RegisterError`]; [`RegisterError::NoHead`] when nothing at any start looks like a head.
+pub fn register_to_mean_head<M: Frame, F: Frame>(
+    moving: &Volume<f32, M>,
+    head: &MeanHead<'_, F>,
+) -> Result<RigidFit<M, F>, RegisterError> {
+    let moving = side("moving", moving, None)?;
+    let subject = Subject::new(moving.image, None);
+    let head = head.prepared();
+    let start_level = level(&head, &subject, 0, 2500);
+    let first = level(&head, &subject, 1, 15_000);
+    let centre = head.centre_mm;
+    let aligned = Pose { linear: Matrix3::identity(), centre, target: head::centre_mm(&subject.foreground) };
+    let as_they_lie = Pose { target: centre, ..aligned };
+    let judged = |poses: &[Pose]| -> Option<(f64, Pose)> {
+        let best = |a: (f64, Pose), b: (f64, Pose)| if b.0 > a.0 { b } else { a };
+        poses.iter().map(|p| refined(&first, p)).map(|p| (likeness(&head, &subject, &p), p)).reduce(best)
+    };
+
+    let near = Reach {
+        turns: turns_about_axes(20f64.to_radians()),
+        shifts_mm: [vec![-15.0, 15.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
+    };
+    let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], &near, 3);
+    let mut found = judged(&starts).unwrap_or((0.0, aligned));
+    let mut best_start = starts.first().copied();
+    if found.0 < CLEAR {
+        let far = Reach { turns: turns_within(75f64.to_radians(), 25f64.to_radians()), ..near };
+        let (starts, _) = coarse(&start_level, &[aligned], &far, 6);
+        if let Some(other) = judged(&starts).filter(|other| other.0 > found.0) {
+            found = other;
+            best_start = starts.first().copied();
+        }
+    }
+    let (likeness_4mm, pose) = found;
+    if likeness_4mm < LEAST {
+        return Err(RegisterError::NoHead { likeness: likeness_4mm, least: LEAST });
+    }
+    let distinctness = best_start.map_or(0.0, |p| rank(&start_level, vec![p])[0].0 / ordinary.max(1e-12));
+
+    let last = level(&head, &subject, 2, 80_000);
+    let stopping = Stopping { longest_step_mm: 1.0, shortest_step_mm: 5e-3, evaluations: 60 };
+    let optimum = optimise(&last, &pose, Freedom::Affine(TETHER), None, stopping);
+    let at = last.at(&optimum.pose);
+    let quality = FitQuality {
+        mutual_information: at.mutual_information,
+        normalised_information: at.mutual_information / at.entropy.max(1e-12),
+        overlap: at.overlap,
+        distinctness,
+        mirrored_ratio: None,
+        evaluations: optimum.evaluations,
+    };
+    let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&optimum.pose.linear));
+    let moving_from_head: RigidTransform<Native, Native> =
+        RigidTransform::new(rotation, optimum.pose.target - rotation * optimum.pose.centre);
+    Ok(RigidFit {
+        fixed_from_moving: moving_from_head.inverse().relabelled(),
+        quality,
+        warnings: quality.warnings(),
+    })
+}
+
+/// The rotation of a linear map's polar decomposition.
+fn nearest_rotation(linear: &Matrix3<f64>) -> Rotation3<f64> {
+    let svd = linear.svd(true, true);
+    Rotation3::from_matrix_unchecked(svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default())
+}
+
+fn refined(level: &Level<'_>, pose: &Pose) -> Pose {
+    let stopping = |evaluations| Stopping { longest_step_mm: 4.0, shortest_step_mm: 0.08, evaluations };
+    let rigid = optimise(level, pose, Freedom::Rigid, None, stopping(20)).pose;
+    optimise(level, &rigid, Freedom::Affine(TETHER), None, stopping(30)).pose
+}
+
+/// Turns on a grid of rotation vectors, `step_rad` apart, up to `reach_rad`.
+fn turns_within(reach_rad: f64, step_rad: f64) -> Vec<Rotation3<f64>> {
+    let most = (reach_rad / step_rad).floor() as i32;
+    let mut turns = Vec::new();
+    for a in -most..=most {
+        for b in -most..=most {
+            for c in -most..=most {
+                let w = Vector3::new(f64::from(a), f64::from(b), f64::from(c)) * step_rad;
+                if w.norm() <= reach_rad * (1.0 + 1e-9) {
+                    turns.push(Rotation3::from_scaled_axis(w));
+                }
+            }
+        }
+    }
+    turns
+}
+
+/// How much a scan seen through a pose looks like the mean head: the mean local correlation over the brain and its rim at
+/// 4 mm, less where little of it is in the field of view.
+fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
+    let (template, image) = (&head.levels[1], &subject.levels[1]);
+    let grid = template.grid;
+    let read = |n: usize| -> Option<f32> {
+        if !head.near_brain.data[n] {
+            return None;
+        }
+        let x = grid.position(Point3::from(grid.voxel(n).map(|i| i as f64))).mm.coords;
+        let p = crate::geometry::Position::from_point(Point3::from(pose.linear * (x - pose.centre) + pose.target));
+        let known = subject.known[1].as_ref().is_none_or(|k| k.nearest(p).unwrap_or(false));
+        if known { image.trilinear(p) } else { None }
+    };
+    let seen: Vec<Option<f32>> = (0..grid.len()).map(read).collect();
+    let weight: Vec<f32> = seen.iter().map(|x| f32::from(u8::from(x.is_some()))).collect();
+    let moved: Vec<f32> = seen.iter().map(|x| x.unwrap_or(0.0)).collect();
+    // Contrast below 2 % of what the brain and its rim show is noise.
+    let noise = |values: &[f32]| {
+        let inside = values.iter().zip(&weight).filter(|(_, w)| **w > 0.0).map(|(x, _)| *x);
+        let [low, high] = head::range_of(inside, 0.02, 0.98);
+        0.02 * (high - low)
+    };
+    let noises = [noise(&template.data), noise(&moved)];
+    let known = f64::from(weight.iter().sum::<f32>()) / head.near_brain.count().max(1) as f64;
+    local_correlation(&grid, &template.data, &moved, &weight, noises) * known.sqrt()
+}
