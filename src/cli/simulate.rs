@@ -3,7 +3,7 @@
 use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
-use crate::fem::{ConvergenceRecord, ElementKind, Method, Motion, Outcome, Progress, Scenario};
+use crate::fem::{ContactOutcome, ConvergenceRecord, ElementKind, Method, Motion, Outcome, Progress, Scenario};
 use crate::fem::{simulate, simulate_from};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, msh, pvd, vtu};
@@ -55,6 +55,8 @@ struct Summary {
     reaction_n: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     rmse_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    contact: Vec<ContactOutcome>,
     convergence: ConvergenceRecord,
     #[serde(skip_serializing_if = "Option::is_none")]
     motion: Option<Motion>,
@@ -68,6 +70,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let scenario = Scenario::from_toml(&read_text(&args.scenario)?)
         .map_err(|e| anyhow!("{}: {}", args.scenario.display(), workflow::in_words(&e.to_string())))
         .reject()?;
+    // Cut open along sheets that slide: results are written on the mesh as it was computed.
+    let mesh = scenario.body(&mesh).with_context(|| args.scenario.display().to_string()).reject()?.into_owned();
     let start = args.start.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
     if start.is_some() && scenario.solver.method == Method::BackwardEuler {
         return Err(Failure::Rejected(anyhow!("--start does not go with `method = \"backward-euler\"`: leave it out")));
@@ -168,6 +172,9 @@ fn produced(
     let errors = reference.map(|reference| node_errors_mm(&outcome.displacement_mm, reference));
     let mut points =
         vec![Field::vector("displacement", &outcome.displacement_mm), Field::vector("reaction_n", &outcome.reaction_n)];
+    if !outcome.contact.is_empty() {
+        points.push(Field::scalar("contact_pressure_pa", outcome.contact_pressure_pa));
+    }
     points.extend(errors.iter().map(|e| Field::scalar("rmse_mm", e.clone())));
     let cells = [
         Field::scalar("jacobian", outcome.jacobian),
@@ -198,6 +205,7 @@ fn produced(
         displacement_rms_mm: root_mean_square(&sizes).unwrap_or(0.0),
         reaction_n: [0, 1, 2].map(|i| outcome.reaction_n.iter().map(|r| r[i]).sum()),
         rmse_mm: errors.as_deref().and_then(root_mean_square),
+        contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
         warnings: outcome.warnings.clone(),
@@ -239,6 +247,13 @@ fn in_words(summary: &Summary, output: &Path) -> String {
         "most squeezed: cell {} to {:.3} of its volume\n",
         convergence.worst_cell, convergence.worst_volume_ratio
     );
+    for wall in &summary.contact {
+        let force = wall.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        text += &format!(
+            "wall before {}: {:.0} mm2 pressed with {force:.3} N, at most {:.3} mm deep\n",
+            wall.set, wall.area_mm2, wall.depth_mm
+        );
+    }
     if let Some(rmse) = summary.rmse_mm {
         text += &format!("RMSE against the reference {rmse:.6} mm\n");
     }

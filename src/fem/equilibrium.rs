@@ -78,7 +78,7 @@ impl Model {
         if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
             let mut u = state.u.clone();
             self.move_prescribed(&mut u, 1.0);
-            let stored = self.body.energy(&u, &laws);
+            let stored = self.energy(&u, &laws);
             if stored.is_finite() {
                 let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);
                 let start_whole = all_whole(&u);
@@ -92,7 +92,7 @@ impl Model {
                     }
                     // From cells inside out Newton may end in a body that overlaps itself, all volumes positive and in
                     // equilibrium: it is taken only if the one from rest has no lower potential (but for rounding).
-                    let potential = self.body.energy(&u, &laws) - work(&u);
+                    let potential = self.energy(&u, &laws) - work(&u);
                     doubtful = Some((u, forces.clone(), record.relative_residual, potential - 1e-9 * stored));
                 }
             }
@@ -100,7 +100,7 @@ impl Model {
 
         let from_rest = self.solve_from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
         let (u, forces) = match (from_rest, doubtful) {
-            (Ok(u), Some((.., lower))) if self.body.energy(&u, &laws) - work(&u) < lower => (u, forces),
+            (Ok(u), Some((.., lower))) if self.energy(&u, &laws) - work(&u) < lower => (u, forces),
             (_, Some((u, forces, relative_residual, _))) => {
                 record = ConvergenceRecord { load_steps: vec![1.0], relative_residual, ..record };
                 (u, forces)
@@ -184,7 +184,7 @@ impl Model {
         }
         for mut candidate in candidates {
             self.move_prescribed(&mut candidate, factor);
-            if self.body.energy(&candidate, laws).is_finite() {
+            if self.energy(&candidate, laws).is_finite() {
                 return candidate;
             }
         }
@@ -207,7 +207,7 @@ impl Model {
         self.move_prescribed(&mut moved, reached + small * (factor - reached));
         let (mut here, mut there) = (vec![[0.0; 3]; u.len()], vec![[0.0; 3]; u.len()]);
         let tangent = self.tangent(u, laws, &mut here, true, None);
-        self.body.assemble(&moved, laws, &self.partition, &mut there, None, false);
+        self.internal_forces(&moved, laws, &mut there);
         let difference: Vec<[f64; 3]> =
             there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
         let rhs = self.free_part(&difference);
@@ -238,7 +238,7 @@ impl Model {
         let settings = &self.scenario.solver;
         let (laws, factor) = (stage.laws, stage.factor);
         let work = |u: &[[f64; 3]]| factor * reduce::dot(&self.load_n, u);
-        let stored = self.body.energy(u, laws);
+        let stored = self.energy(u, laws);
         if !stored.is_finite() {
             return Err(Stuck::NotFinite);
         }
@@ -309,7 +309,7 @@ impl Model {
             let (trial, next) = loop {
                 let mut trial = u.clone();
                 self.add_free(&mut trial, length, &step);
-                let stored = self.body.energy(&trial, laws);
+                let stored = self.energy(&trial, laws);
                 let next = stored - work(&trial);
                 // Close to the solution the fall of energy drowns in rounding: any finite step is taken.
                 let noise = 1e-11 * energy_scale;
