@@ -122,11 +122,13 @@ fn blocks_slide_apart_along_a_sheet_without_a_gap() {
         format!("[[prescribed]]\nset = '{set}'\ndisplacement_mm = [0, {y}, 0]\ncomponents = [false, true, true]\n")
     };
     let text = format!(
-        "{}{}[supports]\nsheet = 'sliding'\n{GREY}[loads]\n\
+        "{}{}[supports]\nsheet = 'sliding'\n{}[loads]\n\
          pressure = [{{ set = 'left', pressure_pa = 100.0 }}, {{ set = 'right', pressure_pa = 100.0 }}]\n\
          [solver]\nrelative_residual = 1e-11\n",
         moved("left", 3.0),
-        moved("right", -3.0)
+        moved("right", -3.0),
+        // Without lateral strain the pressure is even.
+        GREY.replace("0.45", "0.0")
     );
     let scenario = Scenario::from_toml(&text).unwrap();
     let body = scenario.body(&mesh).unwrap();
@@ -288,14 +290,15 @@ fn slow_a_bounce_keeps_its_energy_but_for_the_time_step() {
 #[test]
 fn walls_and_sheets_that_cannot_be_are_refused() {
     let mut mesh = cube(2, 40.0);
-    let all = (0..mesh.nodes_mm().len() as u32).filter(|n| n % 3 != 0).collect();
-    mesh.set_nodes("slab", all).unwrap();
+    let half = (0..mesh.nodes_mm().len() as u32).filter(|&n| mesh.nodes_mm()[n as usize][0] <= 20.0).collect();
+    mesh.set_nodes("slab", half).unwrap();
     let refused = |text: &str| {
         let scenario = Scenario::from_toml(&format!("fixed = ['x0']\n{text}{GREY}")).unwrap();
         Model::new(&mesh, &scenario).err().expect(text).to_string()
     };
     let contact = |rest: &str| refused(&format!("[[contact]]\nset = 'z0'\n{rest}\n"));
     assert!(refused("[supports]\nskull = 'sliding'\n").contains("no set `skull`"));
+    assert!(refused("[supports]\nslab = 'sliding'\n").contains("no sheet of facets"));
     assert!(contact("wall = { shape = 'plane', point_mm = [0, 0, 0], normal = [0, 0, 0] }").contains("a direction"));
     assert!(contact("wall = { shape = 'own-surface' }\nsoftness_mm = 0.0").contains("softness_mm"));
     assert!(contact("wall = { shape = 'own-surface' }\ngap_mm = -1.0").contains("0 or more"));
