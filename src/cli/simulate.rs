@@ -68,6 +68,13 @@ fn in_words(summary: &Simulation, output: &Path) -> String {
         "most squeezed: cell {} to {:.3} of its volume\n",
         convergence.worst_cell, convergence.worst_volume_ratio
     );
+    for wall in &summary.contact {
+        let force = wall.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        text += &format!(
+            "wall before {}: {:.0} mm2 pressed with {force:.3} N, at most {:.3} mm deep\n",
+            wall.set, wall.area_mm2, wall.depth_mm
+        );
+    }
     if let Some(rmse) = summary.rmse_mm {
         text += &format!("RMSE against the reference {rmse:.6} mm\n");
     }

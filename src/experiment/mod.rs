@@ -12,5 +12,6 @@ pub mod rmse;
 pub mod sample;
 pub mod setting;
 pub mod smooth_noise;
+pub mod supports;
 pub mod sweep;
 pub mod synth;

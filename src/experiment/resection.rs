@@ -5,7 +5,10 @@ use super::sample::Tissue;
 use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
-use crate::fem::{Loads, PressureLoad, Scenario, SolverSettings};
+use super::supports::{SkullSettings, level_when_drained};
+use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
+use crate::geometry::Frame;
+use crate::image::LabelMap;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +23,43 @@ pub enum GravityFrame {
     Pre,
     /// The post-operative scanner's, whose scan the sag is seen on.
     Post,
+}
+
+/// Cerebrospinal fluid that is left; the table `[resection.csf]` of the settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CsfSettings {
+    /// Density of the fluid.
+    pub density_kg_per_m3: f64,
+    /// Part of the fluid seen before the operation that has drained, from the top.
+    pub drained: f64,
+}
+
+impl Default for CsfSettings {
+    fn default() -> Self {
+        Self { density_kg_per_m3: 1007.0, drained: 0.3 }
+    }
+}
+
+impl CsfSettings {
+    /// Refuses what no fluid can be.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let density = self.density_kg_per_m3;
+        first_broken(&[
+            ("csf.density_kg_per_m3", &density, density >= 0.0 && density.is_finite(), "0 or more"),
+            ("csf.drained", &self.drained, (0.0..=1.0).contains(&self.drained), "a part from 0 to 1"),
+        ])
+    }
+
+    /// The fluid as a load: its level by the labels of the pre-operative scan and gravity in their frame. `None` where no
+    /// fluid was seen.
+    pub fn level<F: Frame>(&self, labels: &LabelMap<F>, gravity_m_per_s2: [f64; 3]) -> Option<CsfLevel> {
+        let level_mm = level_when_drained(labels, gravity_m_per_s2, self.drained)?;
+        Some(CsfLevel { density_kg_per_m3: self.density_kg_per_m3, level_mm })
+    }
 }
 
 /// Loads, supports and samples of a patient's sweep.
@@ -45,6 +85,17 @@ pub struct ResectionSettings {
     pub sd_levels: Vec<f64>,
     /// Node sets held still.
     pub fixed: Vec<String>,
+    /// How the skull holds the brain: `fixed` at its base, as in the paper, or `sliding`: only the cut brainstem is held
+    /// there, and the skull pushes back without friction.
+    pub supports: Support,
+    /// How the falx holds it where `supports` slide: `fixed` to it, or `sliding` along either side.
+    pub falx: Support,
+    /// The skull of `supports = "sliding"`.
+    pub skull: SkullSettings,
+    /// Fluid left around the brain, with `density_kg_per_m3` the tissue's own; none by default, where that density is an
+    /// effective one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub csf: Option<CsfSettings>,
     /// Expected error of the rigid registration over the brain, mm: part of the noise floor.
     pub registration_error_mm: f64,
     /// Solver.
@@ -62,6 +113,10 @@ impl Default for ResectionSettings {
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
             fixed: vec!["base".to_owned(), "falx".to_owned()],
+            supports: Support::Fixed,
+            falx: Support::Fixed,
+            skull: SkullSettings::default(),
+            csf: None,
             registration_error_mm: 0.2,
             solver: SolverSettings::default(),
         }
@@ -77,6 +132,10 @@ impl ResectionSettings {
         let (g, density) = (self.gravity_m_per_s2, self.density_kg_per_m3);
         let pressures = self.pressure.iter().all(|load| load.pressure_pa.is_finite());
         let registration = self.registration_error_mm;
+        self.skull.check()?;
+        if let Some(csf) = &self.csf {
+            csf.check()?;
+        }
         first_broken(&[
             ("tissues", &self.tissues, (1..=2).contains(&self.tissues), TISSUES_RULE),
             ("gravity_m_per_s2", &g, g.iter().all(|x| x.is_finite()), "three numbers"),

@@ -1,6 +1,7 @@
 //! What must hold of mesh and scenario before anything is solved.
 
 use super::FemError;
+use super::contact::Wall;
 use super::order::Graph;
 use super::scenario::{Materials, Scenario};
 use crate::mesh::TetMesh;
@@ -62,11 +63,41 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
         numbers.push(("loads.csf.density_kg_per_m3".into(), csf.density_kg_per_m3));
         numbers.push(("loads.csf.level_mm".into(), csf.level_mm));
     }
+    for contact in &scenario.contact {
+        let key = |name: &str| format!("contact.{name}` of set `{}", contact.set);
+        numbers.push((key("gap_mm"), contact.gap_mm));
+        if let Wall::Plane { point_mm, normal } = &contact.wall {
+            numbers.extend(point_mm.iter().map(|&v| (key("wall.point_mm"), v)));
+            numbers.extend(normal.iter().map(|&v| (key("wall.normal"), v)));
+        }
+    }
     if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
         return refuse(&key, value, "a finite number");
     }
     if loads.density_kg_per_m3 <= 0.0 {
         return refuse("loads.density_kg_per_m3", loads.density_kg_per_m3, "positive");
+    }
+    for contact in &scenario.contact {
+        let key = |name: &str| format!("contact.{name}` of set `{}", contact.set);
+        for (name, value) in
+            [("stiffness_pa_per_mm", contact.stiffness_pa_per_mm), ("softness_mm", contact.softness_mm)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return refuse(&key(name), value, "positive");
+            }
+        }
+        if contact.gap_mm < 0.0 {
+            return refuse(&key("gap_mm"), contact.gap_mm, "0 or more");
+        }
+        if matches!(contact.wall, Wall::Plane { normal, .. } if normal == [0.0; 3]) {
+            return refuse(&key("wall.normal"), 0.0, "a direction, not [0, 0, 0]");
+        }
+    }
+    for tether in &scenario.tethers {
+        if !(tether.stiffness_pa_per_mm >= 0.0 && tether.stiffness_pa_per_mm.is_finite()) {
+            let key = format!("tethers.stiffness_pa_per_mm` of set `{}", tether.set);
+            return refuse(&key, tether.stiffness_pa_per_mm, "0 or more");
+        }
     }
     let solver = &scenario.solver;
     if !(1e-13..1.0).contains(&solver.relative_residual) {

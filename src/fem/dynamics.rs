@@ -76,7 +76,7 @@ impl Model {
             }
         }
         let mut forces = vec![[0.0; 3]; body.u.len()];
-        self.body.assemble(&body.u, &body.laws, &self.partition, &mut forces, None, false);
+        self.internal_forces(&body.u, &body.laws, &mut forces);
         let size = reduce::norm(&self.out_of_balance(&forces, 1.0));
         let scale = reduce::norm(&self.free_part(&self.load_n));
         record.relative_residual = if scale > 0.0 { size / scale } else { size };
@@ -117,7 +117,9 @@ impl Moving<'_> {
         for iteration in 0..=most {
             let mut now = self.u.clone();
             self.model.add_free(&mut now, 1.0, &moved);
-            let mut first = Some(self.model.tangent(&now, &self.laws, &mut forces, false, spare.take()));
+            let mut first = Some(self.model.tangent_of_body(&now, &self.laws, &mut forces, false, spare.take()));
+            // Damping by stiffness is the tissue's: a wall that damped would hold what leaves it.
+            self.model.supports.add_forces(&now, &self.model.nodes_m, &mut forces);
             let mut rhs = self.model.out_of_balance(&forces, 1.0);
             add(&mut rhs, 1.0, &momentum);
             if let Some(start) = &at_start {
@@ -144,15 +146,18 @@ impl Moving<'_> {
             let mut kept = None;
             for project in [false, true] {
                 let tangent = first.take();
-                let tangent =
-                    tangent.unwrap_or_else(|| self.model.tangent(&now, &self.laws, &mut forces, project, spare.take()));
-                let system = if fixed_count && most == 1 {
+                let tangent = tangent.unwrap_or_else(|| {
+                    let mut again = vec![[0.0; 3]; forces.len()];
+                    self.model.tangent_of_body(&now, &self.laws, &mut again, project, spare.take())
+                });
+                let mut system = if fixed_count && most == 1 {
                     self.mass.plus(mass_factor, tangent, 1.0 + stiffness_damping / h)
                 } else {
                     let sum = tangent.plus(stiffness_damping / h, at_start.as_ref().unwrap_or(&tangent));
                     kept = Some(tangent);
                     self.mass.plus(mass_factor, sum, 1.0)
                 };
+                self.model.add_stiffness_of_supports(&now, project, &mut system);
                 solver.prepare(&system);
                 report = if iteration == 0 {
                     self.solve_along_velocity(solver, &system, &rhs, &mut change, finest)
@@ -169,7 +174,7 @@ impl Moving<'_> {
             loop {
                 let mut trial = now.clone();
                 self.model.add_free(&mut trial, length, &change);
-                if self.model.body.energy(&trial, &self.laws).is_finite() {
+                if self.model.energy(&trial, &self.laws).is_finite() {
                     break;
                 }
                 length *= 0.5;

@@ -74,7 +74,7 @@ impl Model {
         if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
             let mut u = state.u.clone();
             self.move_prescribed(&mut u, 1.0);
-            let stored = self.body.energy(&u, &laws);
+            let stored = self.energy(&u, &laws);
             if stored.is_finite() {
                 let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);
                 let start_whole = all_whole(&u);
@@ -88,7 +88,7 @@ impl Model {
                     }
                     // From cells inside out Newton may end in a body that overlaps itself, all volumes positive and in
                     // equilibrium: it is taken only if the one from rest has no lower potential (but for rounding).
-                    let potential = self.body.energy(&u, &laws) - work(&u);
+                    let potential = self.energy(&u, &laws) - work(&u);
                     doubtful = Some((u, forces.clone(), record.relative_residual, potential - 1e-9 * stored));
                 }
             }
@@ -96,7 +96,7 @@ impl Model {
 
         let from_rest = self.solve_from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
         let (u, forces) = match (from_rest, doubtful) {
-            (Ok(u), Some((.., lower))) if self.body.energy(&u, &laws) - work(&u) < lower => (u, forces),
+            (Ok(u), Some((.., lower))) if self.energy(&u, &laws) - work(&u) < lower => (u, forces),
             (_, Some((u, forces, relative_residual, _))) => {
                 record = ConvergenceRecord { load_steps: vec![1.0], relative_residual, ..record };
                 (u, forces)
@@ -180,7 +180,7 @@ impl Model {
         }
         for mut candidate in candidates {
             self.move_prescribed(&mut candidate, factor);
-            if self.body.energy(&candidate, laws).is_finite() {
+            if self.energy(&candidate, laws).is_finite() {
                 return candidate;
             }
         }
@@ -203,7 +203,7 @@ impl Model {
         self.move_prescribed(&mut moved, reached + small * (factor - reached));
         let (mut here, mut there) = (vec![[0.0; 3]; u.len()], vec![[0.0; 3]; u.len()]);
         let tangent = self.tangent(u, laws, &mut here, true, None);
-        self.body.assemble(&moved, laws, &self.partition, &mut there, None, false);
+        self.internal_forces(&moved, laws, &mut there);
         let difference: Vec<[f64; 3]> =
             there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
         let rhs = self.free_part(&difference);
@@ -234,7 +234,7 @@ impl Model {
         let settings = &self.scenario.solver;
         let (laws, factor) = (stage.laws, stage.factor);
         let work = |u: &[[f64; 3]]| factor * reduce::dot(&self.load_n, u);
-        let stored = self.body.energy(u, laws);
+        let stored = self.energy(u, laws);
         if !stored.is_finite() {
             return Err(Stuck::NotFinite);
         }
@@ -245,6 +245,7 @@ impl Model {
         let mut project = false;
         let (mut best, mut since_best) = (f64::INFINITY, 0);
         let mut spare = None;
+        let mut watch: Option<Watch> = None;
         for iteration in 0..=settings.newton_iterations {
             let mut tangent = self.tangent(u, laws, forces, project, spare.take());
             let rhs = self.out_of_balance(forces, factor);
@@ -301,17 +302,31 @@ impl Model {
                 }
                 slope = -reduce::dot(&rhs, &step);
             }
+            // Close to the solution the fall of energy drowns in rounding: any finite step is taken.
+            let noise = 1e-11 * energy_scale;
             let mut length = 1.0;
+            let mut watched = if self.supports.is_empty() { 0 } else { WATCHED };
             let (trial, next) = loop {
                 let mut trial = u.clone();
                 self.add_free(&mut trial, length, &step);
-                let stored = self.body.energy(&trial, laws);
+                let stored = self.energy(&trial, laws);
                 let next = stored - work(&trial);
-                // Close to the solution the fall of energy drowns in rounding: any finite step is taken.
-                let noise = 1e-11 * energy_scale;
-                if next <= potential + ARMIJO * length * slope + noise {
+                let [from, fall] = watch.as_ref().map_or([potential, slope], |w| [w.potential, w.slope]);
+                if next <= from + ARMIJO * length * fall + noise {
                     energy_scale = stored.abs() + work(&trial).abs();
+                    watch = None;
                     break (trial, next);
+                }
+                let left = watch.as_ref().map_or(watched, |w| w.left);
+                if next.is_finite() && left > 0 && length >= SHORTEST_WATCHED {
+                    let start = || Watch { u: u.clone(), potential, slope, step: step.clone(), left };
+                    watch.get_or_insert_with(start).left = left - 1;
+                    break (trial, next);
+                }
+                if let Some(start) = watch.take_if(|_| next.is_finite()) {
+                    // The way led nowhere: back to where it began, and shorter.
+                    Watch { u: *u, potential, slope, step, .. } = start;
+                    (length, watched) = (1.0, 0);
                 }
                 length *= 0.5;
                 if length < 1e-9 {
@@ -364,6 +379,25 @@ struct Stage<'a> {
     load_scale: f64,
     first_forcing: f64,
     progress: &'a dyn Fn(&Progress),
+}
+
+/// Steps before walls that need not lower the energy at once. A step through a wall costs more energy than it gains, however
+/// right its direction; the next one is pushed back by the wall and mends that. Where they lead nowhere, the way goes back to
+/// their start (the watchdog technique: Chamberlain, Powell, Lemarechal and Pedersen, Math. Programming Study 16, 1982;
+/// Nocedal and Wright, ch. 15).
+const WATCHED: usize = 4;
+
+/// Shortest part of a step that is taken so; a shorter one is better searched for.
+const SHORTEST_WATCHED: f64 = 1.0 / 16.0;
+
+/// Where steps that need not lower the energy began.
+struct Watch {
+    u: Vec<[f64; 3]>,
+    potential: f64,
+    slope: f64,
+    step: Vec<[f64; 3]>,
+    /// Steps left.
+    left: usize,
 }
 
 /// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.

@@ -35,6 +35,16 @@ pub enum FemError {
          that holds whole facets of the surface"
     )]
     NoFacets { set: String },
+    #[error(
+        "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four nodes of cell {cell}; mesh the \
+         body so that it conforms to the sheet, or hold the set in `fixed`"
+    )]
+    NoSheet { set: String, cell: usize },
+    #[error(
+        "the wall before set `{set}` is the field `{name}`, which a scenario file cannot hold; give the wall as \
+         \"own-surface\" or \"plane\", or call the library with the field"
+    )]
+    NoField { set: String, name: String },
     #[error("`{key}` is {value}: it must be {rule}")]
     Setting { key: String, value: f64, rule: &'static str },
     #[error("part of the mesh ({nodes} nodes, among them node {node}) is held nowhere: fix a set there or remove it")]

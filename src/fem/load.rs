@@ -1,6 +1,7 @@
 //! Loads as forces on nodes (N). All are dead loads: found on the undeformed shape, constant in size and direction.
 
-use super::scenario::{CsfLevel, Loads};
+use super::buoyancy::Buoyancy;
+use super::scenario::Loads;
 use super::units::{METRES_PER_MM, metres};
 use super::{FemError, element::cross};
 use crate::mesh::TetMesh;
@@ -20,7 +21,7 @@ pub(super) type Quadratic<'a> = (&'a [[u32; 10]], &'a [[u32; 2]]);
 impl Sharing<'_> {
     /// Integrals of the shape functions over a tetrahedron of volume 1: a quarter each, or -1/20 at corners and 1/5 at
     /// mid-edges (1/36 and 4/27 for a lumped mass).
-    fn of_tet(&self, tet: usize) -> Vec<(u32, f64)> {
+    pub(super) fn of_tet(&self, tet: usize) -> Vec<(u32, f64)> {
         match self.quadratic {
             None => self.mesh.tets()[tet].iter().map(|&n| (n, 0.25)).collect(),
             Some((tets, _)) => {
@@ -31,7 +32,7 @@ impl Sharing<'_> {
     }
 
     /// The same over a facet of area 1: a third at each corner, or at each mid-edge.
-    fn of_facet(&self, facet: [u32; 3]) -> [u32; 3] {
+    pub(super) fn of_facet(&self, facet: [u32; 3]) -> [u32; 3] {
         let Some((_, edges)) = self.quadratic else { return facet };
         let corners = self.mesh.nodes_mm().len();
         [[0, 1], [1, 2], [2, 0]].map(|[a, b]| {
@@ -40,44 +41,19 @@ impl Sharing<'_> {
         })
     }
 
-    fn position_mm(&self, node: u32) -> [f64; 3] {
-        let nodes = self.mesh.nodes_mm();
-        match self.quadratic {
-            Some((_, edges)) if node as usize >= nodes.len() => {
-                let [a, b] = edges[node as usize - nodes.len()].map(|n| nodes[n as usize]);
-                [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]))
-            }
-            _ => nodes[node as usize],
-        }
-    }
-
-    fn nodes(&self) -> usize {
+    pub(super) fn nodes(&self) -> usize {
         self.mesh.nodes_mm().len() + self.quadratic.map_or(0, |(_, edges)| edges.len())
     }
 }
 
-/// Weight of each tetrahedron shared by its nodes (equally by the four corners of a linear one); with a fluid level,
-/// nodes below it share the buoyant weight instead.
+/// Weight of each tetrahedron shared by its nodes (equally by the four corners of a linear one).
 fn add_weight_n(sharing: &Sharing, loads: &Loads, forces: &mut [[f64; 3]]) {
     let g = loads.gravity_m_per_s2;
-    let strength = g.iter().map(|v| v * v).sum::<f64>().sqrt();
-    if strength == 0.0 {
-        return;
-    }
-    let up = g.map(|v| -v / strength);
-    let density = |node: u32| match loads.csf {
-        Some(CsfLevel { density_kg_per_m3, level_mm }) => {
-            let x = sharing.position_mm(node);
-            let height = (0..3).map(|i| x[i] * up[i]).sum::<f64>();
-            loads.density_kg_per_m3 - if height < level_mm { density_kg_per_m3 } else { 0.0 }
-        }
-        None => loads.density_kg_per_m3,
-    };
     let cubic = METRES_PER_MM.powi(3);
     for tet in 0..sharing.mesh.tets().len() {
         let volume = sharing.mesh.volume_mm3(tet) * cubic;
         for (n, share) in sharing.of_tet(tet) {
-            let mass = share * volume * density(n);
+            let mass = share * volume * loads.density_kg_per_m3;
             (0..3).for_each(|i| forces[n as usize][i] += mass * g[i]);
         }
     }
@@ -101,7 +77,7 @@ pub(super) fn facets_of(mesh: &TetMesh, set: &str) -> Result<Vec<[u32; 3]>, FemE
 }
 
 /// Area vector of a facet, m2, along its normal.
-fn area_m2(mesh: &TetMesh, facet: [u32; 3]) -> [f64; 3] {
+pub(super) fn area_m2(mesh: &TetMesh, facet: [u32; 3]) -> [f64; 3] {
     let [a, b, c] = facet.map(|n| metres(mesh.nodes_mm()[n as usize]));
     let d = |x: [f64; 3]| [x[0] - a[0], x[1] - a[1], x[2] - a[2]];
     cross(d(b), d(c)).map(|v| 0.5 * v)
@@ -126,14 +102,21 @@ pub enum Load {
 /// A load with its forces on the nodes, N.
 pub(super) type NodalForces = (Load, Vec<[f64; 3]>);
 
-/// Every load as forces on the nodes.
-pub(super) fn nodal_forces_n(sharing: &Sharing, loads: &Loads) -> Result<Vec<NodalForces>, FemError> {
+/// Every load as forces on the nodes; a fluid's part of the weight is given.
+pub(super) fn nodal_forces_n(
+    sharing: &Sharing,
+    loads: &Loads,
+    buoyancy: Option<&Buoyancy>,
+) -> Result<Vec<NodalForces>, FemError> {
     let mesh = sharing.mesh;
     let none = || vec![[0.0; 3]; sharing.nodes()];
     let mut parts = Vec::new();
     if loads.gravity_m_per_s2 != [0.0; 3] {
         let mut forces = none();
         add_weight_n(sharing, loads, &mut forces);
+        for (force, lift) in forces.iter_mut().zip(buoyancy.iter().flat_map(|b| &b.lift_n)) {
+            (0..3).for_each(|i| force[i] += lift[i]);
+        }
         parts.push((Load::Weight, forces));
     }
     for (n, patch) in loads.patch.iter().enumerate() {

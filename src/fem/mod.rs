@@ -4,7 +4,9 @@
 //! and estimation. Inside, everything is SI and in a numbering of its own; outside, mm and the mesh's numbering.
 
 mod body;
+mod buoyancy;
 mod check;
+mod contact;
 mod dynamics;
 mod element;
 mod equilibrium;
@@ -26,6 +28,7 @@ mod state;
 mod stiffness;
 pub mod units;
 
+pub use contact::{Contact, ContactOutcome, Support, Tether, Wall};
 pub use element::ElementKind;
 pub use error::FemError;
 pub use load::Load;

@@ -2,7 +2,9 @@
 //! every solve.
 
 use super::body::{Body, Laws};
+use super::buoyancy::Buoyancy;
 use super::check::{check_held_together, check_materials, check_settings, materials_of_cells, node_set};
+use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{
     ElementKind, Elements, Kernel, NODAL_SHARE, NodalGradient, Partition, tet4, tet10, with_mid_edge_nodes,
 };
@@ -35,6 +37,10 @@ pub struct Model {
     pub(super) load_n: Vec<[f64; 3]>,
     /// Each load on its own in solver numbering, N.
     pub(super) load_parts: Vec<NodalForces>,
+    /// What a fluid carries, in solver numbering; part of the weight above.
+    pub(super) buoyancy: Option<Buoyancy>,
+    /// Walls and springs.
+    pub(super) supports: Supports,
     /// Undeformed nodes in solver numbering, m.
     pub(super) nodes_m: Vec<[f64; 3]>,
     /// Material names in the order the elements count them.
@@ -57,6 +63,8 @@ impl Model {
     pub fn new(mesh: &TetMesh, scenario: &Scenario) -> Result<Self, FemError> {
         check_settings(scenario)?;
         check_materials(&scenario.materials)?;
+        let body = scenario.body(mesh)?;
+        let mesh = &*body;
         let (material_of_cell, names) = materials_of_cells(mesh, scenario)?;
         let corners = mesh.nodes_mm().len();
         let quadratic =
@@ -82,7 +90,7 @@ impl Model {
         for p in &scenario.prescribed {
             hold(&p.set, p.components, metres(p.displacement_mm))?;
         }
-        for set in &scenario.fixed {
+        for set in scenario.held() {
             hold(set, [true; 3], [0.0; 3])?;
         }
         // A body in motion has its mass to hold on to.
@@ -91,9 +99,13 @@ impl Model {
         let lumped = moving && scenario.dynamics.mass == MassKind::Lumped;
         let ends = quadratic.as_ref().map(|(tets, edges)| (&tets[..], &edges[..]));
         let sharing = Sharing { mesh, quadratic: ends, lumped };
-        let loads = nodal_forces_n(&sharing, &scenario.loads)?;
+        let buoyancy = Buoyancy::new(&sharing, &scenario.loads);
+        let loads = nodal_forces_n(&sharing, &scenario.loads, buoyancy.as_ref())?;
 
-        let any_held = held.iter().any(|h| *h != [false; 3]);
+        // What springs hold is held as well, as far as drifting away goes.
+        let mut leaning = held.clone();
+        tethered_nodes(&sharing, scenario)?.into_iter().for_each(|n| leaning[n as usize] = [true; 3]);
+        let any_held = leaning.iter().any(|h| *h != [false; 3]);
         let graph = match &quadratic {
             Some((tets, _)) => Graph::of_elements(nodes, tets),
             None => Graph::of_elements(nodes, mesh.tets()),
@@ -102,7 +114,7 @@ impl Model {
             return Err(FemError::NothingHeld);
         }
         if !moving {
-            check_held_together(&graph, &held)?;
+            check_held_together(&graph, &leaning)?;
         }
         // A node of no element has nothing to answer to.
         (0..nodes).filter(|&n| graph.of(n).is_empty()).for_each(|n| held[n] = [true; 3]);
@@ -140,6 +152,8 @@ impl Model {
             }
         };
         let nodes_m: Vec<[f64; 3]> = order.iter().map(|&old| position(old)).collect();
+        let numbering = Numbering { number: &number, row_of: &row_of, nodes_m: &nodes_m };
+        let supports = Supports::new(&sharing, scenario, &numbering)?;
         let mut load_n = vec![[0.0; 3]; nodes];
         let load_parts: Vec<NodalForces> = loads
             .into_iter()
@@ -150,6 +164,7 @@ impl Model {
                 (0..3).for_each(|i| sum[i] += force[i]);
             }
         }
+        let buoyancy = buoyancy.map(|b| b.ordered(&order));
         let pattern = Arc::new(BlockPattern::new(&renumbered(&graph, &order, &number), &row_of));
 
         let body = if let Some((tets, _)) = &quadratic {
@@ -192,6 +207,8 @@ impl Model {
             prescribed,
             load_n,
             load_parts,
+            supports,
+            buoyancy,
             edges: edges.to_vec(),
             nodes_m,
             names,
@@ -276,8 +293,40 @@ impl Model {
         })
     }
 
+    /// Stored energy of body, walls and springs, J.
+    pub(super) fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {
+        self.body.energy(u, laws) + self.supports.energy(u, &self.nodes_m)
+    }
+
+    /// Its derivative by the displacement of all nodes, N.
+    pub(super) fn internal_forces(&self, u: &[[f64; 3]], laws: &Laws, forces: &mut [[f64; 3]]) {
+        self.body.assemble(u, laws, &self.partition, forces, None, false);
+        self.supports.add_forces(u, &self.nodes_m, forces);
+    }
+
     /// Tangent at u, in the memory of a spare one; also fills the internal forces of all nodes.
     pub(super) fn tangent(
+        &self,
+        u: &[[f64; 3]],
+        laws: &Laws,
+        forces: &mut [[f64; 3]],
+        project: bool,
+        spare: Option<Tangent>,
+    ) -> Tangent {
+        let mut tangent = self.tangent_of_body(u, laws, forces, project, spare);
+        self.supports.add_forces(u, &self.nodes_m, forces);
+        self.add_stiffness_of_supports(u, project, &mut tangent);
+        tangent
+    }
+
+    /// Adds what walls and springs are to a tangent of the body.
+    pub(super) fn add_stiffness_of_supports(&self, u: &[[f64; 3]], project: bool, tangent: &mut Tangent) {
+        let held = self.held_components.as_ref().map(|held| held.as_slice());
+        self.supports.add_stiffness(u, &self.nodes_m, held, project, tangent);
+    }
+
+    /// Tangent and internal forces of the body without walls and springs.
+    pub(super) fn tangent_of_body(
         &self,
         u: &[[f64; 3]],
         laws: &Laws,

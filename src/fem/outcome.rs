@@ -1,6 +1,7 @@
 //! What a simulation answers.
 
 use super::body::{Body, Laws};
+use super::contact::ContactOutcome;
 use super::model::Model;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,12 @@ pub struct Outcome {
     pub jacobian: Vec<f64>,
     /// Stored energy per undeformed volume of every cell, Pa.
     pub strain_energy_density_pa: Vec<f64>,
+    /// What every wall does; none without walls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contact: Vec<ContactOutcome>,
+    /// Pressure of walls on every node, Pa; empty without walls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contact_pressure_pa: Vec<f64>,
     /// How it was found.
     pub convergence: ConvergenceRecord,
     /// How it moved there; absent in statics.
@@ -135,7 +142,11 @@ impl Model {
             warnings
                 .push(format!("{crushed} cells are squeezed below a tenth of their volume: treat stresses with care"));
         }
+        let (contact, pressure) = self.supports.outcome(u, &self.nodes_m);
+        let of_node = |n: usize| pressure[self.number[n] as usize];
         Outcome {
+            contact_pressure_pa: if contact.is_empty() { Vec::new() } else { (0..self.corners).map(of_node).collect() },
+            contact,
             displacement_mm: self.to_mesh_mm(u),
             reaction_n: (0..self.corners).map(reaction).collect(),
             jacobian: state.iter().map(|s| s[0]).collect(),

@@ -1,9 +1,13 @@
 //! What is to be simulated: the contents of SCENARIO.toml.
 
+use super::FemError;
+use super::contact::{Contact, Support, Tether, body_of};
 use super::element::ElementKind;
 use crate::material::law::Material;
 use crate::material::toml_text::line_of;
+use crate::mesh::TetMesh;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -33,6 +37,15 @@ pub type Materials = BTreeMap<String, Material>;
 pub struct Scenario {
     /// Node sets held at zero displacement.
     pub fixed: Vec<String>,
+    /// Sets that are held or slide: `falx = "sliding"`, `base = "fixed"` (as in `fixed`).
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub supports: BTreeMap<String, Support>,
+    /// Walls that surfaces stand before, `[[contact]]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub contact: Vec<Contact>,
+    /// Springs between surfaces and their places at rest, `[[tethers]]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tethers: Vec<Tether>,
     /// Node sets moved by a given displacement.
     pub prescribed: Vec<Prescribed>,
     /// One law per label name.
@@ -108,7 +121,8 @@ pub struct PressureLoad {
     pub pressure_pa: f64,
 }
 
-/// Cerebrospinal fluid up to a level: tissue below it weighs (rho_tissue - rho_fluid) g, above it its full weight.
+/// Cerebrospinal fluid up to a level: tissue below it weighs (rho_tissue - rho_fluid) g, above it its full weight, an
+/// element at the level by its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CsfLevel {
@@ -241,6 +255,21 @@ impl Scenario {
             let message = e.message().trim().replace('\n', " ");
             ScenarioError { line: line_of(&e, text), message }
         })
+    }
+
+    /// Node sets held at zero displacement, by `fixed` or by `supports`.
+    pub fn held(&self) -> impl Iterator<Item = &String> {
+        let supports = self.supports.iter().filter(|(_, support)| **support == Support::Fixed);
+        self.fixed.iter().chain(supports.map(|(set, _)| set))
+    }
+
+    /// The mesh as the supports need it: cut open along sheets that slide, new nodes behind the mesh's own. A mesh that
+    /// is cut already, or needs no cut, comes back as it is. Outcomes are numbered by it.
+    ///
+    /// # Errors
+    /// [`FemError::UnknownSet`], and [`FemError::NoSheet`] for a set that cannot be cut along.
+    pub fn body<'a>(&self, mesh: &'a TetMesh) -> Result<Cow<'a, TetMesh>, FemError> {
+        body_of(mesh, self)
     }
 
     /// The number of a label name: from `labels`, else as in DSEG files.

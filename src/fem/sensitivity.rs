@@ -15,7 +15,8 @@ use super::{FemError, State, reduce};
 use crate::material::law::Parameter;
 use serde::{Deserialize, Serialize};
 
-/// What a displacement is differentiated by: the logarithm of it, but for [`By::Gravity`].
+/// What a displacement is differentiated by: the logarithm of it, but for [`By::CsfLevel`],
+/// [`By::Gravity`] and [`By::Gap`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum By {
@@ -29,8 +30,17 @@ pub enum By {
     },
     /// One load.
     Load(Load),
+    /// Density of the tissue, what a fluid carries left as it is.
+    TissueDensity,
+    /// Density of the fluid of `loads.csf`.
+    CsfDensity,
+    /// Level of the fluid of `loads.csf`, per mm instead of per logarithm.
+    CsfLevel,
     /// Gravity along an axis (0 to 2 for x to z) of the mesh, per m/s2 instead of per logarithm: the way gravity turns.
     Gravity(usize),
+    /// The room before a wall, per mm instead of per logarithm: the scenario's `contact` of this number, walls of sliding
+    /// supports behind them. Walls that are planes move away from the body.
+    Gap(usize),
     /// Everything that moves the body: all loads and all prescribed displacements together.
     AllLoads,
 }
@@ -136,12 +146,33 @@ impl<'a> Linearised<'a> {
                 // The weight of a node is its mass times gravity.
                 let g = self.model.scenario.loads.gravity_m_per_s2;
                 let squared: f64 = g.iter().map(|v| v * v).sum();
-                let mut forces = self.driving_force(&By::Load(Load::Weight))?;
+                let mut forces = self.driving_force(&By::TissueDensity)?;
                 for force in &mut forces {
                     let mass_kg = (0..3).map(|i| force[i] * g[i]).sum::<f64>() / squared;
                     *force = [0, 1, 2].map(|i| if i == *axis { mass_kg } else { 0.0 });
                 }
+                // The fluid's surface turns with gravity.
+                let turning = self.model.buoyancy.iter().flat_map(|b| &b.per_gravity_n[*axis]);
+                for (force, more) in forces.iter_mut().zip(turning) {
+                    (0..3).for_each(|i| force[i] += more[i]);
+                }
                 Ok(forces)
+            }
+            By::TissueDensity => {
+                let mut forces = self.driving_force(&By::Load(Load::Weight))?;
+                for (force, lift) in forces.iter_mut().zip(self.model.buoyancy.iter().flat_map(|b| &b.lift_n)) {
+                    (0..3).for_each(|i| force[i] -= lift[i]);
+                }
+                Ok(forces)
+            }
+            By::CsfDensity | By::CsfLevel => {
+                let missing = || FemError::NoParameter { what: format!("{by:?} (there is no `loads.csf`)") };
+                let fluid = self.model.buoyancy.as_ref().ok_or_else(missing)?;
+                Ok(if *by == By::CsfLevel { fluid.per_mm_n.clone() } else { fluid.lift_n.clone() })
+            }
+            By::Gap(wall) => {
+                let missing = || FemError::NoParameter { what: format!("wall number {}", wall + 1) };
+                self.model.supports.force_of_gap(*wall, self.u, &self.model.nodes_m).ok_or_else(missing)
             }
             By::AllLoads => {
                 if self.model.prescribed.is_empty() {

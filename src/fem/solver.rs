@@ -18,7 +18,8 @@ pub(super) fn for_model(model: &Model, largest_ratio: f64) -> Box<dyn LinearSolv
     let method = model.scenario.solver.linear;
     let iterative = |blocks| Box::new(Pcg::new(blocks, 20_000 + 10 * model.free_nodes(), None));
     let two_level = || {
-        let rows = Rows { positions: model.positions_of_rows(), held: model.held_components.clone() };
+        let (positions, held) = (model.positions_of_rows(), model.held_components.clone());
+        let rows = Rows { positions, held, change: !model.supports.is_empty() };
         Box::new(Pcg::new(true, 20_000 + 10 * model.free_nodes(), Some(rows)))
     };
     match method {

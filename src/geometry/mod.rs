@@ -8,8 +8,10 @@ mod affine;
 mod frame;
 mod position;
 mod rigid;
+mod smooth_field;
 
 pub use affine::{AffineTransform, SingularAffine};
 pub use frame::{Frame, Mni, Native, Post, Pre};
 pub use position::{Direction, Position};
 pub use rigid::{NotRigid, RigidTransform};
+pub use smooth_field::{FieldPoint, SmoothField};

@@ -1,6 +1,7 @@
 //! Surfaces, tetrahedral meshes, quality, mesh formats, meshing engines.
 
 mod closest_point;
+mod cut;
 pub mod engine;
 mod facets;
 pub mod format;

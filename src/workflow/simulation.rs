@@ -7,7 +7,9 @@ use super::settings::in_words;
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
-use crate::fem::{self, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from};
+use crate::fem::{
+    self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
+};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, ReadError, WriteError, msh, pvd, vtu};
 use serde::{Deserialize, Serialize};
@@ -86,6 +88,9 @@ pub struct Simulation {
     /// Root mean square error against the reference, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_mm: Option<f64>,
+    /// What presses against what.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contact: Vec<ContactOutcome>,
     /// The solver's record.
     pub convergence: ConvergenceRecord,
     /// The record of a motion.
@@ -111,6 +116,9 @@ pub fn simulate(
         name: files.scenario.display().to_string(),
         reason: in_words(&e.to_string()),
     })?;
+    // Cut open along sheets that slide: results are written on the mesh as it was computed.
+    let refused = |source| SimulationError::Fem { names: files.scenario.display().to_string(), source };
+    let mesh = scenario.body(&mesh).map_err(refused)?.into_owned();
     let start = files.start.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
     if start.is_some() && scenario.solver.method == Method::BackwardEuler {
         return Err(SimulationError::StartOfMotion.into());
@@ -203,6 +211,9 @@ fn produced(
     let errors = reference.map(|reference| node_errors_mm(&outcome.displacement_mm, reference));
     let mut points =
         vec![Field::vector("displacement", &outcome.displacement_mm), Field::vector("reaction_n", &outcome.reaction_n)];
+    if !outcome.contact.is_empty() {
+        points.push(Field::scalar("contact_pressure_pa", outcome.contact_pressure_pa));
+    }
     points.extend(errors.iter().map(|e| Field::scalar("rmse_mm", e.clone())));
     let cells = [
         Field::scalar("jacobian", outcome.jacobian),
@@ -232,6 +243,7 @@ fn produced(
         displacement_rms_mm: root_mean_square(&sizes).unwrap_or(0.0),
         reaction_n: [0, 1, 2].map(|i| outcome.reaction_n.iter().map(|r| r[i]).sum()),
         rmse_mm: errors.as_deref().and_then(root_mean_square),
+        contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
         warnings: outcome.warnings.clone(),

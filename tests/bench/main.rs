@@ -5,6 +5,7 @@ mod bytes;
 #[path = "../it/cluster.rs"]
 mod cluster;
 mod cohort;
+mod contact;
 mod experiment;
 mod fem;
 mod heads;
@@ -32,6 +33,7 @@ fn main() {
         ("mesh", mesh::bars),
         ("material", material::bars),
         ("fem", fem::bars),
+        ("contact", contact::bars),
         ("experiment", experiment::bars),
         ("patients", patients::bars),
         ("kills", kills::bars),

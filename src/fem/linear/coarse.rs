@@ -5,7 +5,7 @@
 //! every piece, and Z (Z^T K Z)^-1 Z^T is added to the preconditioner (Nicolaides, "Deflation of conjugate gradients",
 //! SIAM J. Numer. Anal. 24, 1987; rigid motions as in smoothed aggregation, Vanek, Mandel and Brezina, 1996). Z^T K Z is as
 //! sparse as K and factored as sparsely, so that the pieces can grow in number with the rows. K changes little from one Newton
-//! iteration to the next: the factor of the first is kept.
+//! iteration to the next: the factor of the first is kept, but for bodies before walls.
 
 use super::super::reduce::{by_rows, by_tasks};
 use super::super::sparse::{BlockMatrix, BlockPattern};
@@ -25,6 +25,9 @@ pub(in super::super) struct Rows {
     pub positions: Vec<[f64; 3]>,
     /// Components held on rows that are otherwise free.
     pub held: Option<Arc<Vec<[bool; 3]>>>,
+    /// The tangent changes from one iteration to the next by far more than the body's does: a wall pushes or does not. Then
+    /// the correction is made anew for every tangent.
+    pub change: bool,
 }
 
 /// The rows by pieces.

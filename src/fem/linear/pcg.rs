@@ -16,7 +16,7 @@ pub(in super::super) struct Pcg {
     most_iterations: usize,
     /// The rows, where a coarse correction is wanted.
     rows: Option<Rows>,
-    /// The coarse correction, made of the first tangent.
+    /// The coarse correction, made of the first tangent, or of the last where tangents change.
     coarse: Option<Coarse>,
     /// The tangent in single precision.
     single: Option<Packed<f32>>,
@@ -192,7 +192,7 @@ impl Pcg {
 
 impl LinearSolver for Pcg {
     fn prepare(&mut self, tangent: &Tangent) {
-        if let (None, Some(rows)) = (&self.coarse, &self.rows) {
+        if let Some(rows) = self.rows.as_ref().filter(|rows| rows.change || self.coarse.is_none()) {
             self.coarse = Coarse::new(tangent, rows);
         }
         match &mut self.single {

@@ -1,6 +1,8 @@
 //! The solver against closed forms, identities and other people's figures.
 
+mod contact;
 mod cook;
+mod hertz;
 mod inversion;
 mod laws;
 mod loads;

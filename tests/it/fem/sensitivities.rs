@@ -51,7 +51,7 @@ fn all() -> Vec<By> {
     ]
 }
 
-/// The scenario with one parameter multiplied by a factor, gravity with the factor's logarithm added.
+/// The scenario with one parameter multiplied by a factor; to gravity, levels and gaps the factor's logarithm is added.
 fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
     let mut s = scenario.clone();
     match by {
@@ -63,6 +63,10 @@ fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
         By::Load(Load::Patch(n)) => s.loads.patch[*n].force_n = s.loads.patch[*n].force_n.map(|f| f * factor),
         By::Load(Load::Pressure(n)) => s.loads.pressure[*n].pressure_pa *= factor,
         By::Gravity(axis) => s.loads.gravity_m_per_s2[*axis] += factor.ln(),
+        By::TissueDensity => s.loads.density_kg_per_m3 *= factor,
+        By::CsfDensity => s.loads.csf.as_mut().unwrap().density_kg_per_m3 *= factor,
+        By::CsfLevel => s.loads.csf.as_mut().unwrap().level_mm += factor.ln(),
+        By::Gap(wall) => s.contact[*wall].gap_mm += factor.ln(),
         By::AllLoads => {
             for load in [Load::Weight, Load::Patch(0), Load::Pressure(0)] {
                 s = changed(&s, &By::Load(load), factor);
@@ -152,5 +156,34 @@ fn what_the_law_does_not_have_is_refused() {
         By::Load(Load::Patch(1)),
     ] {
         assert!(model.sensitivities(&scenario.materials, &state, &[by]).is_err());
+    }
+}
+
+/// Tissue half out of its fluid, gravity askew.
+#[test]
+fn sensitivities_to_a_fluid_are_the_slopes_of_solutions() {
+    let mesh = two_tissue_cube(3, 60.0);
+    let csf = "csf = { density_kg_per_m3 = 900.0, level_mm = 21.0 }\n[[loads.patch]]";
+    let scenario = Scenario::from_toml(&SCENARIO.replacen("[[loads.patch]]", csf, 1)).unwrap();
+    let model = Model::new(&mesh, &scenario).unwrap();
+    let (outcome, state) = model.solve(&scenario.materials, None, &|_| ()).unwrap();
+    let by = [By::TissueDensity, By::CsfDensity, By::CsfLevel, By::Gravity(0), By::Gravity(2), By::Load(Load::Weight)];
+    let columns = model.sensitivities(&scenario.materials, &state, &by).unwrap();
+    for (by, column) in by.iter().zip(&columns) {
+        let step: f64 = 1e-3;
+        let at = |step: f64| {
+            let s = changed(&scenario, by, step.exp());
+            let model = Model::new(&mesh, &s).unwrap();
+            let start = model.state(&outcome.displacement_mm).unwrap();
+            model.solve(&s.materials, Some(&start), &|_| ()).unwrap().0.displacement_mm
+        };
+        let [above, below] = [at(step), at(-step)];
+        let scale = column.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for (n, slope) in column.iter().enumerate() {
+            for i in 0..3 {
+                let difference = (above[n][i] - below[n][i]) / (2.0 * step);
+                assert!((difference - slope[i]).abs() < 1e-5 * scale, "{by:?}: {difference} {}", slope[i]);
+            }
+        }
     }
 }

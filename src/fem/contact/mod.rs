@@ -1,0 +1,345 @@
+//! Walls that push without friction, and springs: what a body leans on besides the nodes that are held.
+//!
+//! Every node of a surface before a wall stands for the area around it, and stores A phi(g) where g is the gap between the
+//! node and the wall and phi a smooth potential. Its force A phi'(g) grad g points along the wall's normal, so nothing
+//! holds back what slides; its stiffness A (phi'' grad g (x) grad g + phi' hess g) is one block of the diagonal. Both are
+//! continuous, so that Newton's method, its line search, the time steps and the sensitivities treat a wall like any
+//! elastic part of the body. On flat facets under even pressure the lumped forces are the consistent ones.
+
+mod potential;
+mod settings;
+mod sheet;
+
+pub use settings::{Contact, Support, Tether, Wall};
+pub(super) use sheet::{all_contacts, body_of};
+
+use super::FemError;
+use super::linear::Tangent;
+use super::load::{Sharing, area_m2, facets_of};
+use super::scenario::Scenario;
+use super::sparse::HELD;
+use super::units::{METRES_PER_MM, metres, millimetres};
+use crate::geometry::SmoothField;
+use nalgebra::{Matrix3, Vector3};
+use potential::Potential;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What a surface does at its wall.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactOutcome {
+    /// The set that stands before the wall.
+    pub set: String,
+    /// Area of the nodes that are pressed, mm2.
+    pub area_mm2: f64,
+    /// Force of the wall on the body, N.
+    pub force_n: [f64; 3],
+    /// How deep the deepest node is beyond the wall, mm.
+    pub depth_mm: f64,
+}
+
+/// What a node stands before.
+#[derive(Clone, Copy, Debug)]
+enum Before {
+    /// A plane with this normal towards the free side.
+    Plane(Vector3<f64>),
+    /// The field of the wall.
+    Field,
+}
+
+/// One node before one wall.
+#[derive(Clone, Copy, Debug)]
+struct Standing {
+    /// Solver numbering.
+    node: u32,
+    row: u32,
+    wall: u32,
+    before: Before,
+    area_m2: f64,
+    /// What the gap is more than the field, or than the way along the normal, m.
+    room_m: f64,
+    /// The room follows the wall's gap.
+    follows_gap: bool,
+}
+
+/// One node on a spring.
+#[derive(Clone, Copy, Debug)]
+struct Tethered {
+    node: u32,
+    row: u32,
+    /// N/m.
+    stiffness: f64,
+    /// Only along this normal.
+    along: Option<Vector3<f64>>,
+}
+
+struct Barrier {
+    set: String,
+    potential: Potential,
+    field: Option<Arc<SmoothField>>,
+}
+
+/// All walls and springs of a model.
+pub(super) struct Supports {
+    standing: Vec<Standing>,
+    tethered: Vec<Tethered>,
+    walls: Vec<Barrier>,
+}
+
+/// Gap (m), its gradient, its second derivatives (1/m).
+type Gap = (f64, Vector3<f64>, Matrix3<f64>);
+
+/// Where supports find the nodes: positions in solver numbering, and numbers by the mesh's.
+pub(super) struct Numbering<'a> {
+    pub number: &'a [u32],
+    pub row_of: &'a [u32],
+    pub nodes_m: &'a [[f64; 3]],
+}
+
+impl Supports {
+    /// The scenario's walls and springs on its mesh (cut open, as [`body_of`] leaves it).
+    pub(super) fn new(sharing: &Sharing, scenario: &Scenario, at: &Numbering) -> Result<Self, FemError> {
+        let mut supports = Self { standing: Vec::new(), tethered: Vec::new(), walls: Vec::new() };
+        for contact in all_contacts(scenario) {
+            supports.add_wall(sharing, &contact, at)?;
+        }
+        for tether in &scenario.tethers {
+            for (node, area, normal) in surface_nodes(sharing, &tether.set)? {
+                let node = at.number[node as usize];
+                let stiffness = tether.stiffness_pa_per_mm / METRES_PER_MM * area;
+                let along = tether.only_normal.then_some(normal);
+                let row = at.row_of[node as usize];
+                if row != HELD {
+                    supports.tethered.push(Tethered { node, row, stiffness, along });
+                }
+            }
+        }
+        Ok(supports)
+    }
+
+    fn add_wall(&mut self, sharing: &Sharing, contact: &Contact, at: &Numbering) -> Result<(), FemError> {
+        let wall = self.walls.len() as u32;
+        let potential = Potential {
+            stiffness: contact.stiffness_pa_per_mm / METRES_PER_MM,
+            softness_m: contact.softness_mm * METRES_PER_MM,
+        };
+        let (gap, least) = (contact.gap_mm * METRES_PER_MM, 0.5 * potential.softness_m);
+        let field = match &contact.wall {
+            Wall::Field { name, distance_mm: None, .. } => {
+                return Err(FemError::NoField { set: contact.set.clone(), name: name.clone() });
+            }
+            Wall::Field { distance_mm, .. } => distance_mm.clone(),
+            _ => None,
+        };
+        for (node, area_m2, normal) in surface_nodes(sharing, &contact.set)? {
+            let node = at.number[node as usize];
+            let row = at.row_of[node as usize];
+            // The two sides of a sheet meet at its edge, which stays free.
+            let edge = matches!(contact.wall, Wall::OwnSurface | Wall::Sheet) && normal == Vector3::zeros();
+            if row == HELD || edge {
+                continue;
+            }
+            let x = at.nodes_m[node as usize];
+            let (before, room_m, follows_gap) = match &contact.wall {
+                Wall::Plane { point_mm, normal } => {
+                    let n = Vector3::from(*normal).normalize();
+                    let room = n.dot(&(Vector3::from(x) - Vector3::from(metres(*point_mm))));
+                    (Before::Plane(n), room, true)
+                }
+                Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), gap.max(least), gap > least),
+                Wall::Field { even, .. } => {
+                    let seen = field.as_ref().map_or(0.0, |f| f.at(millimetres(x)).value) * METRES_PER_MM;
+                    let room = if *even { gap } else { seen + gap };
+                    (Before::Field, room.max(least) - seen, room > least)
+                }
+            };
+            self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap });
+        }
+        self.walls.push(Barrier { set: contact.set.clone(), potential, field });
+        Ok(())
+    }
+
+    /// No walls and no springs.
+    pub(super) fn is_empty(&self) -> bool {
+        self.standing.is_empty() && self.tethered.is_empty()
+    }
+
+    fn gap(&self, s: &Standing, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Gap {
+        let moved = Vector3::from(u[s.node as usize]);
+        match s.before {
+            Before::Plane(n) => (s.room_m + n.dot(&moved), n, Matrix3::zeros()),
+            Before::Field => {
+                let place = Vector3::from(nodes_m[s.node as usize]) + moved;
+                let at = self.walls[s.wall as usize].field.as_ref().map(|f| f.at(millimetres(place.into())));
+                let at = at.unwrap_or_default();
+                let bend = Matrix3::from_fn(|r, c| at.hessian[r][c] / METRES_PER_MM);
+                (s.room_m + at.value * METRES_PER_MM, at.gradient.into(), bend)
+            }
+        }
+    }
+
+    /// `f` of every node before a wall with its gap, in order.
+    fn each<T: Send>(
+        &self,
+        u: &[[f64; 3]],
+        nodes_m: &[[f64; 3]],
+        f: impl Fn(&Standing, &Potential, Gap) -> T + Sync,
+    ) -> Vec<T> {
+        let one = |s: &Standing| f(s, &self.walls[s.wall as usize].potential, self.gap(s, u, nodes_m));
+        self.standing.par_iter().with_min_len(256).map(one).collect()
+    }
+
+    /// Stored energy, J.
+    pub(super) fn energy(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> f64 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        let parts = self.each(u, nodes_m, |s, potential, (gap, ..)| s.area_m2 * potential.at(gap)[0]);
+        let springs = self.tethered.iter().map(|t| {
+            let u = Vector3::from(u[t.node as usize]);
+            let square = t.along.map_or_else(|| u.norm_squared(), |n| u.dot(&n).powi(2));
+            0.5 * t.stiffness * square
+        });
+        parts.iter().sum::<f64>() + springs.sum::<f64>()
+    }
+
+    /// Adds the derivative of the energy to the internal forces of the nodes, N.
+    pub(super) fn add_forces(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]], forces: &mut [[f64; 3]]) {
+        if self.is_empty() {
+            return;
+        }
+        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, _)| -s.area_m2 * potential.at(gap)[1] * normal);
+        for (s, part) in self.standing.iter().zip(parts) {
+            (0..3).for_each(|i| forces[s.node as usize][i] += part[i]);
+        }
+        for t in &self.tethered {
+            let u = Vector3::from(u[t.node as usize]);
+            let part = t.stiffness * t.along.map_or(u, |n| n * u.dot(&n));
+            (0..3).for_each(|i| forces[t.node as usize][i] += part[i]);
+        }
+    }
+
+    /// Adds the stiffness to the blocks of the diagonal; `project` makes every block positive semi-definite. Held
+    /// components of free rows stay alone.
+    pub(super) fn add_stiffness(
+        &self,
+        u: &[[f64; 3]],
+        nodes_m: &[[f64; 3]],
+        held: Option<&[[bool; 3]]>,
+        project: bool,
+        tangent: &mut Tangent,
+    ) {
+        if self.is_empty() {
+            return;
+        }
+        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, bend)| {
+            let [_, pressure, stiffness] = potential.at(gap);
+            if pressure == 0.0 {
+                return Matrix3::zeros();
+            }
+            let mut curved = -pressure * bend;
+            if project {
+                let mut eigen = curved.symmetric_eigen();
+                eigen.eigenvalues.iter_mut().for_each(|v| *v = v.max(0.0));
+                curved = eigen.recompose();
+            }
+            s.area_m2 * (stiffness * normal * normal.transpose() + curved)
+        });
+        let matrix = &mut tangent.matrix;
+        let mut add = |row: u32, block: Matrix3<f64>| {
+            let held = held.map_or([false; 3], |h| h[row as usize]);
+            let target = &mut matrix.blocks[matrix.pattern.diagonal[row as usize] as usize];
+            for c in (0..3).filter(|&c| !held[c]) {
+                for r in (0..3).filter(|&r| !held[r]) {
+                    target[3 * c + r] += block[(r, c)];
+                }
+            }
+        };
+        for (s, part) in self.standing.iter().zip(parts) {
+            add(s.row, part);
+        }
+        for t in &self.tethered {
+            let along = t.along.map_or_else(Matrix3::identity, |n| n * n.transpose());
+            add(t.row, t.stiffness * along);
+        }
+    }
+
+    /// What drives the body when the wall of this number moves away from it: -dR per mm, N.
+    pub(super) fn force_of_gap(&self, wall: usize, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+        if wall >= self.walls.len() {
+            return None;
+        }
+        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, _)| {
+            let moves = s.wall as usize == wall && s.follows_gap;
+            if moves { -s.area_m2 * potential.at(gap)[2] * METRES_PER_MM * normal } else { Vector3::zeros() }
+        });
+        let mut forces = vec![[0.0; 3]; u.len()];
+        for (s, part) in self.standing.iter().zip(parts) {
+            (0..3).for_each(|i| forces[s.node as usize][i] += part[i]);
+        }
+        Some(forces)
+    }
+
+    /// What every wall does, and the pressure on every node, Pa, in solver numbering.
+    pub(super) fn outcome(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> (Vec<ContactOutcome>, Vec<f64>) {
+        if self.walls.is_empty() {
+            return (Vec::new(), Vec::new());
+        }
+        let parts = self.each(u, nodes_m, |_, potential, (gap, normal, _)| (gap, potential.at(gap)[1], normal));
+        let mut walls: Vec<ContactOutcome> =
+            self.walls.iter().map(|w| ContactOutcome { set: w.set.clone(), ..Default::default() }).collect();
+        let mut pressure_pa = vec![0.0; u.len()];
+        for (s, (gap, pressure, normal)) in self.standing.iter().zip(parts) {
+            let wall = &mut walls[s.wall as usize];
+            wall.depth_mm = wall.depth_mm.max(-gap / METRES_PER_MM);
+            pressure_pa[s.node as usize] += pressure;
+            if pressure > 0.0 {
+                wall.area_mm2 += s.area_m2 / METRES_PER_MM.powi(2);
+                (0..3).for_each(|i| wall.force_n[i] += s.area_m2 * pressure * normal[i]);
+            }
+        }
+        (walls, pressure_pa)
+    }
+}
+
+/// Nodes on springs that leave no direction free, in the mesh's numbering.
+pub(super) fn tethered_nodes(sharing: &Sharing, scenario: &Scenario) -> Result<Vec<u32>, FemError> {
+    let mut nodes = Vec::new();
+    for tether in scenario.tethers.iter().filter(|t| !t.only_normal && t.stiffness_pa_per_mm > 0.0) {
+        nodes.extend(surface_nodes(sharing, &tether.set)?.into_iter().map(|(n, ..)| n));
+    }
+    Ok(nodes)
+}
+
+/// Nodes of a surface with their area (m2) and mean outward normal, ascending; where a surface turns back on itself the
+/// normal is shorter than one.
+fn surface_nodes(sharing: &Sharing, set: &str) -> Result<Vec<(u32, f64, Vector3<f64>)>, FemError> {
+    let mut nodes: BTreeMap<u32, (f64, Vector3<f64>)> = BTreeMap::new();
+    for facet in surface_of(sharing, set)? {
+        let area = Vector3::from(area_m2(sharing.mesh, facet)) / 3.0;
+        for n in sharing.of_facet(facet) {
+            let sum = nodes.entry(n).or_default();
+            sum.0 += area.norm();
+            sum.1 += area;
+        }
+    }
+    let unit = |(n, (area, sum)): (u32, (f64, Vector3<f64>))| {
+        let length = sum.norm();
+        // Ridges and furrows keep a direction as long as their facets do not cancel.
+        let normal = if length > 0.1 * area { sum / length } else { Vector3::zeros() };
+        (n, area, normal)
+    };
+    Ok(nodes.into_iter().map(unit).collect())
+}
+
+/// The facets of a set, or of the whole boundary where `surface` is no set of the mesh.
+fn surface_of(sharing: &Sharing, set: &str) -> Result<Vec<[u32; 3]>, FemError> {
+    let mesh = sharing.mesh;
+    let named = mesh.facet_sets.contains_key(set) || mesh.node_sets.contains_key(set);
+    if set == WHOLE_SURFACE && !named { Ok(mesh.boundary_facets(|_| true)) } else { facets_of(mesh, set) }
+}
+
+/// The whole boundary, where the mesh has no set of this name.
+const WHOLE_SURFACE: &str = "surface";
