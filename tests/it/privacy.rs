@@ -1,7 +1,6 @@
 //! What a scan's file says of the patient besides the voxels goes nowhere.
 
-use crate::bids::COARSE;
-use crate::job::{contents, output, sample};
+use crate::job::{COARSE, contents, output, sample};
 use base64::Engine;
 use std::io::{Read, Write};
 
