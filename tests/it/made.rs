@@ -57,7 +57,7 @@ pub fn copy(from: &Path, to: &Path) {
 
 /// The sample pair after `hgm run` on two threads, undisturbed.
 pub fn finished_pair() -> PathBuf {
-    made("pair", |folder| {
+    made("finished-pair", |folder| {
         let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|scan| sample(scan).display().to_string());
         let case = folder.join("case").display().to_string();
         must(&output(&[&["run", "-q", &pre, &post, "-o", &case, "--threads", "2"], &COARSE[..]].concat()));
@@ -67,7 +67,7 @@ pub fn finished_pair() -> PathBuf {
 
 /// A copy of the sample pair after `hgm prep`, in `case`. Its images are those of [`finished_pair`].
 pub fn prepared_pair(case: &Path) {
-    let prepared = made("prepared", |folder| {
+    let prepared = made("prepared-pair", |folder| {
         let done = folder.join("case");
         for part in ["anat", "xfm"] {
             copy(&finished_pair().join(part), &done.join(part));
