@@ -1,8 +1,13 @@
 //! `hgm schema`: what `--json` prints, as a JSON Schema.
 
 use super::{Failure, Session};
+use crate::experiment::outcome::ExperimentOutcome;
+use crate::report::cohort::Cohort;
+use schemars::generate::SchemaSettings;
+use serde_json::Value;
 
-const SCHEMA: &str = include_str!("schema.json");
+/// The commands, and the documents that no type of the library describes.
+const COMMANDS: &str = include_str!("schema.json");
 
 /// Print the JSON Schema of what every command prints with --json
 ///
@@ -11,5 +16,40 @@ const SCHEMA: &str = include_str!("schema.json");
 pub struct Args {}
 
 pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
-    session.emit(&serde_json::from_str::<serde_json::Value>(SCHEMA)?, SCHEMA)
+    let schema = schema()?;
+    session.emit(&schema, &format!("{schema:#}\n"))
+}
+
+/// The commands' documents with the results' own types among the definitions.
+fn schema() -> serde_json::Result<Value> {
+    let mut generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    generator.subschema_for::<ExperimentOutcome>();
+    generator.subschema_for::<Cohort>();
+    let mut schema: Value = serde_json::from_str(COMMANDS)?;
+    for (name, mut definition) in generator.take_definitions(true) {
+        if name == "MeshOutcome" {
+            // `hgm mesh` prints more beside it, and says itself that there is nothing else.
+            definition.as_object_mut().and_then(|mesh| mesh.remove("additionalProperties"));
+        }
+        schema["$defs"][name] = definition;
+    }
+    Ok(schema)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_reference_leads_to_a_definition_and_units_are_told() {
+        let schema = schema().unwrap();
+        let text = schema.to_string();
+        let names: Vec<&str> = text.split("#/$defs/").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        assert!(names.len() > 10);
+        for name in names {
+            assert!(schema["$defs"].get(name).is_some(), "{name}");
+        }
+        let rmse = &schema["$defs"]["SampleOutcome"]["properties"]["rmse_mm"];
+        assert!(rmse["description"].as_str().unwrap().contains("mm"), "{rmse}");
+    }
 }

@@ -17,7 +17,7 @@ pub enum Search {
     #[default]
     Exact,
     /// As the published program: its bounds and starts, its tolerances, and its neo-Hookean Jacobian, which lacks the
-    /// derivative of mu and leaves mu up to 3 % low.
+    /// derivative of mu and leaves mu too low.
     Published,
 }
 
