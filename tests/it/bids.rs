@@ -1,10 +1,13 @@
 //! `hgm bids`: a data set in, valid derivatives and one table out.
 
-use crate::job::{COARSE, contents, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
 use crate::made::{prepared_pair, prepared_patient, synthetic_patient};
 use crate::python::tool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// A mesh that makes a subject cheap.
+pub const COARSE: [&str; 4] = ["--mesher", "lattice", "--cells", "3000"];
 
 /// A data set of two patients: the sample pair and a synthetic one.
 pub fn data_set(folder: &Path) -> PathBuf {
@@ -46,7 +49,7 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     // Both go on from `hgm prep`; the cohort's test takes a subject from nothing.
     prepared_pair(&out.join("sub-01/hgm"));
     prepared_patient(&out.join("sub-02/hgm"));
-    let run = bids(&[&["participant"], &COARSE[..]].concat());
+    let run = bids(&[&["participant"], &CHEAP[..]].concat());
     let said = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(3), "{said}");
     assert!(said.contains("1 of 3 subjects did not end well: sub-00"), "{said}");
@@ -55,7 +58,7 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     assert!(table.status.success(), "{}", String::from_utf8_lossy(&table.stderr));
 
     // What is there is not computed again, and comes out the same.
-    let again = bids(&[&["participant", "--participant-label", "sub-01", "02"], &COARSE[..]].concat());
+    let again = bids(&[&["participant", "--participant-label", "sub-01", "02"], &CHEAP[..]].concat());
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
     let second = contents(&out);
     assert!(first.iter().all(|(name, bytes)| second.get(name) == Some(bytes)));

@@ -2,7 +2,7 @@
 
 use crate::bids::data_set;
 use crate::cluster::{OneNodeSlurm, printed, snakemake};
-use crate::job::{COARSE, contents, output, program};
+use crate::job::{CHEAP, contents, output, program};
 use crate::made::{prepared_pair, prepared_patient};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn slow_a_cohort_has_the_same_files_by_one_command_by_snakemake_and_on_slurm_wit
     let raw = data_set(folder.path());
     // A subject whose second scan is missing holds nobody up.
     std::fs::create_dir_all(raw.join("sub-00/ses-preop/anat")).unwrap();
-    let settings = PathBuf::from(COARSE[1]);
+    let settings = PathBuf::from(CHEAP[1]);
     let outs: [PathBuf; 3] = ["command", "local", "slurm"].map(|name| folder.path().join(name).join("out"));
     let bids = |level: &str| {
         let [config, raw, out] = [&settings, &raw, &outs[0]].map(|path| path.to_str().unwrap());

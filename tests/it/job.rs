@@ -24,7 +24,7 @@ pub fn output(arguments: &[&str]) -> Output {
 }
 
 /// Settings that make a case cheap, for tests that are not about accuracy.
-pub const COARSE: [&str; 2] = ["--config", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/coarse.toml")];
+pub const CHEAP: [&str; 2] = ["--config", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cheap.toml")];
 
 /// Every file below a folder by its relative name.
 pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -48,7 +48,7 @@ fn start(case: &Path, threads: &str) -> Child {
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let mut command = hgm();
     command.args(["run", pre.to_str().unwrap(), post.to_str().unwrap(), "-o", case.to_str().unwrap()]);
-    command.args(COARSE).args(["--threads", threads]);
+    command.args(CHEAP).args(["--threads", threads]);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
@@ -91,7 +91,7 @@ fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threa
 /// Nothing would run again with the same options; a changed setting, file and scan are each named, and what follows too.
 fn asks_why(case: &Path) {
     let why = |rest: &[&str]| -> BTreeMap<String, Vec<String>> {
-        let ended = output(&[&["why", case.to_str().unwrap(), "--json"], &COARSE[..], rest].concat());
+        let ended = output(&[&["why", case.to_str().unwrap(), "--json"], &CHEAP[..], rest].concat());
         let said: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
         let stages = said["stages"].as_array().unwrap().iter().filter(|stage| stage["would_run"] == true);
         let reasons = |stage: &serde_json::Value| {

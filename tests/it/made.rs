@@ -1,7 +1,7 @@
 //! Cases that several tests start from: made once per program under test, kept below `target/tmp`, copied by each test.
 //! Each is what the program itself writes; a test that is about making a case makes its own.
 
-use crate::job::{COARSE, contents, output, program, sample};
+use crate::job::{CHEAP, contents, output, program, sample};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::process::Output;
 fn made(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
     let mut sum = Sha256::new();
     sum.update(std::fs::read(program()).unwrap());
-    sum.update(std::fs::read(COARSE[1]).unwrap());
+    sum.update(std::fs::read(CHEAP[1]).unwrap());
     let key: String = sum.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
     let all = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made");
     std::fs::create_dir_all(&all).unwrap();
@@ -43,7 +43,7 @@ fn must(ended: &Output) {
 
 fn prep(scans: &[PathBuf; 2], case: &Path) {
     let [pre, post] = scans.each_ref().map(|path| path.to_str().unwrap());
-    must(&output(&[&["prep", "-q", pre, post, "-o", case.to_str().unwrap()], &COARSE[..]].concat()));
+    must(&output(&[&["prep", "-q", pre, post, "-o", case.to_str().unwrap()], &CHEAP[..]].concat()));
 }
 
 /// Copies a folder with everything in it.
@@ -60,7 +60,7 @@ pub fn finished_pair() -> PathBuf {
     made("finished-pair", |folder| {
         let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|scan| sample(scan).display().to_string());
         let case = folder.join("case").display().to_string();
-        must(&output(&[&["run", "-q", &pre, &post, "-o", &case, "--threads", "2"], &COARSE[..]].concat()));
+        must(&output(&[&["run", "-q", &pre, &post, "-o", &case, "--threads", "2"], &CHEAP[..]].concat()));
     })
     .join("case")
 }

@@ -1,6 +1,6 @@
 //! `hgm prep --no-mesh` and a user's own ventricles: what stands in the case folder.
 
-use crate::job::{COARSE, contents, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
 use hgm::geometry::{Frame, Position, Post, Pre, RigidTransform};
 use hgm::image::nifti::{ReadOptions, decode, decode_labels, decode_mask, encode_mask};
 use hgm::image::{Grid, Mask};
@@ -37,7 +37,7 @@ fn prep(case: &Path, ventricles: &Path) {
     let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|name| sample(name).to_str().unwrap().to_owned());
     let [case, mask] = [case, ventricles].map(|path| path.to_str().unwrap());
     let words = ["prep", "-q", "--no-mesh", &pre, &post, "--ventricle-mask", mask, "-o", case];
-    let made = output(&[&words[..], &COARSE[..]].concat());
+    let made = output(&[&words[..], &CHEAP[..]].concat());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
 }
 
