@@ -50,7 +50,7 @@ impl Viewer {
             p { "Drag to turn, scroll to come nearer; or use the buttons, or the arrow keys with the picture in focus." }
             div class="controls" role="group" aria-label="Surface" {
                 @for (n, s) in self.surfaces.iter().enumerate() {
-                    button type="button" data-surface=(n) aria-pressed=(n == self.first()) { (s.name) }
+                    button type="button" data-surface=(n) aria-pressed=(if n == self.first() { "true" } else { "false" }) { (s.name) }
                 }
             }
             div class="controls" role="group" aria-label="Side" {
