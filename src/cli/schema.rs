@@ -1,11 +1,14 @@
 //! `hgm schema`: what `--json` prints, as a JSON Schema.
 
 use super::{Failure, Session};
-use crate::material::law::LAWS;
+use crate::experiment::outcome::ExperimentOutcome;
 use crate::material::meta_model::MetaModel;
-use crate::mesh::engine::Engine;
+use crate::report::cohort::Cohort;
+use schemars::generate::SchemaSettings;
+use serde_json::Value;
 
-const SCHEMA: &str = include_str!("schema.json");
+/// The commands, and the documents that no type of the library describes.
+const COMMANDS: &str = include_str!("schema.json");
 
 /// Print the JSON Schema of what every command prints with --json
 ///
@@ -14,21 +17,30 @@ const SCHEMA: &str = include_str!("schema.json");
 pub struct Args {}
 
 pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
-    let schema = schema();
-    session.emit(&serde_json::from_str::<serde_json::Value>(&schema)?, &schema)
+    let schema = schema()?;
+    session.emit(&schema, &format!("{schema:#}\n"))
 }
 
-/// The schema with the names of what stands in lists: laws, meta-models, engines.
-fn schema() -> String {
-    let laws: Vec<&str> = LAWS.iter().map(|law| law.card().name).collect();
-    let engines: Vec<&str> = Engine::all().map(Engine::name).collect();
-    [("laws", laws), ("meta-models", MetaModel::names()), ("engines", engines)].into_iter().fold(
-        SCHEMA.to_owned(),
-        |schema, (what, names)| {
-            let names = names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
-            schema.replace(&format!("\"names of {what}\""), &names)
-        },
-    )
+/// The commands' documents with the results' own types among the definitions.
+fn schema() -> serde_json::Result<Value> {
+    let mut generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    generator.subschema_for::<ExperimentOutcome>();
+    generator.subschema_for::<Cohort>();
+    let mut schema: Value = serde_json::from_str(&with_names(COMMANDS))?;
+    for (name, mut definition) in generator.take_definitions(true) {
+        if name == "MeshOutcome" {
+            // `hgm mesh` prints more beside it, and says itself that there is nothing else.
+            definition.as_object_mut().and_then(|mesh| mesh.remove("additionalProperties"));
+        }
+        schema["$defs"][name] = definition;
+    }
+    Ok(schema)
+}
+
+/// The text with the names of the meta-models where it asks for them.
+fn with_names(text: &str) -> String {
+    let names: Vec<String> = MetaModel::names().iter().map(|name| format!("\"{name}\"")).collect();
+    text.replace("\"names of meta-models\"", &names.join(", "))
 }
 
 #[cfg(test)]
@@ -36,13 +48,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_list_of_names_is_filled_in() {
-        let schema = schema();
-        assert!(!schema.contains("names of "));
-        let schema: serde_json::Value = serde_json::from_str(&schema).unwrap();
-        let named = |place: &str| schema.pointer(place).unwrap()["enum"].as_array().unwrap().len();
-        assert_eq!(named("/$defs/law/properties/law"), LAWS.len());
-        assert_eq!(named("/$defs/fit/properties/model"), MetaModel::names().len());
-        assert_eq!(named("/$defs/mesh/properties/engine"), Engine::all().count());
+    fn every_reference_leads_to_a_definition_and_units_are_told() {
+        let schema = schema().unwrap();
+        let text = schema.to_string();
+        let names: Vec<&str> = text.split("#/$defs/").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        assert!(names.len() > 10);
+        for name in names {
+            assert!(schema["$defs"].get(name).is_some(), "{name}");
+        }
+        let rmse = &schema["$defs"]["SampleOutcome"]["properties"]["rmse_mm"];
+        assert!(rmse["description"].as_str().unwrap().contains("mm"), "{rmse}");
     }
 }

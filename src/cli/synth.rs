@@ -100,7 +100,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     })?;
     let figure = |name: &str| outcome.manifest.facts[name].as_f64().unwrap_or(f64::NAN);
     let text = format!(
-        "{}: {} lobe, resected {:.1} cc, cavity {:.1} cc, sag up to {:.1} mm, head turned by {:.1} degrees between the scans",
+        "{}: {} lobe, resected {:.1} cc, cavity {:.1} cc, brain shift up to {:.1} mm, head turned by {:.1} degrees between the scans",
         args.output.display(),
         settings.side,
         figure("resected_cc"),

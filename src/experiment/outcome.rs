@@ -6,12 +6,13 @@
 pub use super::law_outcome::LawOutcome;
 
 use super::estimate::EstimateOutcome;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Which experiment was run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExperimentKind {
     /// A reference simulated with known moduli, looked for again among the samples.
@@ -22,7 +23,7 @@ pub enum ExperimentKind {
 }
 
 /// One experiment: settings' worth of samples against one reference.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentOutcome {
     /// Which experiment.
@@ -71,7 +72,7 @@ pub struct ExperimentOutcome {
 }
 
 /// One simulation of a sweep.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleOutcome {
     /// Name of the sample, part of its file's name: `sample-05`.
@@ -111,7 +112,7 @@ pub struct SampleOutcome {
 }
 
 /// Errors of the measurement itself, mm, each where it is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseFloor {
     /// Expected error of the rigid registration over the brain.
@@ -135,7 +136,7 @@ impl NoiseFloor {
 }
 
 /// What the images show of a resection: volumes in cubic centimetres, and the midline.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResectionVolumes {
     /// The cavity on the post-operative image.
@@ -159,7 +160,7 @@ pub struct ResectionVolumes {
 }
 
 /// One boundary set of the mesh.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SetOutcome {
     /// Name: `ventricle`, `margin`, `base`, `falx`, `superior`.
@@ -175,7 +176,7 @@ pub struct SetOutcome {
 }
 
 /// One rigid registration.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegistrationOutcome {
     /// Frame of the moving image: `post`.
@@ -197,7 +198,7 @@ pub struct RegistrationOutcome {
 }
 
 /// A mesh in numbers.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshOutcome {
     /// The meshing engine: `lattice`, `cgal`, `gmsh`, `tetgen`.

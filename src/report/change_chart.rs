@@ -1,4 +1,4 @@
-//! What deformation does to an error, subject by subject: at rest on the left, deformed on the right, a line between.
+//! What deformation does to an error, subject by subject: undeformed on the left, deformed on the right, a line between.
 
 use super::chart::{Axis, SERIES_COLOURS, open};
 use super::html::{escape, number};
@@ -31,7 +31,7 @@ pub struct ChangePanel {
     pub name: String,
     /// The subjects.
     pub changes: Vec<Change>,
-    /// Their middle at rest and deformed.
+    /// Their middle undeformed and deformed.
     pub middle: [Middle; 2],
 }
 
@@ -92,7 +92,7 @@ impl ChangeChart {
             let _ = write!(
                 svg,
                 "<path d=\"M{LEFT} {y:.1}H{0:.1}\" stroke=\"currentColor\" stroke-dasharray=\"6 4\" opacity=\".65\"/>\
-                 <text x=\"{1:.1}\" y=\"{2:.1}\" text-anchor=\"middle\" fill=\"currentColor\">measurement error</text>",
+                 <text x=\"{1:.1}\" y=\"{2:.1}\" text-anchor=\"middle\" fill=\"currentColor\">noise floor</text>",
                 width - 18.0,
                 f64::midpoint(LEFT, width - 18.0),
                 if BOTTOM - y > 20.0 { y + 14.0 } else { y - 5.0 }

@@ -4,12 +4,13 @@ use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::resection::improvement;
 use crate::experiment::rmse::median_and_mad;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How a subject of a cohort ended.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Every stage ran within its checks.
@@ -38,7 +39,7 @@ pub struct Member {
 }
 
 /// A line of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Row {
     /// `sub-01`.
     pub participant_id: String,
@@ -61,7 +62,7 @@ pub struct Row {
 }
 
 /// The table of a cohort.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Cohort {
     /// `hgm x.y.z`.
     pub program: String,

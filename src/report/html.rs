@@ -1,4 +1,5 @@
-//! Text that is safe inside HTML, SVG and inline scripts.
+//! Numbers and pictures for a page, and text that is safe where the page's templates (maud, which escapes by itself) do not
+//! reach: inside the SVG of our charts and in inline scripts.
 
 /// Text for element content and quoted attributes.
 ///
@@ -20,6 +21,12 @@ pub fn escape(text: &str) -> String {
         }
     }
     safe
+}
+
+/// A page without control characters, which HTML does not allow, whatever a header or a warning brought along.
+pub fn without_control_characters(page: String) -> String {
+    let unwanted = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if page.contains(unwanted) { page.replace(unwanted, "\u{fffd}") } else { page }
 }
 
 /// JSON for a `<script type="application/json">`: `<`, `>`, `&` as escapes, so that neither `</script` nor `<!--`
@@ -92,7 +99,9 @@ mod tests {
 
     #[test]
     fn control_characters_never_pass() {
-        assert_eq!(escape("a\u{0}b\u{1b}c\nd"), "a\u{fffd}b\u{fffd}c\nd");
+        for pass in [escape as fn(&str) -> String, |text| without_control_characters(text.to_owned())] {
+            assert_eq!(pass("a\u{0}b\u{1b}c\nd"), "a\u{fffd}b\u{fffd}c\nd");
+        }
     }
 
     #[test]

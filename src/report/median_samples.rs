@@ -3,11 +3,12 @@
 use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::rmse::median_and_mad;
 use crate::experiment::sweep::best_sample;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// A sample of the sweep over the subjects.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MedianSample {
     /// Name of the sample: `sample-05`.
     pub id: String,

@@ -2,10 +2,10 @@
 
 use super::chart;
 use super::colour::{ColourScale, NO_VALUE};
-use super::html::{escape, script_json};
+use super::html::script_json;
 use crate::mesh::TriMesh;
 use base64::Engine;
-use std::fmt::Write;
+use maud::{Markup, PreEscaped, html};
 
 /// niivue 0.69.0 (BSD 2-Clause), the published bundle, compressed; see `assets/PROVENANCE.md`.
 const NIIVUE: &[u8] = include_bytes!("assets/niivue-0.69.0.umd.js.gz");
@@ -37,53 +37,44 @@ pub struct Viewer {
 
 impl Viewer {
     /// The section's content; everything it needs beside the scripts.
-    pub(super) fn section(&self) -> String {
-        let mut html = String::from(
-            "<p>Drag to turn, scroll to come nearer; or use the buttons, or the arrow keys with the picture in \
-             focus.</p><div class=\"controls\" role=\"group\" aria-label=\"Surface\">",
-        );
-        for (n, s) in self.surfaces.iter().enumerate() {
-            let shown = n == self.first();
-            let name = escape(&s.name);
-            let _ =
-                write!(html, "<button type=\"button\" data-surface=\"{n}\" aria-pressed=\"{shown}\">{name}</button>");
-        }
-        html.push_str("</div><div class=\"controls\" role=\"group\" aria-label=\"Side\">");
-        for (side, azimuth, elevation) in [
+    pub(super) fn section(&self) -> Markup {
+        let sides = [
             ("left", 270, 0),
             ("right", 90, 0),
             ("anterior", 180, 0),
             ("posterior", 0, 0),
             ("superior", 0, 90),
             ("inferior", 180, -90),
-        ] {
-            let _ = write!(
-                html,
-                "<button type=\"button\" data-azimuth=\"{azimuth}\" data-elevation=\"{elevation}\">{side}</button>"
-            );
+        ];
+        html! {
+            p { "Drag to turn, scroll to come nearer; or use the buttons, or the arrow keys with the picture in focus." }
+            div class="controls" role="group" aria-label="Surface" {
+                @for (n, s) in self.surfaces.iter().enumerate() {
+                    button type="button" data-surface=(n) aria-pressed=(if n == self.first() { "true" } else { "false" }) { (s.name) }
+                }
+            }
+            div class="controls" role="group" aria-label="Side" {
+                @for (side, azimuth, elevation) in sides {
+                    button type="button" data-azimuth=(azimuth) data-elevation=(elevation) { (side) }
+                }
+            }
+            div class="stage" id="stage" {
+                p class="message" id="stage-message" {
+                    "The 3-D view needs JavaScript and WebGL 2; the pictures above show the same data without them."
+                }
+                canvas id="gl" tabindex="0" role="img"
+                    aria-label="Surfaces of the brain in three dimensions; arrow keys turn them" {}
+            } "\n"
+            @if let Some(scale) = &self.scale {
+                div class="bar-row" id="view-bar" data-low=(scale.low) data-high=(scale.high) {
+                    (PreEscaped(chart::colour_bar(scale)))
+                } "\n"
+            }
+            details {
+                summary { "The viewer is niivue 0.69.0 (BSD 2-Clause)" }
+                pre tabindex="0" aria-label="Licence of niivue" { (NIIVUE_LICENCE) }
+            } "\n"
         }
-        html.push_str(
-            "</div><div class=\"stage\" id=\"stage\"><p class=\"message\" id=\"stage-message\">The 3-D view needs \
-             JavaScript and WebGL 2; the pictures above show the same data without them.</p><canvas id=\"gl\" \
-             tabindex=\"0\" role=\"img\" aria-label=\"Surfaces of the brain in three dimensions; arrow keys turn them\">\
-             </canvas></div>\n",
-        );
-        if let Some(scale) = &self.scale {
-            let _ = writeln!(
-                html,
-                "<div class=\"bar-row\" id=\"view-bar\" data-low=\"{}\" data-high=\"{}\">{}</div>",
-                scale.low,
-                scale.high,
-                chart::colour_bar(scale)
-            );
-        }
-        let licence = escape(NIIVUE_LICENCE);
-        let _ = writeln!(
-            html,
-            "<details><summary>The viewer is niivue 0.69.0 (BSD 2-Clause)</summary><pre tabindex=\"0\" \
-             aria-label=\"Licence of niivue\">{licence}</pre></details>"
-        );
-        html
     }
 
     fn first(&self) -> usize {
@@ -91,7 +82,7 @@ impl Viewer {
     }
 
     /// Data, library and script, to stand at the end of the page.
-    pub(super) fn scripts(&self) -> String {
+    pub(super) fn scripts(&self) -> Markup {
         let base64 = base64::engine::general_purpose::STANDARD;
         let surfaces: Vec<serde_json::Value> = self
             .surfaces
@@ -111,11 +102,11 @@ impl Viewer {
             })
             .collect();
         let data = script_json(&serde_json::json!({"surfaces": surfaces, "first": self.first()}));
-        format!(
-            "<script type=\"application/json\" id=\"view-data\">{data}</script>\n\
-             <script type=\"text/plain\" id=\"niivue\">{}</script>\n<script>\n{SCRIPT}</script>\n",
-            base64.encode(NIIVUE)
-        )
+        html! {
+            script type="application/json" id="view-data" { (PreEscaped(data)) } "\n"
+            script type="text/plain" id="niivue" { (base64.encode(NIIVUE)) } "\n"
+            script { "\n" (PreEscaped(SCRIPT)) } "\n"
+        }
     }
 
     fn colours(&self, surface: &TriMesh, values: &[f64]) -> Vec<u8> {
@@ -218,9 +209,10 @@ mod tests {
         let name = "</script><b>".to_owned();
         let scale = ColourScale::over(values.iter().copied(), "RMSE (mm)");
         let viewer = Viewer { surfaces: vec![ViewedSurface { name, surface, values }], scale };
-        let scripts = viewer.scripts();
+        let scripts = viewer.scripts().into_string();
         assert_eq!(scripts.matches("</script").count(), 3);
-        assert!(!viewer.section().contains("<b>"));
-        assert!(viewer.section().contains("data-low=\"0\" data-high=\"2\""));
+        let section = viewer.section().into_string();
+        assert!(!section.contains("<b>"));
+        assert!(section.contains("data-low=\"0\" data-high=\"2\""));
     }
 }

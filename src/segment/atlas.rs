@@ -212,7 +212,10 @@ mod tests {
         let atlas = template();
         let derived = atlas.derived_labels();
         let differing = derived.data.iter().zip(&atlas.labels.data).filter(|(a, b)| a != b).count();
-        assert_eq!(differing, 0, "run `cargo run --release --example derive_atlas_labels` and commit the file");
+        assert_eq!(
+            differing, 0,
+            "run `cargo run --release --example derive_atlas_labels -- --write` and commit the file"
+        );
     }
 
     #[test]

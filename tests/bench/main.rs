@@ -1,4 +1,5 @@
-//! `./run bench [ROOM ...]`: measures the bars of the issues and prints them side by side. Never part of a timed test.
+//! `./run bench [ROOM ...]`: measures the bars of the issues, prints them side by side and writes them to
+//! `docs/evidence/ROOM.md`. Never part of a timed test.
 
 mod bar;
 mod bytes;
@@ -6,6 +7,7 @@ mod bytes;
 mod cluster;
 mod cohort;
 mod contact;
+mod evidence;
 mod experiment;
 mod fem;
 mod heads;
@@ -49,7 +51,9 @@ fn main() {
     let (mut met, mut all) = (0, 0);
     for (name, bars) in rooms.into_iter().filter(|(name, _)| wanted.is_empty() || wanted.iter().any(|w| w == name)) {
         println!("\n== {name}");
-        for Bar { name, bar, measured, met: reached } in bars() {
+        let bars = bars();
+        evidence::write(name, bar::data().is_some(), &bars);
+        for Bar { name, bar, measured, met: reached } in bars {
             println!("{} {name:<44} bar {bar:<44} measured {measured}", if reached { "met    " } else { "NOT MET" });
             met += usize::from(reached);
             all += 1;

@@ -1,23 +1,20 @@
 //! `hgm bids`: a data set in, valid derivatives and one table out.
 
-use crate::job::{contents, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
+use crate::made::{prepared_pair, prepared_patient, synthetic_patient};
 use crate::python::tool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Settings that make a subject cheap.
+/// A mesh that makes a subject cheap.
 pub const COARSE: [&str; 4] = ["--mesher", "lattice", "--cells", "3000"];
 
 /// A data set of two patients: the sample pair and a synthetic one.
 pub fn data_set(folder: &Path) -> PathBuf {
     let raw = folder.join("study");
-    let patient = folder.join("synthetic");
-    let made = output(&["synth", "--seed", "5", "--spacing-mm", "3", "-o", patient.to_str().unwrap()]);
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    for (subject, [pre, post]) in [
-        ("sub-01", [sample("pre.nii.gz"), sample("post.nii.gz")]),
-        ("sub-02", [patient.join("pre.nii.gz"), patient.join("post.nii.gz")]),
-    ] {
+    for (subject, [pre, post]) in
+        [("sub-01", ["pre.nii.gz", "post.nii.gz"].map(sample)), ("sub-02", synthetic_patient())]
+    {
         for (session, scan) in [("ses-preop", pre), ("ses-postop", post)] {
             let anat = raw.join(subject).join(session).join("anat");
             std::fs::create_dir_all(&anat).unwrap();
@@ -49,7 +46,10 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     let stopped = bids(&["participant", "--stop-on-first-crash"]);
     assert_eq!(stopped.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&stopped.stderr).contains("2 not begun"));
-    let run = bids(&[&["participant"], &COARSE[..]].concat());
+    // Both go on from `hgm prep`; the cohort's test takes a subject from nothing.
+    prepared_pair(&out.join("sub-01/hgm"));
+    prepared_patient(&out.join("sub-02/hgm"));
+    let run = bids(&[&["participant"], &CHEAP[..]].concat());
     let said = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(3), "{said}");
     assert!(said.contains("1 of 3 subjects did not end well: sub-00"), "{said}");
@@ -58,8 +58,7 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     assert!(table.status.success(), "{}", String::from_utf8_lossy(&table.stderr));
 
     // What is there is not computed again, and comes out the same.
-    let again =
-        bids(&["participant", "--participant-label", "sub-01", "02", COARSE[0], COARSE[1], COARSE[2], COARSE[3]]);
+    let again = bids(&[&["participant", "--participant-label", "sub-01", "02"], &CHEAP[..]].concat());
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
     let second = contents(&out);
     assert!(first.iter().all(|(name, bytes)| second.get(name) == Some(bytes)));

@@ -2,7 +2,8 @@
 
 use crate::bids::data_set;
 use crate::cluster::{OneNodeSlurm, printed, snakemake};
-use crate::job::{contents, output, program};
+use crate::job::{CHEAP, contents, output, program};
+use crate::made::{prepared_pair, prepared_patient};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Child;
@@ -28,13 +29,17 @@ fn slow_a_cohort_has_the_same_files_by_one_command_by_snakemake_and_on_slurm_wit
     let raw = data_set(folder.path());
     // A subject whose second scan is missing holds nobody up.
     std::fs::create_dir_all(raw.join("sub-00/ses-preop/anat")).unwrap();
-    let settings = folder.path().join("settings.toml");
-    std::fs::write(&settings, "[mesh]\nengine = \"lattice\"\nsize = { cells = 3000 }\n").unwrap();
+    let settings = PathBuf::from(CHEAP[1]);
     let outs: [PathBuf; 3] = ["command", "local", "slurm"].map(|name| folder.path().join(name).join("out"));
     let bids = |level: &str| {
         let [config, raw, out] = [&settings, &raw, &outs[0]].map(|path| path.to_str().unwrap());
         output(&["--config", config, "bids", raw, out, level])
     };
+    // The first subject goes on from `hgm prep` everywhere, the second comes from nothing where Snakemake starts the steps.
+    for out in &outs {
+        prepared_pair(&out.join("sub-01/hgm"));
+    }
+    prepared_patient(&outs[0].join("sub-02/hgm"));
     assert_eq!(bids("participant").status.code(), Some(3));
     assert!(bids("group").status.success());
     let expected = products(&outs[0]);

@@ -1,7 +1,7 @@
 //! The command line as scripts and hands use it: `--json`, interruption, colours.
 
-use crate::bids::COARSE;
-use crate::job::{contents, output, program, sample};
+use crate::job::{CHEAP, contents, output, program, sample};
+use crate::made::{copy, finished_phantom, prepared_pair};
 use crate::python::python_file;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -79,23 +79,26 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("gp fit", &["gp", "fit", "--starts", "1", "-o", &at("gp")]);
     prints("law fit", &["law", "fit", "--literature", "3"]);
     prints("register", &["register", post, pre, "-o", &at("x.txt")]);
-    prints("segment", &["segment", pre, "-o", &at("dseg.nii.gz")]);
+    prints("segment", &[&["segment", pre, "-o", &at("dseg.nii.gz")], &CHEAP[..]].concat());
     prints("bids participant", &[&bids[..], &["--dry-run"]].concat());
-    prints("prep", &[&["prep", pre, post, "-o", &case], &COARSE[..]].concat());
+    prepared_pair(Path::new(&case));
+    copy(&finished_phantom()[0], &folder.path().join("phantom"));
+    prints("prep", &[&["prep", pre, post, "-o", &case], &CHEAP[..]].concat());
     prints("sweep", &["sweep", &case, "--shard", "1/2"]);
     prints("sweep", &["sweep", &case]);
     prints("reduce", &["reduce", &case]);
-    prints("run", &[&["run", pre, post, "-o", &case], &COARSE[..]].concat());
-    prints("why", &[&["why", &case], &COARSE[..]].concat());
-    prints("bids participant", &[&bids, &COARSE[..]].concat());
+    prints("run", &[&["run", pre, post, "-o", &case], &CHEAP[..]].concat());
+    prints("why", &[&["why", &case], &CHEAP[..]].concat());
+    prints("bids participant", &[&bids, &CHEAP[..]].concat());
     prints("bids group", &["bids", &study, &out, "group"]);
     prints("estimate", &["estimate", &case]);
     prints("report", &["report", &case]);
     prints(
         "mesh",
-        &[&["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu")], &COARSE[..]].concat(),
+        &[&["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu")], &CHEAP[..]].concat(),
     );
-    prints("phantom", &[&["phantom", "-o", &at("phantom")], &COARSE[..]].concat());
+    let phantom = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "-o"];
+    prints("phantom", &[&phantom[..], &[&at("phantom")]].concat());
     prints("simulate", &["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("s.vtu")]);
 
     let printed = checks.iter().filter_map(|check| check.split_once('=')).map(|(command, _)| command.to_owned());
@@ -129,13 +132,16 @@ fn on_terminal(words: &[&str]) -> String {
 #[test]
 fn slow_an_interrupted_job_leaves_only_whole_files() {
     let folder = tempfile::tempdir().unwrap();
-    let case = folder.path().join("case");
-    let cases = [("-INT", 130, ".stages/registration.manifest.json"), ("-TERM", 143, "anat/pre_space-MNI_T1w.nii.gz")];
-    for (signal, code, file) in cases {
+    let (fresh, masked) = (folder.path().join("fresh"), folder.path().join("masked"));
+    prepared_pair(&masked);
+    std::fs::remove_dir_all(masked.join("mesh")).unwrap();
+    // Right after a stage, and among the files of one.
+    let cases = [("-INT", 130, &fresh, ".stages/registration.manifest.json"), ("-TERM", 143, &masked, "mesh/rest.vtu")];
+    for (signal, code, case, file) in cases {
         let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
         let mut command = Command::new(program());
         command.args(["run".as_ref(), pre.as_os_str(), post.as_os_str(), "-o".as_ref(), case.as_os_str()]);
-        let mut job = command.args(COARSE).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut job = command.args(CHEAP).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let begin = Instant::now();
         while !case.join(file).exists() {
             assert!(

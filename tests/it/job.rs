@@ -1,5 +1,6 @@
 //! The whole job from the command line: exit codes, messages, resume, the same bytes.
 
+use crate::made::{copy, finished_pair, finished_phantom, prepared_pair};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -21,6 +22,9 @@ pub fn sample(name: &str) -> PathBuf {
 pub fn output(arguments: &[&str]) -> Output {
     hgm().args(arguments).output().unwrap()
 }
+
+/// Settings that make a case cheap, for tests that are not about accuracy.
+pub const CHEAP: [&str; 2] = ["--config", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cheap.toml")];
 
 /// Every file below a folder by its relative name.
 pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -44,7 +48,7 @@ fn start(case: &Path, threads: &str) -> Child {
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let mut command = hgm();
     command.args(["run", pre.to_str().unwrap(), post.to_str().unwrap(), "-o", case.to_str().unwrap()]);
-    command.args(["--mesher", "lattice", "--cells", "8000", "--threads", threads]);
+    command.args(CHEAP).args(["--threads", threads]);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
@@ -64,7 +68,7 @@ fn kill_when_there(mut job: Child, file: &Path) {
 fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
-    assert!(start(&whole, "2").wait().unwrap().success());
+    copy(&finished_pair(), &whole);
     kill_when_there(start(&broken, "1"), &broken.join("anat/pre_space-MNI_T1w.nii.gz"));
     kill_when_there(start(&broken, "1"), &broken.join("sim/sample-02.vtu"));
     let kept = std::fs::metadata(broken.join("mesh/rest.vtu")).unwrap().modified().unwrap();
@@ -87,37 +91,31 @@ fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threa
 /// Nothing would run again with the same options; a changed setting, file and scan are each named, and what follows too.
 fn asks_why(case: &Path) {
     let why = |rest: &[&str]| -> BTreeMap<String, Vec<String>> {
-        let mesh = ["why", case.to_str().unwrap(), "--json", "--mesher", "lattice"];
-        let said: serde_json::Value = serde_json::from_slice(&output(&[&mesh, rest].concat()).stdout).unwrap();
+        let ended = output(&[&["why", case.to_str().unwrap(), "--json"], &CHEAP[..], rest].concat());
+        let said: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
         let stages = said["stages"].as_array().unwrap().iter().filter(|stage| stage["would_run"] == true);
         let reasons = |stage: &serde_json::Value| {
             stage["reasons"].as_array().unwrap().iter().map(|r| r.as_str().unwrap().to_owned()).collect()
         };
         stages.map(|stage| (stage["stage"].as_str().unwrap().to_owned(), reasons(stage))).collect()
     };
-    let same = ["--cells", "8000"];
-    assert!(why(&same).is_empty(), "{:?}", why(&same));
-    let finer = why(&["--cells", "9000"]);
-    assert_eq!(finer["mesh"], ["setting `mesh.size.cells` changed from 8000 to 9000"]);
+    assert!(why(&[]).is_empty(), "{:?}", why(&[]));
+    let finer = why(&["--cells", "4000"]);
+    assert_eq!(finer["mesh"], ["setting `mesh.size.cells` changed from 3000 to 4000"]);
     assert!(finer["sim-sample-04"][0].contains("follows mesh") && !finer.contains_key("anat"));
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
-    let scans =
-        |pre: &Path| why(&["--cells", "8000", "--pre", pre.to_str().unwrap(), "--post", post.to_str().unwrap()]);
+    let scans = |pre: &Path| why(&["--pre", pre.to_str().unwrap(), "--post", post.to_str().unwrap()]);
     assert!(scans(&pre).is_empty());
     assert_eq!(scans(&post)["registration"], ["input `pre` changed"]);
     std::fs::remove_file(case.join("sim/sample-03.vtu")).unwrap();
-    assert_eq!(why(&same)["sim-sample-03"], ["output `sim/sample-03.vtu` is missing"]);
+    assert_eq!(why(&[])["sim-sample-03"], ["output `sim/sample-03.vtu` is missing"]);
     assert_eq!(output(&["why", case.to_str().unwrap(), "meshes"]).status.code(), Some(3));
 }
 
 #[test]
 fn slow_the_phantom_finds_the_sample_nearest_to_what_went_in() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("phantom");
-    let arguments = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "--json", "-o"];
-    let output = output(&[arguments.as_slice(), &[out.to_str().unwrap()]].concat());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let outcome: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [_, printed] = finished_phantom();
+    let outcome: serde_json::Value = serde_json::from_slice(&std::fs::read(printed).unwrap()).unwrap();
     let samples = outcome["samples"].as_array().unwrap();
     let rmse = |n: usize| samples[n]["rmse_mm"]["all"].as_f64().unwrap();
     let modulus = |n: usize| samples[n]["shear_modulus_pa"]["brain"].as_f64().unwrap();
@@ -132,14 +130,12 @@ fn slow_the_phantom_finds_the_sample_nearest_to_what_went_in() {
 fn slow_shards_in_any_order_give_the_bytes_of_one_run_and_a_gap_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let mesh = ["--mesher", "lattice", "--cells", "8000"];
-    assert!(output(&[&["phantom", "-o", &path("phantom")], &mesh[..]].concat()).status.success());
+    copy(&finished_phantom()[0], &folder.path().join("phantom"));
     // A phantom is no patient: it has no masks to sweep against.
     assert_eq!(output(&["sweep", &path("phantom")]).status.code(), Some(3));
-    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
-    let scans = [pre.to_str().unwrap(), post.to_str().unwrap()];
-    assert!(output(&[&["prep", scans[0], scans[1], "-o", &path("parts")], &mesh[..]].concat()).status.success());
-    copy(&folder.path().join("parts"), &folder.path().join("whole"));
+    for name in ["parts", "whole"] {
+        prepared_pair(&folder.path().join(name));
+    }
     assert!(output(&["sweep", &path("whole")]).status.success());
     for part in ["3/3", "1/3"] {
         assert!(output(&["sweep", &path("parts"), "--shard", part, "--threads", "1"]).status.success());
@@ -171,14 +167,6 @@ fn slow_the_estimate_finds_both_moduli_of_a_phantom() {
     for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {
         let found = result["posterior"]["mode"][n].as_f64().unwrap();
         assert!((found / truth - 1.0).abs() < 1e-3, "{found} for {truth}");
-    }
-}
-
-fn copy(from: &Path, to: &Path) {
-    for (name, bytes) in contents(from) {
-        let path = to.join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
     }
 }
 

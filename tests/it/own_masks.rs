@@ -1,6 +1,6 @@
 //! `hgm prep --no-mesh` and a user's own ventricles: what stands in the case folder.
 
-use crate::job::{contents, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
 use hgm::geometry::{Frame, Position, Post, Pre, RigidTransform};
 use hgm::image::nifti::{ReadOptions, decode, decode_labels, decode_mask, encode_mask};
 use hgm::image::{Grid, Mask};
@@ -36,7 +36,8 @@ fn in_white_matter() -> Position<Pre> {
 fn prep(case: &Path, ventricles: &Path) {
     let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|name| sample(name).to_str().unwrap().to_owned());
     let [case, mask] = [case, ventricles].map(|path| path.to_str().unwrap());
-    let made = output(&["prep", "-q", "--no-mesh", &pre, &post, "--ventricle-mask", mask, "-o", case]);
+    let words = ["prep", "-q", "--no-mesh", &pre, &post, "--ventricle-mask", mask, "-o", case];
+    let made = output(&[&words[..], &CHEAP[..]].concat());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
 }
 

@@ -1,7 +1,6 @@
 //! What a scan's file says of the patient besides the voxels goes nowhere.
 
-use crate::bids::COARSE;
-use crate::job::{contents, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
 use base64::Engine;
 use std::io::{Read, Write};
 
@@ -126,7 +125,7 @@ fn slow_no_word_of_a_header_an_extension_or_a_file_name_is_in_any_output() {
     assert!(words[2..10].iter().all(|word| holds(&in_pre, word)));
     assert!(words[10..].iter().all(|word| holds(&in_post, word)));
 
-    let run = output(&[&["run", &pre_file, &post_file, "-o", &case, "-vv", "--json"], &COARSE[..]].concat());
+    let run = output(&[&["run", &pre_file, &post_file, "-o", &case, "-vv", "--json"], &CHEAP[..]].concat());
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let mut outputs = contents(folder.path().join("case").as_path());
     assert!(outputs.len() > 80 && outputs.contains_key("report.html") && outputs.contains_key("sim/sample-04.vtu"));

@@ -1,7 +1,7 @@
 //! What a user may hand to `hgm run` that cannot be used: exit code 3, a message with file, field and remedy, and nothing
 //! written.
 
-use crate::job::{output, sample};
+use crate::job::{CHEAP, output, sample};
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -130,7 +130,8 @@ fn slow_a_mask_outside_the_brain_is_refused_and_no_mask_is_written() {
     // The scan itself: everything is inside.
     std::fs::copy(&pre, path("head.nii.gz")).unwrap();
     let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
-    let result = output(&["run", pair[0], pair[1], "--resected-mask", &path("head.nii.gz"), "-o", &path("case")]);
+    let words = ["run", pair[0], pair[1], "--resected-mask", &path("head.nii.gz"), "-o", &path("case")];
+    let result = output(&[&words[..], &CHEAP[..]].concat());
     let message = String::from_utf8_lossy(&result.stderr).into_owned();
     assert_eq!(result.status.code(), Some(3), "{message}");
     assert!(message.contains("outside the brain") && message.contains("check the masks"), "{message:?}");

@@ -1,7 +1,7 @@
 //! Settings as a case keeps them: resolved once, and meant by every later command.
 
 use crate::bids::COARSE;
-use crate::job::{output, sample};
+use crate::job::{CHEAP, output, sample};
 use serde_json::Value;
 use std::path::Path;
 
@@ -25,12 +25,14 @@ fn json(arguments: &[&str]) -> Value {
 fn slow_an_estimate_means_the_settings_its_case_was_made_with() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    std::fs::write(path("s.toml"), SETTINGS).unwrap();
+    // The cheap settings are none of the defaults: `[anat.sag]` among them.
+    let cheap = std::fs::read_to_string(CHEAP[1]).unwrap();
+    std::fs::write(path("s.toml"), format!("{cheap}{SETTINGS}")).unwrap();
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let scans = [pre.to_str().unwrap(), post.to_str().unwrap()];
     let (two, one, config) = (path("two"), path("one"), path("s.toml"));
     let run = |case: &str, more: &[&str]| {
-        json(&[&["run", scans[0], scans[1], "-o", case, "--config", &config], &COARSE[..], more].concat())
+        json(&[&["run", scans[0], scans[1], "-o", case, "--config", &config], more].concat())
     };
     run(&two, &[]);
     let later = json(&["estimate", &two]);

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
 /// Depth and noise were measured on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is
-/// known: with the registration's own error taken out one component is off by .08 to .11 mm, before by .19 to .25. The
+/// known, with the registration's own error taken out; what they lead to stands in docs/evidence/patients.md. The
 /// distance is that at which the fit's smoothing (Gaussians of 8 mm) no longer ties two nodes together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -23,8 +23,7 @@ pub struct DisplacementSettings {
     pub noise_mm: f64,
     /// Nodes nearer to each other than this share their error, mm: they count as one.
     pub correlation_mm: f64,
-    /// How many times the registration's own error is measured on the estimate's state and taken out. A second time moves
-    /// moduli by less than 4 %.
+    /// How many times the registration's own error is measured on the estimate's state and taken out.
     pub re_registrations: usize,
 }
 

@@ -3,6 +3,7 @@
 use super::LogPrior;
 use crate::experiment::setting::{SettingError, first_broken};
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -68,7 +69,7 @@ impl Default for EstimateSettings {
 }
 
 /// How the descent ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Convergence {
     /// The last step was below a tolerance.

@@ -20,10 +20,11 @@ pub use outcome::{Estimate, EstimateOutcome, Problem, ProblemError, solve_proble
 pub use posterior::{Identifiability, Posterior, Verdict, laplace};
 pub use re_registration::{Instrument, ReRegistration, moved_by};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A Gaussian over the logarithm of one parameter (or an angle): what is known before the patient is seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LogPrior {
     /// Name of the parameter: `shear_modulus_pa of grey_matter`.
     pub name: String,
@@ -38,7 +39,7 @@ pub struct LogPrior {
 }
 
 /// What an estimated number stands for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scale {
     /// The logarithm of a positive quantity.

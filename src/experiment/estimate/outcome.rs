@@ -7,6 +7,7 @@ use crate::experiment::rmse::root_mean_square;
 use crate::fem::{Outcome, Scenario};
 use crate::mesh::TetMesh;
 use crate::register::deformable::DeformableError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -36,7 +37,7 @@ pub struct Problem<'a> {
 }
 
 /// The estimate as tables, JSON and the page show it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EstimateOutcome {
     /// Modes, intervals, identifiability.

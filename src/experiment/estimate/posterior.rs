@@ -2,10 +2,11 @@
 
 use super::{Descent, LogPrior};
 use nalgebra::{DMatrix, SymmetricEigen};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether the data say something about a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// The data narrow the prior.
@@ -17,7 +18,7 @@ pub enum Verdict {
 }
 
 /// The Laplace approximation: a Gaussian over the log-parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Posterior {
     /// Names, in the order of everything below.
     pub names: Vec<String>,
@@ -34,7 +35,7 @@ pub struct Posterior {
 }
 
 /// Panel of identifiability, from the data alone (prior left out).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identifiability {
     /// One verdict per parameter.
     pub verdicts: Vec<Verdict>,

@@ -1,8 +1,7 @@
 //! What the registration makes of a displacement that is known: its own error, taken out of what it has seen.
 //!
-//! A deformable registration smooths. On synthetic patients its displacement in the depth of the brain lay within .19 to
-//! .25 mm of the truth, and that little made white matter 16 to 28 % too stiff: strains were too small. So the estimate's
-//! own state is shown to the registration: the pre-operative scan, moved as the solver says, is registered like the
+//! A deformable registration smooths: strains come out too small and tissue too stiff (docs/evidence/patients.md has the
+//! figures with this correction). So the estimate's own state is shown to the registration: the pre-operative scan, moved as the solver says, is registered like the
 //! post-operative one, and what comes out besides the known displacement is taken from what the patient's scans showed
 //! (indirect inference: Gourieroux, Monfort and Renault, Journal of Applied Econometrics 8, 1993). Then the estimate is
 //! found again.

@@ -2,10 +2,11 @@
 
 use super::super::change_chart::{Change, ChangeChart, ChangePanel, Middle};
 use super::super::cohort::{Cohort, Row, Status};
-use super::super::html::{escape, fixed, number};
+use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
-use super::results::{figures, set_name, table};
+use super::results::{Row as Line, figures, set_name, table, words as cells};
 use super::{Frame, Section, notice};
+use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 
 impl Cohort {
@@ -24,8 +25,8 @@ impl Cohort {
         let sections: Vec<Section> =
             bodies.into_iter().filter_map(|(id, heading, body)| Some(Section { id, heading, body: body? })).collect();
         let first = self.notices();
-        let above = if first.is_empty() { String::new() } else { notice("warn", "Look here first", &first) };
-        frame.html(&above, &sections, "The page makes no request to any other place.", "")
+        let above = html! { @if !first.is_empty() { (notice("warn", "Look here first", &first)) } };
+        frame.html(&above, &sections, "The page makes no request to any other place.", &html! {})
     }
 
     /// Who did not end well, and who lies apart in what.
@@ -42,8 +43,8 @@ impl Cohort {
         all.clone().filter_map(unwell).chain(all.filter_map(apart)).chain(self.warnings.iter().cloned()).collect()
     }
 
-    /// RMSE at rest and of the best sample, subject by subject and in the median.
-    fn errors_section(&self) -> Option<String> {
+    /// RMSE undeformed and of the best sample, subject by subject and in the median.
+    fn errors_section(&self) -> Option<Markup> {
         let panel = |set: &str| {
             let columns = [format!("rest_rmse_{set}_mm"), format!("rmse_{set}_mm")];
             let middle =
@@ -63,70 +64,82 @@ impl Cohort {
                 let [rest, deformed] = panel.middle.map(|m| format!("{} ± {}", number(m.median, 3), number(m.mad, 2)));
                 let better = panel.changes.iter().filter(|c| c.after < c.before).count();
                 let all = panel.changes.len();
-                format!("{}: {rest} mm at rest, {deformed} mm deformed, smaller in {better} of {all}", panel.name)
+                format!("{}: {rest} mm undeformed, {deformed} mm deformed, smaller in {better} of {all}", panel.name)
             })
             .collect();
         let chart = ChangeChart {
-            description: format!("RMSE of every subject at rest and of its best sample. {}", said.join("; ")),
+            description: format!("RMSE of every subject undeformed and of its best sample. {}", said.join("; ")),
             y_label: "RMSE (mm)".to_owned(),
-            states: ["rest", "best sample"].map(str::to_owned),
+            states: ["undeformed", "best sample"].map(str::to_owned),
             panels,
             floor: self.median.get("noise_floor_mm").copied(),
         };
         (!chart.panels.is_empty()).then(|| {
-            format!(
-                "<p>Median ± MAD. {}.</p>\n<div class=\"charts\"><figure>{}<figcaption>One line per subject; beside \
-                 them the median and its MAD. Differences below the measurement error (median over the subjects) mean \
-                 nothing.</figcaption></figure></div>",
-                escape(&said.join("; ")),
-                chart.to_svg()
-            )
+            html! {
+                p { "Median ± MAD. " (said.join("; ")) "." } "\n"
+                div class="charts" {
+                    figure {
+                        (PreEscaped(chart.to_svg()))
+                        figcaption {
+                            "One line per subject; beside them the median and its MAD. Differences below the noise floor \
+                             (median over the subjects) mean nothing."
+                        }
+                    }
+                }
+            }
         })
     }
 
     /// RMSE over the samples that all subjects share, in the median.
-    fn samples_section(&self) -> Option<String> {
+    fn samples_section(&self) -> Option<Markup> {
         let first = self.median_samples.first()?;
         let tissues: Vec<String> = first.shear_modulus_pa.keys().cloned().collect();
         let figures = figures(&as_outcome(&self.median_samples, &tissues));
-        Some(format!(
-            "<p>The median over the subjects of the RMSE of every sample: the valley that all of them share, if there is \
-             one.</p>\n<div class=\"charts\">{figures}</div>"
-        ))
+        Some(html! {
+            p {
+                "The median over the subjects of the RMSE of every sample: the valley that all of them share, if there is one."
+            } "\n"
+            div class="charts" { (figures) }
+        })
     }
 
-    fn subjects_section(&self) -> String {
+    fn subjects_section(&self) -> Markup {
         let mut head = vec!["subject".to_owned()];
-        head.extend(self.columns.iter().map(|name| escape(&words(name))));
+        head.extend(self.columns.iter().map(|name| words(name)));
         head.extend(["at the margin", "warnings"].map(str::to_owned));
         let numbers = |from: &BTreeMap<String, f64>| -> Vec<String> {
             let shown = |name: &String, v: f64| if name.ends_with("_sd_level") { fixed(v, 2) } else { number(v, 4) };
             self.columns.iter().map(|name| from.get(name).map_or("–".to_owned(), |v| shown(name, *v))).collect()
         };
-        let line = |row: &Row| {
-            let name = escape(&row.participant_id);
-            let linked = format!("<a href=\"{name}.html\">{name}</a>");
-            let mut cells = vec![if row.best_sample.is_some() { linked } else { name }];
+        let line = |row: &Row| -> Line {
+            let name = &row.participant_id;
+            let linked = html! { a href={ (name) ".html" } { (name) } };
+            let mut line = vec![if row.best_sample.is_some() {
+                linked
+            } else {
+                html! { (name) }
+            }];
             for (column, value) in self.columns.iter().zip(numbers(&row.figures)) {
                 let apart = row.outlying.contains(column);
-                cells.push(if apart { format!("<strong>{value} ▲</strong>") } else { value });
+                line.push(html! { @if apart { strong { (value) " ▲" } } @else { (value) } });
             }
             let end = if row.status == Status::Done { row.verdict.unwrap_or("–") } else { row.status.name() };
-            cells.extend([end.replace(' ', "\u{a0}"), row.warnings.to_string()]);
-            (false, cells)
+            line.extend(cells([end.replace(' ', "\u{a0}"), row.warnings.to_string()]));
+            (false, line)
         };
-        let mut rows: Vec<(bool, Vec<String>)> = self.subjects.iter().map(line).collect();
+        let mut rows: Vec<Line> = self.subjects.iter().map(line).collect();
         for (name, values) in [("median", &self.median), ("MAD", &self.mad)] {
-            rows.push((true, [vec![name.to_owned()], numbers(values), vec!["–".to_owned(); 2]].concat()));
+            rows.push((true, cells([vec![name.to_owned()], numbers(values), vec!["–".to_owned(); 2]].concat())));
         }
         let done = self.subjects.iter().filter(|row| row.best_sample.is_some()).count();
-        format!(
-            "<p>{done} of {} subjects have figures. Subjects that did not end well come first, then those farthest from \
-             the median; ▲ marks a figure more than 3.5 robust standard deviations from it (1.483 times the median \
-             absolute deviation, MAD). Moduli are those of the best sample.</p>\n{}",
-            self.subjects.len(),
-            table("Best sample and errors per subject", &head, &rows)
-        )
+        html! {
+            p {
+                (done) " of " (self.subjects.len()) " subjects have figures. Subjects that did not end well come first, then \
+                 those farthest from the median; ▲ marks a figure more than 3.5 robust standard deviations from it (1.483 times \
+                 the median absolute deviation, MAD). Moduli are those of the best sample."
+            } "\n"
+            (table("Best sample and errors per subject", &head, &rows))
+        }
     }
 }
 

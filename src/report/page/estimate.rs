@@ -1,15 +1,15 @@
 //! The estimate: most probable moduli with their intervals, and what the data can tell apart.
 
-use super::super::html::{escape, number};
-use super::results::table;
+use super::super::html::number;
+use super::results::{Row, table, words};
 use crate::experiment::estimate::{EstimateOutcome, Verdict};
-use std::fmt::Write;
+use maud::{Markup, html};
 
 /// The section's body.
-pub fn section(estimate: &EstimateOutcome) -> String {
+pub fn section(estimate: &EstimateOutcome) -> Markup {
     let posterior = &estimate.posterior;
     let head = ["Parameter", "Most probable", "95 % interval", "Prior 95 %", "What the data say"].map(str::to_owned);
-    let row = |n: usize| {
+    let row = |n: usize| -> Row {
         let [low, high] = posterior.interval_95[n];
         let prior = &estimate.prior[n];
         let before = prior.sd.map_or("none".to_owned(), |sd| {
@@ -21,59 +21,44 @@ pub fn section(estimate: &EstimateOutcome) -> String {
             Verdict::PriorDominated => "little: the interval is the prior's",
             Verdict::NotIdentifiable => "not identifiable",
         };
-        let cells = vec![
-            escape(&posterior.names[n].replace('_', " ")),
+        let cells = [
+            posterior.names[n].replace('_', " "),
             number(posterior.mode[n], 5),
             format!("{} to {}", number(low, 4), number(high, 4)),
             before,
             verdict.to_owned(),
         ];
-        (false, cells)
+        (false, words(cells))
     };
-    let rows: Vec<_> = (0..posterior.names.len()).map(row).collect();
-    let mut html = table("Estimate", &head, &rows);
-    let _ = write!(
-        html,
-        "<p>Residual {} mm over {} observations ({} of them independent), each known to {} mm. {} equilibria and {} \
-         tangent solves.</p>",
-        number(estimate.residual_rms_mm, 3),
-        estimate.observations,
-        number(estimate.independent_observations, 3),
-        number(estimate.noise_mm, 3),
-        estimate.solves,
-        estimate.tangent_solves
-    );
-    if let Some(taken_out) = estimate.taken_out_rms_mm {
-        let _ = write!(
-            html,
-            "<p>The registration's own error, {} mm, was measured on the estimate's state and taken out of what it saw.</p>",
-            number(taken_out, 3)
-        );
-    }
+    let rows: Vec<Row> = (0..posterior.names.len()).map(row).collect();
     let panel = &posterior.identifiability;
-    if posterior.names.len() > 1 {
-        let direction: Vec<String> = posterior
-            .names
-            .iter()
-            .zip(&panel.valley)
-            .map(|(name, v)| format!("{} {}", escape(&name.replace('_', " ")), number(*v, 2)))
-            .collect();
-        let _ = write!(
-            html,
-            "<p>Correlation of the first two sensitivities {}; condition number {}. The cost has its valley along \
-             ({}), where the data alone leave a standard deviation of {} in the logarithm.</p>",
-            number(panel.sensitivity_correlation[0][1], 3),
-            number(panel.condition, 3),
-            direction.join(", "),
-            number(panel.valley_log_sd, 2)
-        );
-    }
-    if !estimate.limits.is_empty() {
-        html += "<h3>What limits it</h3><ul>";
-        for limit in &estimate.limits {
-            let _ = write!(html, "<li>{}</li>", escape(limit));
+    let pair = |(name, along): (&String, &f64)| format!("{} {}", name.replace('_', " "), number(*along, 2));
+    let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
+    html! {
+        (table("Estimate", &head, &rows))
+        p {
+            "Residual " (number(estimate.residual_rms_mm, 3)) " mm over " (estimate.observations) " observations ("
+            (number(estimate.independent_observations, 3)) " of them independent), each known to "
+            (number(estimate.noise_mm, 3)) " mm. " (estimate.solves) " equilibria and " (estimate.tangent_solves)
+            " tangent solves."
         }
-        html += "</ul>";
+        @if let Some(taken_out) = estimate.taken_out_rms_mm {
+            p {
+                "The registration's own error, " (number(taken_out, 3))
+                " mm, was measured on the estimate's state and taken out of what it saw."
+            }
+        }
+        @if posterior.names.len() > 1 {
+            p {
+                "Correlation of the first two sensitivities " (number(panel.sensitivity_correlation[0][1], 3))
+                "; condition number " (number(panel.condition, 3)) ". The cost has its valley along ("
+                (direction.join(", ")) "), where the data alone leave a standard deviation of "
+                (number(panel.valley_log_sd, 2)) " in the logarithm."
+            }
+        }
+        @if !estimate.limits.is_empty() {
+            h3 { "What limits it" }
+            ul { @for limit in &estimate.limits { li { (limit) } } }
+        }
     }
-    html
 }

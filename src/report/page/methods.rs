@@ -1,8 +1,8 @@
 //! The methods paragraph, what to cite, and BibTeX.
 
-use super::super::html::{count, escape};
+use super::super::html::count;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use std::fmt::Write;
+use maud::{Markup, html};
 
 /// A work to cite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,21 +70,19 @@ pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
 }
 
 /// The paragraph, the references and their BibTeX.
-pub fn section(outcome: &ExperimentOutcome) -> String {
+pub fn section(outcome: &ExperimentOutcome) -> Markup {
     let references = references(outcome);
-    let mut html =
-        format!("<p>Text that may be used as it stands:</p><blockquote>{}</blockquote>\n", paragraph(outcome));
-    html += "<h3>References</h3><ol class=\"references\">";
-    for r in &references {
-        let _ = write!(html, "<li id=\"ref-{}\">{}</li>", r.key, escape(r.text));
-    }
     let bibtex: Vec<&str> = references.iter().map(|r| r.bibtex).collect();
-    let _ = writeln!(
-        html,
-        "</ol><details><summary>BibTeX</summary><pre tabindex=\"0\" aria-label=\"BibTeX\">{}</pre></details>",
-        escape(&bibtex.join("\n\n"))
-    );
-    html
+    html! {
+        p { "Text that may be used as it stands:" }
+        blockquote { (paragraph(outcome)) } "\n"
+        h3 { "References" }
+        ol class="references" { @for r in &references { li id={ "ref-" (r.key) } { (r.text) } } }
+        details {
+            summary { "BibTeX" }
+            pre tabindex="0" aria-label="BibTeX" { (bibtex.join("\n\n")) }
+        } "\n"
+    }
 }
 
 fn list(words: &[String]) -> String {
@@ -95,66 +93,42 @@ fn list(words: &[String]) -> String {
     }
 }
 
-fn paragraph(outcome: &ExperimentOutcome) -> String {
+fn paragraph(outcome: &ExperimentOutcome) -> Markup {
     let references = references(outcome);
     let cite = |r: Reference| {
         let number = references.iter().position(|other| *other == r).map_or(0, |n| n + 1);
-        format!("<a href=\"#ref-{}\">[{number}]</a>", r.key)
+        html! { a href={ "#ref-" (r.key) } { "[" (number) "]" } }
     };
-    let mut text = format!("Simulations were made with hgm {}, research software", env!("CARGO_PKG_VERSION"));
-    let images = match outcome.kind {
-        ExperimentKind::Phantom => {
-            format!(", on the MNI152NLin2009aSym template {}. ", cite(TEMPLATE))
-        }
-        ExperimentKind::Resection => format!(
-            ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
-             MNI152NLin2009aSym template {}{}, so that sizes stay the patient&#39;s. Resected tissue was removed from the \
-             mesh. ",
-            cite(TEMPLATE),
-            if outcome.registrations.is_empty() {
-                String::new()
-            } else {
-                format!(", maximising Mattes mutual information {}", cite(MUTUAL_INFORMATION))
-            }
-        ),
-    };
-    text += &images;
-    if let Some(mesh) = &outcome.mesh {
-        let engine = if mesh.engine == "cgal" {
-            format!("CGAL {}", cite(CGAL))
-        } else {
-            format!("its engine {}", escape(&mesh.engine))
-        };
-        let _ = write!(
-            text,
-            "The brain was meshed with {engine} into {} tetrahedra and {} nodes. ",
-            count(mesh.tets),
-            count(mesh.nodes)
-        );
-    }
-    let tissues: Vec<String> = outcome.tissues.iter().map(|t| escape(&t.replace('_', " "))).collect();
-    let mut laws: Vec<String> = outcome.samples.iter().flat_map(|s| s.laws.values().map(|l| escape(&l.law))).collect();
+    let tissues: Vec<String> = outcome.tissues.iter().map(|t| t.replace('_', " ")).collect();
+    let mut laws: Vec<String> = outcome.samples.iter().flat_map(|s| s.laws.values().map(|l| l.law.clone())).collect();
     laws.sort();
     laws.dedup();
-    if !tissues.is_empty() {
-        let law = if laws.is_empty() { String::new() } else { format!(" through {} meta-models", list(&laws)) };
-        let _ = write!(
-            text,
-            "Material parameters of {} were sampled at {} points of a Gaussian-process model of the literature{law} {}. ",
-            list(&tissues),
-            outcome.samples.len(),
-            cite(GENERATIVE_MODEL)
-        );
+    html! {
+        "Simulations were made with hgm " (env!("CARGO_PKG_VERSION")) ", research software"
+        @match outcome.kind {
+            ExperimentKind::Phantom => { ", on the MNI152NLin2009aSym template " (cite(TEMPLATE)) ". " },
+            ExperimentKind::Resection => {
+                ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
+                 MNI152NLin2009aSym template " (cite(TEMPLATE))
+                @if !outcome.registrations.is_empty() {
+                    ", maximising Mattes mutual information " (cite(MUTUAL_INFORMATION))
+                }
+                ", so that sizes stay the patient's. Resected tissue was removed from the mesh. "
+            },
+        }
+        @if let Some(mesh) = &outcome.mesh {
+            "The brain was meshed with "
+            @if mesh.engine == "cgal" { "CGAL " (cite(CGAL)) } @else { "its engine " (mesh.engine) }
+            " into " (count(mesh.tets)) " tetrahedra and " (count(mesh.nodes)) " nodes. "
+        }
+        @if !tissues.is_empty() {
+            "Material parameters of " (list(&tissues)) " were sampled at " (outcome.samples.len())
+            " points of a Gaussian-process model of the literature"
+            @if !laws.is_empty() { " through " (list(&laws)) " meta-models" }
+            " " (cite(GENERATIVE_MODEL)) ". "
+        }
+        @if !outcome.loads.is_empty() { "Loads: " (list(&outcome.loads)) ". " }
+        "Each static equilibrium was compared with " (outcome.reference)
+        " by the root mean square over nodes of the distance, RMSE = √(Σ|u − u" sub { "ref" } "|² / S)."
     }
-    if !outcome.loads.is_empty() {
-        let loads: Vec<String> = outcome.loads.iter().map(|l| escape(l)).collect();
-        let _ = write!(text, "Loads: {}. ", list(&loads));
-    }
-    let _ = write!(
-        text,
-        "Each static equilibrium was compared with {} by the root mean square over nodes of the distance, \
-         RMSE = √(Σ|u − u<sub>ref</sub>|² / S).",
-        escape(&outcome.reference)
-    );
-    text
 }

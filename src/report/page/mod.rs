@@ -12,10 +12,10 @@ pub use results::set_name;
 use super::chart;
 use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
-use super::html::{escape, png_address};
+use super::html::{png_address, without_control_characters};
 use super::viewer::Viewer;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use std::fmt::Write;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("../assets/page.css");
 const RATING_SCRIPT: &str = include_str!("../assets/rating.js");
@@ -84,7 +84,7 @@ const POLICY: &str = "default-src 'none'; img-src data: blob:; style-src 'unsafe
 struct Section {
     id: &'static str,
     heading: &'static str,
-    body: String,
+    body: Markup,
 }
 
 /// What every page has around its sections.
@@ -95,62 +95,87 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn html(&self, notice: &str, sections: &[Section], footnote: &str, scripts: &str) -> String {
-        let mut page = String::with_capacity(4 << 20);
-        let (title, version) = (escape(self.title), escape(self.version));
-        let _ = write!(
-            page,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n<meta name=\"referrer\" content=\"no-referrer\">\n\
-             <link rel=\"icon\" href=\"data:,\">\n<title>{title} · hgm</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-             <a class=\"skip\" href=\"#main\">Skip to the report</a>\n\
-             <header><div class=\"wrap\"><p class=\"kicker\">hgm {version} · {}</p><h1>{title}</h1>\
-             <p class=\"disclaimer\">Research software, not a medical device. \
-             Not for diagnosis, not for surgical planning.</p></div></header>\n\
-             <nav aria-label=\"Sections\"><div class=\"wrap\">",
-            self.kicker
-        );
-        for section in sections {
-            let _ = write!(page, "<a href=\"#{}\">{}</a>", section.id, section.heading);
+    fn html(&self, notice: &Markup, sections: &[Section], footnote: &str, scripts: &Markup) -> String {
+        let page = html! {
+            (DOCTYPE) "\n"
+            html lang="en" {
+                "\n" (self.head()) "\n"
+                body {
+                    "\n"
+                    a class="skip" href="#main" { "Skip to the report" } "\n"
+                    header {
+                        div class="wrap" {
+                            p class="kicker" { "hgm " (self.version) " · " (self.kicker) }
+                            h1 { (self.title) }
+                            p class="disclaimer" {
+                                "Research software, not a medical device. Not for diagnosis, not for surgical planning."
+                            }
+                        }
+                    } "\n"
+                    nav aria-label="Sections" {
+                        div class="wrap" {
+                            @for section in sections { a href={ "#" (section.id) } { (section.heading) } }
+                        }
+                    } "\n"
+                    main id="main" class="wrap" {
+                        "\n" (notice)
+                        @for section in sections { (section.html()) "\n" }
+                    } "\n"
+                    footer class="wrap" {
+                        p { "Research software, not a medical device. Made by hgm " (self.version) ". " (footnote) }
+                    } "\n"
+                    (scripts)
+                } "\n"
+            } "\n"
+        };
+        without_control_characters(page.into_string())
+    }
+
+    fn head(&self) -> Markup {
+        html! {
+            head {
+                "\n" meta charset="utf-8";
+                "\n" meta http-equiv="Content-Security-Policy" content=(POLICY);
+                "\n" meta name="viewport" content="width=device-width, initial-scale=1";
+                "\n" meta name="color-scheme" content="light dark";
+                "\n" meta name="referrer" content="no-referrer";
+                "\n" link rel="icon" href="data:,";
+                "\n" title { (self.title) " · hgm" }
+                "\n" style { "\n" (PreEscaped(STYLE)) } "\n"
+            }
         }
-        page.push_str("</div></nav>\n<main id=\"main\" class=\"wrap\">\n");
-        page.push_str(notice);
-        for s in sections {
-            let _ = write!(
-                page,
-                "<section id=\"{0}\" aria-labelledby=\"h-{0}\"><h2 id=\"h-{0}\">{1}</h2>\n{2}</section>\n",
-                s.id, s.heading, s.body
-            );
+    }
+}
+
+impl Section {
+    fn html(&self) -> Markup {
+        html! {
+            section id=(self.id) aria-labelledby={ "h-" (self.id) } {
+                h2 id={ "h-" (self.id) } { (self.heading) } "\n"
+                (self.body)
+            }
         }
-        let _ = write!(
-            page,
-            "</main>\n<footer class=\"wrap\"><p>Research software, not a medical device. Made by hgm {version}. \
-             {footnote}</p></footer>\n{scripts}</body>\n</html>\n"
-        );
-        page
     }
 }
 
 /// A box above the sections.
-fn notice(class: &str, heading: &str, items: &[String]) -> String {
-    let items: Vec<String> = items.iter().map(|text| format!("<li>{}</li>", escape(text))).collect();
-    let items = items.concat();
-    format!(
-        "<div class=\"notice {class}\" id=\"warnings\" role=\"note\"><h2><span aria-hidden=\"true\">▲</span> \
-         {heading}</h2><ul>{items}</ul></div>\n"
-    )
+fn notice(class: &str, heading: &str, items: &[String]) -> Markup {
+    html! {
+        div class={ "notice " (class) } id="warnings" role="note" {
+            h2 { span aria-hidden="true" { "▲" } " " (heading) }
+            ul { @for item in items { li { (item) } } }
+        } "\n"
+    }
 }
 
 impl CasePage {
     /// The whole page.
     pub fn to_html(&self) -> String {
         let frame = Frame { title: &self.title, kicker: "brain deformation report", version: &self.version };
-        let mut scripts = format!("<script>\n{RATING_SCRIPT}</script>\n");
-        if let Some(viewer) = &self.viewer {
-            scripts.push_str(&viewer.scripts());
-        }
+        let scripts = html! {
+            script { "\n" (PreEscaped(RATING_SCRIPT)) } "\n"
+            @if let Some(viewer) = &self.viewer { (viewer.scripts()) }
+        };
         let note = "The images are masked to the brain; the page holds no names, dates or places, and makes no request \
                     to any other place.";
         frame.html(&self.warnings_box(), &self.sections(), note, &scripts)
@@ -158,13 +183,13 @@ impl CasePage {
 
     fn sections(&self) -> Vec<Section> {
         let mut sections = Vec::new();
-        let mut add = |id, heading, body: Option<String>| {
+        let mut add = |id, heading, body: Option<Markup>| {
             sections.extend(body.map(|body| Section { id, heading, body }));
         };
         let outcome = self.outcome.as_ref();
         add("summary", "Summary", outcome.map(results::summary));
         add("registration", "Registration", self.registration_section());
-        add("masks", "Masks", (!self.mosaics.is_empty()).then(|| self.mosaics.iter().map(parts::mosaic).collect()));
+        add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());
         add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(results::samples));
         add("estimate", "Estimate", outcome.and_then(|o| o.estimate.as_ref()).map(estimate::section));
@@ -177,59 +202,75 @@ impl CasePage {
         sections
     }
 
-    fn warnings_box(&self) -> String {
+    fn warnings_box(&self) -> Markup {
         let raised = self.outcome.iter().flat_map(|o| &o.warnings).chain(&self.warnings);
         let absent = self.absent.iter().map(|what| format!("Not shown: {what}."));
         let items: Vec<String> = raised.cloned().chain(absent).collect();
         match items.len() {
-            0 => "<div class=\"notice calm\" id=\"warnings\" role=\"note\"><h2>No warnings</h2><p>Every stage ran \
-                  within its checks. Look at the registration and the masks all the same.</p></div>\n"
-                .to_owned(),
+            0 => html! {
+                div class="notice calm" id="warnings" role="note" {
+                    h2 { "No warnings" }
+                    p { "Every stage ran within its checks. Look at the registration and the masks all the same." }
+                } "\n"
+            },
             1 => notice("warn", "1 warning", &items),
             n => notice("warn", &format!("{n} warnings"), &items),
         }
     }
 
-    fn registration_section(&self) -> Option<String> {
-        let table = self.outcome.as_ref().and_then(|o| results::registrations(&o.registrations));
-        if self.registration.is_none() && table.is_none() {
-            return None;
-        }
-        Some(self.registration.as_ref().map(parts::registration).unwrap_or_default() + &table.unwrap_or_default())
+    fn masks_section(&self) -> Option<Markup> {
+        (!self.mosaics.is_empty()).then(|| html! { @for mosaic in &self.mosaics { (parts::mosaic(mosaic)) } })
     }
 
-    fn mesh_section(&self) -> Option<String> {
+    fn registration_section(&self) -> Option<Markup> {
+        let table = self.outcome.as_ref().and_then(|o| results::registrations(&o.registrations));
+        let figure = self.registration.as_ref().map(parts::registration);
+        (figure.is_some() || table.is_some()).then(|| html! { (Given(figure)) (Given(table)) })
+    }
+
+    fn mesh_section(&self) -> Option<Markup> {
         let tables = self.outcome.as_ref().and_then(results::mesh);
         if self.mesh_pictures.is_empty() && tables.is_none() {
             return None;
         }
-        let mut html = pictures(&self.mesh_pictures);
-        if !self.mesh_legend.is_empty() {
-            html.push_str("<ul class=\"swatches\" aria-label=\"Colours of the cells\">");
-            for (colour, name) in &self.mesh_legend {
-                let _ = write!(
-                    html,
-                    "<li><svg viewBox=\"0 0 10 10\" aria-hidden=\"true\"><path fill=\"{}\" d=\"M0 0h10v10H0z\"/></svg>{}</li>",
-                    hex(*colour),
-                    escape(name)
-                );
+        Some(html! {
+            (pictures(&self.mesh_pictures))
+            @if !self.mesh_legend.is_empty() {
+                ul class="swatches" aria-label="Colours of the cells" {
+                    @for (colour, name) in &self.mesh_legend {
+                        li {
+                            svg viewBox="0 0 10 10" aria-hidden="true" {
+                                path fill=(hex(*colour)) d="M0 0h10v10H0z" {}
+                            }
+                            (name)
+                        }
+                    }
+                } "\n"
             }
-            html.push_str("</ul>\n");
-        }
-        Some(html + &tables.unwrap_or_default())
+            (Given(tables))
+        })
     }
 
-    fn provenance_section(&self) -> Option<String> {
-        let block = |name: &str, text: &Option<String>| {
-            let text = text.as_ref()?;
-            let text = escape(text);
-            Some(format!(
-                "<details><summary>{name}</summary><pre tabindex=\"0\" aria-label=\"{name}\">{text}</pre></details>\n"
-            ))
-        };
-        let blocks = [block("Settings", &self.settings_toml), block("Provenance", &self.provenance_json)];
-        let body: String = blocks.into_iter().flatten().collect();
-        (!body.is_empty()).then_some(body)
+    fn provenance_section(&self) -> Option<Markup> {
+        let blocks = [("Settings", &self.settings_toml), ("Provenance", &self.provenance_json)];
+        blocks.iter().any(|(_, text)| text.is_some()).then(|| {
+            html! {
+                @for (name, text) in blocks {
+                    @if let Some(text) = text {
+                        details { summary { (name) } pre tabindex="0" aria-label=(name) { (text) } } "\n"
+                    }
+                }
+            }
+        })
+    }
+}
+
+/// Markup that may be absent.
+struct Given(Option<Markup>);
+
+impl maud::Render for Given {
+    fn render_to(&self, page: &mut String) {
+        page.extend(self.0.as_ref().map(|markup| markup.0.as_str()));
     }
 }
 
@@ -243,37 +284,36 @@ pub fn title_of(kind: Option<ExperimentKind>) -> &'static str {
 }
 
 /// A row of captioned pictures.
-fn pictures(pictures: &[CaptionedPicture]) -> String {
-    if pictures.is_empty() {
-        return String::new();
+fn pictures(pictures: &[CaptionedPicture]) -> Markup {
+    html! {
+        @if !pictures.is_empty() {
+            div class="pictures" {
+                @for p in pictures {
+                    figure {
+                        img src=(png_address(&p.png)) width=(p.size[0]) height=(p.size[1]) alt=(p.description);
+                        figcaption { (p.caption) }
+                    }
+                }
+            } "\n"
+        }
     }
-    let mut html = String::from("<div class=\"pictures\">");
-    for p in pictures {
-        let _ = write!(
-            html,
-            "<figure><img src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\"><figcaption>{}</figcaption></figure>",
-            png_address(&p.png),
-            p.size[0],
-            p.size[1],
-            escape(&p.description),
-            escape(&p.caption)
-        );
-    }
-    html + "</div>\n"
 }
 
-fn error_section(map: &ErrorMap) -> String {
-    let mut html = String::from(
-        "<p>Distance at every node between the best sample and the reference. Grey: no reference there.</p>\n",
-    );
-    html += &pictures(&map.pictures);
-    let _ = write!(html, "<div class=\"bar-row\">{}</div>\n<div class=\"charts\">", chart::colour_bar(&map.scale));
-    for (set, errors) in &map.errors_mm {
-        let label = format!("error, {} (mm)", set_name(set));
-        let chart = chart::histogram(errors, &label, "nodes", Some(&map.scale));
-        let _ = write!(html, "<figure>{chart}<figcaption>{}</figcaption></figure>", escape(&results::spread(errors)));
+fn error_section(map: &ErrorMap) -> Markup {
+    html! {
+        p { "Distance at every node between the best sample and the target. Grey: no target there." } "\n"
+        (pictures(&map.pictures))
+        div class="bar-row" { (PreEscaped(chart::colour_bar(&map.scale))) } "\n"
+        div class="charts" {
+            @for (set, errors) in &map.errors_mm {
+                @let label = format!("error, {} (mm)", set_name(set));
+                figure {
+                    (PreEscaped(chart::histogram(errors, &label, "nodes", Some(&map.scale))))
+                    figcaption { (results::spread(errors)) }
+                }
+            }
+        } "\n"
     }
-    html + "</div>\n"
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 
 use super::super::chart::{DataPoint, HeatMap, LineChart, Rule, Series, colour_bar};
 use super::super::colour::ColourScale;
-use super::super::html::{count, escape, fixed, number};
+use super::super::html::{count, fixed, number};
 use super::parts::quantity;
 use crate::experiment::outcome::{
-    ExperimentKind, ExperimentOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
+    ExperimentKind, ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
 };
-use std::fmt::Write;
+use maud::{Markup, PreEscaped, html};
 
 /// A set's name for readers.
 pub fn set_name(set: &str) -> String {
@@ -32,35 +32,48 @@ pub fn spread(values: &[f64]) -> String {
     format!("{} nodes: median {} mm, 95 % below {} mm, largest {} mm", finite.len(), at(0.5), at(0.95), at(1.0))
 }
 
-/// A table that scrolls on its own when the page is narrow. Cells are HTML.
-pub fn table(caption: &str, head: &[String], rows: &[(bool, Vec<String>)]) -> String {
-    let mut html = format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
-        escape(caption)
-    );
-    for cell in head {
-        let _ = write!(html, "<th scope=\"col\">{cell}</th>");
-    }
-    html.push_str("</tr></thead><tbody>");
-    for (chosen, row) in rows {
-        html.push_str(if *chosen { "<tr class=\"best\">" } else { "<tr>" });
-        for (n, cell) in row.iter().enumerate() {
-            let _ =
-                if n == 0 { write!(html, "<th scope=\"row\">{cell}</th>") } else { write!(html, "<td>{cell}</td>") };
-        }
-        html.push_str("</tr>");
-    }
-    html + "</tbody></table></div>\n"
+/// Whether a row stands out, and its cells.
+pub type Row = (bool, Vec<Markup>);
+
+/// Cells of plain words.
+pub fn words(cells: impl IntoIterator<Item = String>) -> Vec<Markup> {
+    cells.into_iter().map(|cell| html! { (cell) }).collect()
 }
 
-fn tile(name: &str, value: &str, note: &str) -> String {
-    let note = if note.is_empty() { String::new() } else { format!("<span class=\"note\">{note}</span>") };
-    format!("<div><dt>{name}</dt><dd>{value}{note}</dd></div>")
+/// A table that scrolls on its own when the page is narrow.
+pub fn table(caption: &str, head: &[String], rows: &[Row]) -> Markup {
+    html! {
+        div class="scroll" tabindex="0" role="region" aria-label=(caption) {
+            table {
+                caption { (caption) }
+                thead { tr { @for cell in head { th scope="col" { (cell) } } } }
+                tbody {
+                    @for (chosen, cells) in rows {
+                        tr class=[chosen.then_some("best")] {
+                            @for (n, cell) in cells.iter().enumerate() {
+                                @if n == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+                            }
+                        }
+                    }
+                }
+            }
+        } "\n"
+    }
+}
+
+/// A key figure with its name and a note below it.
+fn tile(name: &str, value: &Markup, note: &str) -> Markup {
+    html! {
+        div {
+            dt { (name) }
+            dd { (value) @if !note.is_empty() { span class="note" { (note) } } }
+        }
+    }
 }
 
 /// Key figures and one sentence on what they say.
-pub fn summary(outcome: &ExperimentOutcome) -> String {
-    let mut html = format!("<p class=\"lead\">{}</p>\n<dl class=\"figures\">", sentence(outcome));
+pub fn summary(outcome: &ExperimentOutcome) -> Markup {
+    let mut tiles: Vec<Markup> = Vec::new();
     if let Some(best) = outcome.best() {
         for set in outcome.rmse_sets() {
             let Some(&rmse) = best.rmse_mm.get(&set) else { continue };
@@ -68,20 +81,18 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
                 .rest_rmse_mm
                 .get(&set)
                 .map_or_else(String::new, |rest| format!("undeformed: {} mm", number(*rest, 3)));
-            html += &tile(&format!("RMSE, {}", escape(&set_name(&set))), &quantity(Some(rmse), 3, "mm"), &note);
+            tiles.push(tile(&format!("RMSE, {}", set_name(&set)), &quantity(Some(rmse), 3, "mm"), &note));
         }
         for (tissue, modulus) in &best.shear_modulus_pa {
             let truth = outcome.reference_shear_modulus_pa.get(tissue);
             let truth = truth.map(|t| format!("reference: {} Pa", number(*t, 5)));
             let level = best.sd_levels.get(tissue).map(|level| format!("{} SD of the prior", signed(*level)));
             let note = truth.or(level).unwrap_or_default();
-            let name = format!("Shear modulus, {}", escape(&tissue_name(tissue)));
-            html += &tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note);
+            let name = format!("Shear modulus, {}", tissue_name(tissue));
+            tiles.push(tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note));
         }
     }
-    if let Some(v) = &outcome.volumes {
-        html += &volume_tiles(v);
-    }
+    tiles.extend(outcome.volumes.iter().flat_map(volume_tiles));
     if let Some(floor) = outcome.noise_floor {
         let part = |name: &str, mm: Option<f64>| mm.map(|mm| format!("{name} {} mm", number(mm, 2)));
         let parts: Vec<String> = [
@@ -92,37 +103,40 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
         .into_iter()
         .flatten()
         .collect();
-        html += &tile("Measurement error", &quantity(floor.combined_mm(), 2, "mm"), &parts.join(", "));
+        tiles.push(tile("Noise floor", &quantity(floor.combined_mm(), 2, "mm"), &parts.join(", ")));
     }
     if let Some(mesh) = &outcome.mesh {
-        let note = format!("{} nodes, engine {}", count(mesh.nodes), escape(&mesh.engine));
-        html += &tile("Tetrahedra", &count(mesh.tets), &note);
+        let note = format!("{} nodes, engine {}", count(mesh.nodes), mesh.engine);
+        tiles.push(tile("Tetrahedra", &html! { (count(mesh.tets)) }, &note));
     }
-    html + "</dl>\n"
+    html! {
+        p class="lead" { (sentence(outcome)) } "\n"
+        dl class="figures" { @for tile in tiles { (tile) } } "\n"
+    }
 }
 
-fn volume_tiles(v: &ResectionVolumes) -> String {
-    let mut html = String::new();
+fn volume_tiles(v: &ResectionVolumes) -> Vec<Markup> {
+    let mut tiles = Vec::new();
     if v.resected_cc.is_some() {
-        html += &tile("Resected tissue", &quantity(v.resected_cc, 3, "cc"), "on the image before surgery");
+        tiles.push(tile("Resected tissue", &quantity(v.resected_cc, 3, "cc"), "on the image before surgery"));
     }
     if v.cavity_cc.is_some() {
-        html += &tile("Cavity", &quantity(v.cavity_cc, 3, "cc"), "on the image after surgery");
+        tiles.push(tile("Cavity", &quantity(v.cavity_cc, 3, "cc"), "on the image after surgery"));
     }
     if v.ventricle_before_cc.is_some() {
         let change = |after: f64| v.ventricle_before_cc.map_or(0.0, |before| 100.0 * (after / before - 1.0));
         let after = |after: f64| format!("after: {} cc ({} %)", number(after, 3), signed_fixed(change(after)));
         let note = v.ventricle_after_cc.map_or_else(String::new, after);
-        html += &tile("Ventricles before surgery", &quantity(v.ventricle_before_cc, 3, "cc"), &note);
+        tiles.push(tile("Ventricles before surgery", &quantity(v.ventricle_before_cc, 3, "cc"), &note));
     }
     if let Some(shift) = v.midline_shift_mm {
         let side = if shift > 0.0 { "to the right" } else { "to the left" };
-        html += &tile("Midline shift", &quantity(Some(shift.abs()), 2, "mm"), side);
+        tiles.push(tile("Midline shift", &quantity(Some(shift.abs()), 2, "mm"), side));
     }
     if v.brain_cc.is_some() {
-        html += &tile("Brain before surgery", &quantity(v.brain_cc, 4, "cc"), "");
+        tiles.push(tile("Brain before surgery", &quantity(v.brain_cc, 4, "cc"), ""));
     }
-    html
+    tiles
 }
 
 fn signed_fixed(percent: f64) -> String {
@@ -137,9 +151,9 @@ fn sentence(outcome: &ExperimentOutcome) -> String {
     let converged = outcome.samples.iter().filter(|s| s.converged).count();
     let tally = format!("{converged} of {} simulations converged.", outcome.samples.len());
     let Some(best) = outcome.best() else {
-        return format!("{tally} There is no best sample. Compared with: {}.", escape(&outcome.reference));
+        return format!("{tally} There is no best sample. Compared with: {}.", outcome.reference);
     };
-    let best_id = escape(&best.id);
+    let best_id = &best.id;
     let verdict = match outcome.kind {
         ExperimentKind::Phantom => format!("The sample nearest to the reference is {best_id}."),
         ExperimentKind::Resection => {
@@ -147,7 +161,7 @@ fn sentence(outcome: &ExperimentOutcome) -> String {
             let gain = sets.iter().find_map(|set| Some((set, outcome.rest_rmse_mm.get(set)?, best.rmse_mm.get(set)?)));
             gain.map_or_else(String::new, |(set, rest, rmse)| {
                 let percent = number((100.0 * (rest - rmse) / rest).abs(), 2);
-                let set = escape(&set_name(set));
+                let set = set_name(set);
                 if rmse < rest {
                     format!("The best sample, {best_id}, takes away {percent} % of the error at the {set}.")
                 } else {
@@ -156,91 +170,92 @@ fn sentence(outcome: &ExperimentOutcome) -> String {
             })
         }
     };
-    format!("{tally} {verdict} Compared with: {}.", escape(&outcome.reference))
+    format!("{tally} {verdict} Compared with: {}.", outcome.reference)
 }
 
 /// Registrations in numbers.
-pub fn registrations(all: &[RegistrationOutcome]) -> Option<String> {
+pub fn registrations(all: &[RegistrationOutcome]) -> Option<Markup> {
     if all.is_empty() {
         return None;
     }
     let head = ["registration", "rotation (°)", "translation x, y, z (mm)", "similarity", "before", "after"];
-    let rows: Vec<(bool, Vec<String>)> = all
+    let rows: Vec<Row> = all
         .iter()
         .map(|r| {
             let shift: Vec<String> = r.translation_mm.iter().map(|t| fixed(*t, 2)).collect();
             let similarity = |s: Option<f64>| s.map_or_else(|| "–".to_owned(), |s| number(s, 4));
-            let cells = vec![
-                format!("{} to {}", escape(&r.moving), escape(&r.fixed)),
+            let cells = [
+                format!("{} to {}", r.moving, r.fixed),
                 fixed(r.rotation_deg, 2),
                 shift.join(", "),
-                escape(&r.similarity),
+                r.similarity.clone(),
                 similarity(r.similarity_before),
                 similarity(r.similarity_after),
             ];
-            (false, cells)
+            (false, words(cells))
         })
         .collect();
     Some(table("Rigid registrations", &head.map(str::to_owned), &rows))
 }
 
 /// Mesh quality and boundary sets.
-pub fn mesh(outcome: &ExperimentOutcome) -> Option<String> {
-    let mut html = String::new();
-    if let Some(m) = &outcome.mesh {
-        let optional = |v: Option<f64>, digits, unit: &str| {
-            v.map_or_else(|| "–".to_owned(), |v| format!("{} {unit}", number(v, digits)))
-        };
-        let mut rows = vec![
-            ("engine".to_owned(), escape(&m.engine)),
-            ("nodes".to_owned(), count(m.nodes)),
-            ("tetrahedra".to_owned(), count(m.tets)),
-            ("smallest dihedral angle".to_owned(), optional(m.dihedral_min_deg, 3, "°")),
-            ("1 % of tetrahedra have one below".to_owned(), optional(m.dihedral_percentile_1_deg, 3, "°")),
-            ("tetrahedra below 10°".to_owned(), optional(m.dihedral_below_10_percent, 2, "%")),
-            ("radius ratio, mean".to_owned(), optional(m.radius_ratio_mean, 3, "")),
-            ("radius ratio, smallest".to_owned(), optional(m.radius_ratio_min, 3, "")),
-            ("scaled Jacobian, smallest".to_owned(), optional(m.scaled_jacobian_min, 3, "")),
-        ];
-        for (name, cc) in &m.volume_cc {
-            rows.push((format!("volume, {}", escape(&tissue_name(name))), format!("{} cc", number(*cc, 4))));
-        }
-        for (name, percent) in &m.volume_error_percent {
-            let name = format!("volume against the label map, {}", escape(&tissue_name(name)));
-            rows.push((name, format!("{} %", fixed(*percent, 2))));
-        }
-        for (name, dice) in &m.dice {
-            rows.push((format!("Dice with the label map, {}", escape(&tissue_name(name))), fixed(*dice, 3)));
-        }
-        if let (Some(mean), Some(far)) = (m.surface_distance_mean_mm, m.surface_distance_95_mm) {
-            let figures = format!("{} / {} mm", fixed(mean, 2), fixed(far, 2));
-            rows.push(("distance to the border of the labels, mean / 95 %".to_owned(), figures));
-        }
-        let rows: Vec<_> = rows.into_iter().map(|(name, value)| (false, vec![name, value])).collect();
-        let quality = table("Mesh", &["measure".to_owned(), "value".to_owned()], &rows);
-        html += "<div class=\"columns\">";
-        html += &quality;
-        if !m.dihedral_counts.is_empty() {
-            let _ = write!(html, "<figure>{}</figure>", dihedral_chart(&m.dihedral_counts));
-        }
-        html += "</div>";
+pub fn mesh(outcome: &ExperimentOutcome) -> Option<Markup> {
+    let tables: Vec<Markup> = outcome.mesh.iter().map(quality).chain(boundary_sets(outcome)).collect();
+    (!tables.is_empty()).then(|| html! { @for table in tables { (table) } })
+}
+
+fn quality(m: &MeshOutcome) -> Markup {
+    let optional = |v: Option<f64>, digits, unit: &str| {
+        v.map_or_else(|| "–".to_owned(), |v| format!("{} {unit}", number(v, digits)))
+    };
+    let mut rows = vec![
+        ("engine".to_owned(), m.engine.clone()),
+        ("nodes".to_owned(), count(m.nodes)),
+        ("tetrahedra".to_owned(), count(m.tets)),
+        ("smallest dihedral angle".to_owned(), optional(m.dihedral_min_deg, 3, "°")),
+        ("1 % of tetrahedra have one below".to_owned(), optional(m.dihedral_percentile_1_deg, 3, "°")),
+        ("tetrahedra below 10°".to_owned(), optional(m.dihedral_below_10_percent, 2, "%")),
+        ("radius ratio, mean".to_owned(), optional(m.radius_ratio_mean, 3, "")),
+        ("radius ratio, smallest".to_owned(), optional(m.radius_ratio_min, 3, "")),
+        ("scaled Jacobian, smallest".to_owned(), optional(m.scaled_jacobian_min, 3, "")),
+    ];
+    for (name, cc) in &m.volume_cc {
+        rows.push((format!("volume, {}", tissue_name(name)), format!("{} cc", number(*cc, 4))));
     }
-    if !outcome.sets.is_empty() {
-        let head = ["set", "nodes", "area (mm²)", "centre x, y, z (mm)"].map(str::to_owned);
-        let rows: Vec<_> = outcome
-            .sets
-            .iter()
-            .map(|s| {
-                let centre = s.centroid_mm.map(|c| c.map(|x| fixed(x, 1)).join(", "));
-                let area = s.area_mm2.map(|a| number(a, 4));
-                let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
-                let cells = vec![escape(&s.name), count(s.nodes), or_dash(area), or_dash(centre)];
-                (false, cells)
-            })
-            .collect();
-        html += &table("Boundary sets", &head, &rows);
+    for (name, percent) in &m.volume_error_percent {
+        let name = format!("volume against the label map, {}", tissue_name(name));
+        rows.push((name, format!("{} %", fixed(*percent, 2))));
     }
-    (!html.is_empty()).then_some(html)
+    for (name, dice) in &m.dice {
+        rows.push((format!("Dice with the label map, {}", tissue_name(name)), fixed(*dice, 3)));
+    }
+    if let (Some(mean), Some(far)) = (m.surface_distance_mean_mm, m.surface_distance_95_mm) {
+        let figures = format!("{} / {} mm", fixed(mean, 2), fixed(far, 2));
+        rows.push(("distance to the border of the labels, mean / 95 %".to_owned(), figures));
+    }
+    let rows: Vec<Row> = rows.into_iter().map(|(name, value)| (false, words([name, value]))).collect();
+    html! {
+        div class="columns" {
+            (table("Mesh", &["measure".to_owned(), "value".to_owned()], &rows))
+            @if !m.dihedral_counts.is_empty() { figure { (PreEscaped(dihedral_chart(&m.dihedral_counts))) } }
+        }
+    }
+}
+
+fn boundary_sets(outcome: &ExperimentOutcome) -> Option<Markup> {
+    let head = ["set", "nodes", "area (mm²)", "centre x, y, z (mm)"].map(str::to_owned);
+    let rows: Vec<Row> = outcome
+        .sets
+        .iter()
+        .map(|s| {
+            let centre = s.centroid_mm.map(|c| c.map(|x| fixed(x, 1)).join(", "));
+            let area = s.area_mm2.map(|a| number(a, 4));
+            let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
+            let cells = [s.name.clone(), count(s.nodes), or_dash(area), or_dash(centre)];
+            (false, words(cells))
+        })
+        .collect();
+    (!rows.is_empty()).then(|| table("Boundary sets", &head, &rows))
 }
 
 fn dihedral_chart(counts: &[usize]) -> String {
@@ -264,29 +279,25 @@ fn dihedral_chart(counts: &[usize]) -> String {
 }
 
 /// Table and curves of the samples.
-pub fn samples(outcome: &ExperimentOutcome) -> String {
-    let mut html = format!("<div class=\"charts\">{}</div>\n", figures(outcome));
-    let table = sample_table(outcome);
-    if outcome.samples.len() > 20 {
-        let _ = write!(html, "<details><summary>All {} samples</summary>{table}</details>", outcome.samples.len());
-    } else {
-        html += &table;
+pub fn samples(outcome: &ExperimentOutcome) -> Markup {
+    let (table, all) = (sample_table(outcome), outcome.samples.len());
+    html! {
+        div class="charts" { (figures(outcome)) } "\n"
+        @if all > 20 { details { summary { "All " (all) " samples" } (table) } } @else { (table) }
     }
-    html
 }
 
 /// A curve, or a map for every set where two tissues form a grid.
-pub fn figures(outcome: &ExperimentOutcome) -> String {
+pub fn figures(outcome: &ExperimentOutcome) -> Markup {
     if let Some(grid) = Grid::of(outcome) {
-        return outcome.rmse_sets().iter().map(|set| grid.figure(outcome, set)).collect();
+        return html! { @for set in outcome.rmse_sets() { (grid.figure(outcome, &set)) } };
     }
-    let (curve, caption) = (curve(outcome), curve_caption(outcome));
-    format!("<figure>{curve}<figcaption>{caption}</figcaption></figure>")
+    html! { figure { (PreEscaped(curve(outcome))) figcaption { (curve_caption(outcome)) } } }
 }
 
 fn curve_caption(outcome: &ExperimentOutcome) -> String {
     let floor = outcome.noise_floor.and_then(|f| f.combined_mm());
-    let floor = floor.map_or("", |_| " Differences below the measurement error mean nothing.");
+    let floor = floor.map_or("", |_| " Differences below the noise floor mean nothing.");
     format!("RMSE of every sample; the ring marks the best one.{floor}")
 }
 
@@ -330,7 +341,7 @@ fn curve(outcome: &ExperimentOutcome) -> String {
         .map(|(set, mm)| Rule { at: *mm, name: format!("undeformed, {}", set_name(set)) })
         .collect();
     let floor = outcome.noise_floor.and_then(|f| f.combined_mm());
-    y_rules.extend(floor.map(|mm| Rule { at: mm, name: "measurement error".to_owned() }));
+    y_rules.extend(floor.map(|mm| Rule { at: mm, name: "noise floor".to_owned() }));
     let truth = outcome.reference_shear_modulus_pa.get(&tissue).filter(|_| one);
     let x_label = if one {
         format!("shear modulus of {} (Pa)", tissue_name(&tissue))
@@ -386,11 +397,13 @@ impl Grid {
         Some(Self { tissues: [a, b], moduli_pa, samples })
     }
 
-    fn figure(&self, outcome: &ExperimentOutcome, set: &str) -> String {
+    fn figure(&self, outcome: &ExperimentOutcome, set: &str) -> Markup {
         let rmse = |n: usize| outcome.samples[n].rmse_mm.get(set).copied().unwrap_or(f64::NAN);
         let values: Vec<Vec<f64>> = self.samples.iter().map(|row| row.iter().map(|n| rmse(*n)).collect()).collect();
         let title = format!("RMSE, {} (mm)", set_name(set));
-        let Some(scale) = ColourScale::over(values.iter().flatten().copied(), &title) else { return String::new() };
+        let Some(scale) = ColourScale::over(values.iter().flatten().copied(), &title) else {
+            return html! {};
+        };
         let names = |axis: usize| self.moduli_pa[axis].iter().map(|m| number(*m, 4)).collect::<Vec<_>>();
         let place = |id: &String| {
             let at = |n: &usize| &outcome.samples[*n].id == id;
@@ -408,15 +421,19 @@ impl Grid {
             chosen: outcome.best_sample.as_ref().and_then(place),
             scale,
         };
-        format!(
-            "<figure>{}<figcaption><div class=\"bar-row\">{}</div>The frame marks the best sample.</figcaption></figure>",
-            map.to_svg(),
-            colour_bar(&map.scale)
-        )
+        html! {
+            figure {
+                (PreEscaped(map.to_svg()))
+                figcaption {
+                    div class="bar-row" { (PreEscaped(colour_bar(&map.scale))) }
+                    "The frame marks the best sample."
+                }
+            }
+        }
     }
 }
 
-fn sample_table(outcome: &ExperimentOutcome) -> String {
+fn sample_table(outcome: &ExperimentOutcome) -> Markup {
     let sets = outcome.rmse_sets();
     let mut head = vec!["sample".to_owned()];
     let level_of = |s: &SampleOutcome, tissue: &String| s.sd_levels.get(tissue).copied();
@@ -430,18 +447,18 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         &outcome.tissues
     };
     for tissue in levelled {
-        let whose = if levelled.len() == 1 { String::new() } else { format!(" of {}", escape(&tissue_name(tissue))) };
+        let whose = if levelled.len() == 1 { String::new() } else { format!(" of {}", tissue_name(tissue)) };
         head.push(format!("level{whose} (SD)"));
     }
     for tissue in &outcome.tissues {
-        head.push(format!("µ of {} (Pa)", escape(&tissue_name(tissue))));
+        head.push(format!("µ of {} (Pa)", tissue_name(tissue)));
     }
-    head.extend(sets.iter().map(|set| format!("RMSE, {} (mm)", escape(&set_name(set)))));
+    head.extend(sets.iter().map(|set| format!("RMSE, {} (mm)", set_name(set))));
     let apart = outcome.samples.iter().any(|s| !s.surface_distance_mm.is_empty());
     let apart: &[String] = if apart { &sets } else { &[] };
-    head.extend(apart.iter().map(|set| format!("surfaces apart, {} (mm)", escape(&set_name(set)))));
+    head.extend(apart.iter().map(|set| format!("surfaces apart, {} (mm)", set_name(set))));
     head.extend(["largest displacement (mm)", "Newton steps", "converged"].map(str::to_owned));
-    let mut rows: Vec<(bool, Vec<String>)> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     let dash = || "–".to_owned();
     if !outcome.rest_rmse_mm.is_empty() {
         let mut row = vec!["undeformed".to_owned()];
@@ -450,11 +467,11 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         let rest_apart = &outcome.rest_surface_distance_mm;
         row.extend(apart.iter().map(|set| rest_apart.get(set).map_or_else(dash, |mm| number(*mm, 3))));
         row.extend([number(0.0, 1), dash(), dash()]);
-        rows.push((false, row));
+        rows.push((false, words(row)));
     }
     for s in &outcome.samples {
         let best = outcome.best_sample.as_deref() == Some(s.id.as_str());
-        let mut row = vec![if best { format!("{} · best", escape(&s.id)) } else { escape(&s.id) }];
+        let mut row = vec![if best { format!("{} · best", s.id) } else { s.id.clone() }];
         row.extend(levelled.iter().map(|t| s.sd_levels.get(t).map_or_else(dash, |level| signed(*level))));
         let modulus = |t: &String| s.shear_modulus_pa.get(t).map_or_else(dash, |mu| number(*mu, 4));
         row.extend(outcome.tissues.iter().map(modulus));
@@ -463,13 +480,13 @@ fn sample_table(outcome: &ExperimentOutcome) -> String {
         row.push(s.displacement_max_mm.map_or_else(dash, |mm| number(mm, 3)));
         row.push(s.newton_iterations.to_string());
         row.push(if s.converged { "yes" } else { "no" }.to_owned());
-        rows.push((best, row));
+        rows.push((best, words(row)));
     }
-    table("Samples (µ: shear modulus at rest)", &head, &rows)
+    table("Samples (µ: shear modulus, undeformed)", &head, &rows)
 }
 
 /// Residuals over Newton steps.
-pub fn convergence(outcome: &ExperimentOutcome) -> Option<String> {
+pub fn convergence(outcome: &ExperimentOutcome) -> Option<Markup> {
     let mut shown: Vec<&SampleOutcome> = outcome.samples.iter().filter(|s| s.relative_residuals.len() > 1).collect();
     // Six lines can be told apart: the best sample, then evenly through the grid.
     let best = outcome.best_sample.as_deref();
@@ -507,11 +524,14 @@ pub fn convergence(outcome: &ExperimentOutcome) -> Option<String> {
         series: series.collect(),
         ..LineChart::default()
     };
-    let unfinished: Vec<String> = outcome.samples.iter().filter(|s| !s.converged).map(|s| escape(&s.id)).collect();
+    let unfinished: Vec<String> = outcome.samples.iter().filter(|s| !s.converged).map(|s| s.id.clone()).collect();
     let verdict = if unfinished.is_empty() {
         "Every simulation reached its tolerance.".to_owned()
     } else {
         format!("Without a result: {}.", unfinished.join(", "))
     };
-    Some(format!("<p>{verdict}</p><div class=\"charts\"><figure>{}</figure></div>\n", chart.to_svg()))
+    Some(html! {
+        p { (verdict) }
+        div class="charts" { figure { (PreEscaped(chart.to_svg())) } } "\n"
+    })
 }
