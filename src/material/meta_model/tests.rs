@@ -167,7 +167,7 @@ fn points_that_determine_nothing_are_refused() {
 #[test]
 fn a_fit_as_a_material_keeps_its_shear_modulus() {
     let l = stretches(0.7, 1.3, 41);
-    for model in MetaModel::ALL {
+    for model in MetaModel::all() {
         let fit = fit(model, &l, &targets(MetaModel::MOONEY_RIVLIN, &[140.0, 166.5], &l), &exact()).unwrap();
         let material = fit.material(0.45);
         assert!((material.shear_modulus_pa() / fit.shear_modulus_pa - 1.0).abs() < 1e-12, "{model}");
