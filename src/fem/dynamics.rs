@@ -7,7 +7,7 @@
 //! one. Free fall and linear modes come out exactly as the formula says. Prescribed displacements are in place from the
 //! start.
 
-use super::body::Laws;
+use super::element::Laws;
 use super::equilibrium::{INSIDE_OUT, largest_ratio};
 use super::linear::{self, Tangent};
 use super::mass::Mass;

@@ -6,7 +6,7 @@
 //! elements are projected, so that the step still goes down. A load step that fails is halved; one that succeeds lets
 //! the next be longer.
 
-use super::body::Laws;
+use super::element::Laws;
 use super::linear::{LinearReport, LinearSolver};
 use super::model::Model;
 use super::outcome::worst;

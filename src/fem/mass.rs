@@ -1,6 +1,6 @@
 //! Mass of the free nodes: lumped, or the Galerkin matrix on the pattern of the stiffness.
 
-use super::body::Body;
+use super::element::Body;
 use super::linear::Tangent;
 use super::model::Model;
 use super::reduce::by_rows;
@@ -14,71 +14,35 @@ pub(super) struct Mass {
     blocks: Vec<f64>,
 }
 
-/// Integrals of products of shape functions over a tetrahedron of volume 1: (1 + [a = b]) / 20.
-fn linear(a: usize, b: usize) -> f64 {
-    if a == b { 0.1 } else { 0.05 }
-}
-
-/// The same for the quadratic tetrahedron with straight edges (Zienkiewicz and Taylor, vol. 1).
-fn quadratic(a: usize, b: usize) -> f64 {
-    use super::element::EDGES;
-    let at_edge = |corner: usize, edge: usize| EDGES[edge - 4].contains(&corner);
-    let entry = match (a < 4, b < 4) {
-        (true, true) => [1.0, 6.0][usize::from(a == b)],
-        (true, false) => [-6.0, -4.0][usize::from(at_edge(a, b))],
-        (false, true) => [-6.0, -4.0][usize::from(at_edge(b, a))],
-        (false, false) => {
-            let shared = EDGES[a - 4].iter().filter(|c| EDGES[b - 4].contains(c)).count();
-            [8.0, 16.0, 32.0][shared]
-        }
-    };
-    entry / 420.0
-}
-
 impl Mass {
     pub(super) fn new(model: &Model) -> Self {
         let pattern = Arc::clone(&model.pattern);
         let mut mass = Self { blocks: vec![0.0; pattern.columns.len()], pattern };
-        match &model.body {
-            Body::Tet4(e) | Body::Tet4Nodal(e, _) => {
-                let volumes = e.points.iter().map(|p| p[0].weight_m3);
-                mass.add_elements(model, &e.nodes, volumes, linear);
-            }
-            Body::Tet10(e) => {
-                let volumes = e.points.iter().map(|p| p.iter().map(|q| q.weight_m3).sum());
-                mass.add_elements(model, &e.nodes, volumes, quadratic);
-            }
-        }
+        mass.add_elements(model, model.body.as_ref());
         mass
     }
 
-    fn add_elements<const K: usize>(
-        &mut self,
-        model: &Model,
-        nodes: &[[u32; K]],
-        volumes_m3: impl Iterator<Item = f64>,
-        share: fn(usize, usize) -> f64,
-    ) {
+    fn add_elements(&mut self, model: &Model, body: &dyn Body) {
         let density = model.scenario.loads.density_kg_per_m3;
         let lumped = model.scenario.dynamics.mass == MassKind::Lumped;
-        // Diagonal scaled to the whole mass (Hinton, Rock and Zienkiewicz, 1976): a quarter each for four nodes.
-        let trace: f64 = (0..K).map(|a| share(a, a)).sum();
-        for (element, volume) in nodes.iter().zip(volumes_m3) {
-            let rows = element.map(|n| model.row_of[n as usize]);
-            for a in (0..K).filter(|&a| rows[a] != HELD) {
+        body.each_element(&mut |element, volume| {
+            // Diagonal scaled to the whole mass (Hinton, Rock and Zienkiewicz, 1976): a quarter each for four nodes.
+            let trace: f64 = (0..element.len()).map(|a| body.mass_share(a, a)).sum();
+            let row = |a: usize| model.row_of[element[a] as usize];
+            for a in (0..element.len()).filter(|&a| row(a) != HELD) {
                 if lumped {
-                    let own = self.pattern.diagonal[rows[a] as usize] as usize;
-                    self.blocks[own] += density * volume * share(a, a) / trace;
+                    let own = self.pattern.diagonal[row(a) as usize] as usize;
+                    self.blocks[own] += density * volume * body.mass_share(a, a) / trace;
                     continue;
                 }
-                for b in (0..K).filter(|&b| rows[b] != HELD) {
-                    let at = self.pattern.position(rows[a], rows[b]);
+                for b in (0..element.len()).filter(|&b| row(b) != HELD) {
+                    let at = self.pattern.position(row(a), row(b));
                     if at != HELD {
-                        self.blocks[at as usize] += density * volume * share(a, b);
+                        self.blocks[at as usize] += density * volume * body.mass_share(a, b);
                     }
                 }
             }
-        }
+        });
     }
 
     /// M x.
@@ -119,22 +83,5 @@ impl Mass {
             });
         }
         tangent
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shares_of_a_tetrahedron_sum_to_one() {
-        let sum = |n: usize, f: fn(usize, usize) -> f64| -> f64 {
-            (0..n).flat_map(|a| (0..n).map(move |b| (a, b))).map(|(a, b)| f(a, b)).sum()
-        };
-        assert!((sum(4, linear) - 1.0).abs() < 1e-15);
-        assert!((sum(10, quadratic) - 1.0).abs() < 1e-15);
-        // Rows integrate single shape functions: -1/20 at corners, 1/5 at mid-edges.
-        let row = |a: usize| (0..10).map(|b| quadratic(a, b)).sum::<f64>();
-        assert!((0..4).all(|a| (row(a) + 0.05).abs() < 1e-15) && (4..10).all(|a| (row(a) - 0.2).abs() < 1e-15));
     }
 }

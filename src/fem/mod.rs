@@ -3,7 +3,6 @@
 //! [`simulate`] answers one [`Scenario`] on one mesh; [`Model`] keeps what does not depend on the materials for sweeps
 //! and estimation. Inside, everything is SI and in a numbering of its own; outside, mm and the mesh's numbering.
 
-mod body;
 mod buoyancy;
 mod check;
 mod contact;

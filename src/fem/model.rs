@@ -1,28 +1,25 @@
 //! A mesh made ready for many solves: numbering, pattern, held nodes and loads are found once, materials come with
 //! every solve.
 
-use super::body::{Body, Laws};
 use super::buoyancy::Buoyancy;
 use super::check::{check_held_together, check_materials, check_settings, materials_of_cells, node_set};
 use super::contact::{Numbering, Supports, tethered_nodes};
-use super::element::{
-    ElementKind, Elements, Kernel, NODAL_SHARE, NodalGradient, Partition, tet4, tet10, with_mid_edge_nodes,
-};
+use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
 use super::linear::{Symbolic, Tangent};
 use super::load::{NodalForces, Sharing, nodal_forces_n};
-use super::order::{Graph, renumbered, reverse_cuthill_mckee, sorted};
+use super::order::{Graph, renumbered, reverse_cuthill_mckee};
 use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, State};
-use crate::material::law::{Material, Parameter};
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use std::sync::{Arc, OnceLock};
 
 /// A mesh with held nodes and loads, ready to be solved with any materials.
 pub struct Model {
     pub(super) scenario: Scenario,
-    pub(super) body: Body,
+    pub(super) body: Box<dyn Body>,
     pub(super) pattern: Arc<BlockPattern>,
     pub(super) partition: Partition,
     /// Row of every node in solver numbering, or [`HELD`].
@@ -67,8 +64,8 @@ impl Model {
         let mesh = &*body;
         let (material_of_cell, names) = materials_of_cells(mesh, scenario)?;
         let corners = mesh.nodes_mm().len();
-        let quadratic =
-            (scenario.solver.element == ElementKind::Tet10).then(|| with_mid_edge_nodes(corners, mesh.tets()));
+        let element = scenario.solver.element.element();
+        let quadratic = element.has_mid_edge_nodes().then(|| with_mid_edge_nodes(corners, mesh.tets()));
         let edges: &[[u32; 2]] = quadratic.as_ref().map_or(&[], |(_, edges)| edges);
         let nodes = corners + edges.len();
 
@@ -167,32 +164,24 @@ impl Model {
         let buoyancy = buoyancy.map(|b| b.ordered(&order));
         let pattern = Arc::new(BlockPattern::new(&renumbered(&graph, &order, &number), &row_of));
 
-        let body = if let Some((tets, _)) = &quadratic {
-            let (tets, materials, cells) = sorted(tets, &number, &material_of_cell);
-            let points = tet10(&nodes_m, &tets);
-            Body::Tet10(Elements::new(tets, points, materials, cells, &row_of, &pattern))
-        } else {
-            let (tets, materials, cells) = sorted(mesh.tets(), &number, &material_of_cell);
-            let points = tet4(&nodes_m, &tets);
-            let elements = Elements::new(tets, points, materials, cells, &row_of, &pattern);
-            if scenario.solver.element == ElementKind::Tet4Nodal {
-                let nodal = Box::new(NodalGradient::new(&elements, &row_of));
-                Body::Tet4Nodal(elements, nodal)
-            } else {
-                Body::Tet4(elements)
-            }
-        };
-        let partition = match &body {
-            Body::Tet4(e) | Body::Tet4Nodal(e, _) => e.partition(&row_of, &pattern),
-            Body::Tet10(e) => e.partition(&row_of, &pattern),
-        };
+        let body = element.body(&Numbered {
+            number: &number,
+            nodes_m: &nodes_m,
+            material_of_cell: &material_of_cell,
+            tets: mesh.tets(),
+            with_mid_edge_nodes: quadratic.as_ref().map_or(&[], |(tets, _)| tets),
+            row_of: &row_of,
+            pattern: &pattern,
+        });
+        let partition = body.partition(&row_of, &pattern);
         let mut warnings = unstable_laws(&scenario.materials);
-        if scenario.solver.element == ElementKind::Tet4 {
+        if let Some(limit) = element.locks_above() {
             let stiffest = scenario.materials.values().map(Material::poisson_ratio).fold(0.0, f64::max);
-            if stiffest > 0.47 {
+            if stiffest > limit {
                 warnings.push(format!(
-                    "tet4 locks at Poisson's ratio {stiffest}: displacements come out too small; \
-                     `element = \"tet4-nodal\"` does not"
+                    "{} locks at Poisson's ratio {stiffest}: displacements come out too small; \
+                     `element = \"tet4-nodal\"` does not",
+                    element.name()
                 ));
             }
         }
@@ -231,13 +220,7 @@ impl Model {
 
     /// Elimination order of the direct solver; `None` when there is not enough memory.
     pub(super) fn symbolic(&self) -> Option<Arc<Symbolic>> {
-        let new = || {
-            let rings = match &self.body {
-                Body::Tet4Nodal(_, nodal) => Some(nodal.rings()),
-                _ => None,
-            };
-            Symbolic::new(&self.pattern, rings, &self.positions_of_rows()).map(Arc::new)
-        };
+        let new = || Symbolic::new(&self.pattern, self.body.rings(), &self.positions_of_rows()).map(Arc::new);
         self.symbolic.get_or_init(new).clone()
     }
 
@@ -280,17 +263,7 @@ impl Model {
             .iter()
             .map(|name| materials.get(name).cloned().ok_or_else(|| missing(name)))
             .collect::<Result<_, _>>()?;
-        let part = |m: &Material, part: f64| m.scaled(Parameter::Stiffness, part).unwrap_or_else(|| m.clone());
-        Ok(match self.body {
-            Body::Tet4Nodal(..) => Laws {
-                kernels: materials.iter().map(|m| Kernel::new(&part(m, 1.0 - NODAL_SHARE), 0.0)).collect(),
-                nodal: materials.iter().map(|m| part(m, NODAL_SHARE).law_with_lambda(m.lame_lambda_pa())).collect(),
-            },
-            _ => Laws {
-                kernels: materials.iter().map(|m| Kernel::new(m, m.lame_lambda_pa())).collect(),
-                nodal: Vec::new(),
-            },
-        })
+        Ok(self.body.laws(&materials))
     }
 
     /// Stored energy of body, walls and springs, J.

@@ -1,7 +1,7 @@
 //! What a simulation answers.
 
-use super::body::{Body, Laws};
 use super::contact::ContactOutcome;
+use super::element::Laws;
 use super::model::Model;
 use serde::{Deserialize, Serialize};
 
@@ -122,11 +122,7 @@ impl Model {
             let held = self.held_of_row(self.row_of[new]);
             [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
         };
-        let mut density: Vec<f64> = state.iter().map(|s| s[2]).collect();
-        if let Body::Tet4Nodal(elements, nodal) = &self.body {
-            let averaged = nodal.energy_density(u, &laws.nodal);
-            elements.cell.iter().zip(averaged).for_each(|(&cell, extra)| density[cell as usize] += extra);
-        }
+        let density: Vec<f64> = state.iter().map(|s| s[2]).collect();
 
         let worst_cell = worst(&state);
         let convergence = ConvergenceRecord { worst_cell, worst_volume_ratio: state[worst_cell][1], ..convergence };

@@ -181,7 +181,7 @@ impl Default for SolverSettings {
         Self {
             method: Method::Static,
             relative_residual: 1e-8,
-            element: ElementKind::Tet4,
+            element: ElementKind::TET4,
             linear: LinearMethod::Auto,
             newton_iterations: 50,
             smallest_load_step: 1.0 / 256.0,

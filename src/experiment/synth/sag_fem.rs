@@ -61,7 +61,7 @@ pub fn by_finite_elements(
             density_kg_per_m3: settings.effective_density_kg_per_m3,
             ..Loads::default()
         },
-        solver: SolverSettings { element: ElementKind::Tet4Nodal, ..SolverSettings::default() },
+        solver: SolverSettings { element: ElementKind::TET4_NODAL, ..SolverSettings::default() },
         ..Scenario::default()
     };
     let outcome = simulate(&tissue, &scenario, &|_| ()).map_err(|e| failed(e.to_string()))?;

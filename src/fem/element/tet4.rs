@@ -1,13 +1,61 @@
 //! The linear tetrahedron: constant gradient, one point.
 
+use super::assembly::Elements;
+use super::definition::{Body, Element, Numbered};
+use super::plain::Plain;
 use super::point::{Point, barycentric_gradients};
+use crate::fem::order::sorted;
 
-/// The single point of every tetrahedron; nodes in m.
-pub(in super::super) fn tet4(nodes_m: &[[f64; 3]], tets: &[[u32; 4]]) -> Vec<[Point<4>; 1]> {
-    tets.iter()
+/// The element; it locks towards nu = 0.5.
+pub(super) struct Tet4;
+
+impl Element for Tet4 {
+    fn name(&self) -> &'static str {
+        "tet4"
+    }
+
+    fn aliases(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn has_mid_edge_nodes(&self) -> bool {
+        false
+    }
+
+    fn locks_above(&self) -> Option<f64> {
+        Some(0.47)
+    }
+
+    fn body(&self, mesh: &Numbered) -> Box<dyn Body> {
+        Box::new(Plain { elements: elements(mesh), mass_share })
+    }
+}
+
+/// Linear elements of a mesh.
+pub(super) fn elements(mesh: &Numbered) -> Elements<4, 1> {
+    let (tets, materials, cells) = sorted(mesh.tets, mesh.number, mesh.material_of_cell);
+    let points = tets
+        .iter()
         .map(|tet| {
-            let (gradients, weight_m3) = barycentric_gradients(tet.map(|n| nodes_m[n as usize]));
+            let (gradients, weight_m3) = barycentric_gradients(tet.map(|n| mesh.nodes_m[n as usize]));
             [Point { weight_m3, gradients }]
         })
-        .collect()
+        .collect();
+    Elements::new(tets, points, materials, cells, mesh.row_of, mesh.pattern)
+}
+
+/// Integrals of products of shape functions over a tetrahedron of volume 1: (1 + [a = b]) / 20.
+pub(super) fn mass_share(a: usize, b: usize) -> f64 {
+    if a == b { 0.1 } else { 0.05 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_a_tetrahedron_sum_to_one() {
+        let sum: f64 = (0..4).flat_map(|a| (0..4).map(move |b| mass_share(a, b))).sum();
+        assert!((sum - 1.0).abs() < 1e-15);
+    }
 }

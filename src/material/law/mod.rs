@@ -17,6 +17,7 @@ mod stability;
 mod verification;
 mod volume;
 
+pub mod gent;
 pub mod literature;
 pub mod mooney_rivlin;
 pub mod neo_hookean;
@@ -36,10 +37,11 @@ pub use stability::{Stability, StabilityRange};
 pub use stable_neo_hookean::StableNeoHookean;
 
 /// The laws, in the order in which they are shown.
-pub static LAWS: [&dyn Law; 5] = [
+pub static LAWS: [&dyn Law; 6] = [
     &neo_hookean::Definition,
     &mooney_rivlin::Definition,
     &ogden::Definition,
     &stable_neo_hookean::Definition,
+    &gent::Definition,
     &literature::Definition,
 ];

@@ -1,6 +1,7 @@
 //! The embedded table against figures computed elsewhere, and tables that must be refused.
 
 use super::*;
+use crate::material::form::Form;
 
 /// W in Pa of each model as the published program has it, at the window's lower end, half way from there to rest, half way from rest to the
 /// upper end and at the upper end; computed in 80-bit arithmetic from the textbook expressions.

@@ -139,7 +139,7 @@ fn to_frame(complex: &Complex, field: &LabelField) -> Result<TetMesh, MeshError>
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::settings::MidplaneSplit;
     use super::super::sizing::{LabelEdge, Sizing, WallEdge};
     use super::*;
@@ -148,7 +148,7 @@ mod tests {
     use crate::mesh::quality::{shape_quality, surface_distance};
 
     /// A ball of radius 20 mm in a shell of radius 30 mm, off centre in a mirrored, shifted grid.
-    pub(super) fn ball_in_shell() -> LabelMap<Mni> {
+    pub fn ball_in_shell() -> LabelMap<Mni> {
         let mut m = nalgebra::Matrix4::from_diagonal(&nalgebra::Vector4::new(-1.5, 1.5, 1.5, 1.0));
         m.fixed_view_mut::<3, 1>(0, 3).copy_from(&nalgebra::Vector3::new(40.0, -35.0, -38.0));
         let grid = Grid::new([52, 50, 51], m).unwrap();

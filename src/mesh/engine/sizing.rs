@@ -222,7 +222,7 @@ pub(crate) fn interface_seeds(field: &LabelField, per_part: usize) -> Vec<Point>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::engine::tests::ball_in_shell;
+    use crate::mesh::engine::meshing::tests::ball_in_shell;
 
     #[test]
     fn edges_have_their_factor_at_the_wall_and_grow_gently_from_there() {

@@ -260,7 +260,7 @@ impl<'a> File<'a> {
         if kind != "UnstructuredGrid" {
             return Err(self.unsupported("VTKFile", format!("type `{kind}`: only UnstructuredGrid holds tetrahedra")));
         }
-        self.marked = get(MARKED)?.is_some();
+        let marked = get(MARKED)?.is_some();
         self.storage = Storage {
             big_endian: get("byte_order")?.as_deref() == Some("BigEndian"),
             header_bytes: if get("header_type")?.as_deref() == Some("UInt64") { 8 } else { 4 },
@@ -272,6 +272,7 @@ impl<'a> File<'a> {
                 }
             },
         };
+        self.marked = marked;
         Ok(())
     }
 

@@ -81,7 +81,7 @@ impl Default for EstimateOptions {
             observed: Observed::default(),
             displacement: DisplacementSettings::default(),
             correlation_mm: 5.0,
-            element: ElementKind::Tet4Nodal,
+            element: ElementKind::TET4_NODAL,
             model_log_sd: 0.15,
             density: false,
             density_log_sd: 0.56,
