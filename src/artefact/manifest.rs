@@ -1,5 +1,6 @@
 //! What is known of a file: where it came from, by which settings.
 
+use super::reason::Reason;
 use super::write::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -50,11 +51,11 @@ impl Manifest {
         sha256_hex(all.as_bytes())
     }
 
-    /// One line per output that is not in `folder` as it was written.
-    pub fn changed_outputs(&self, folder: &Path) -> Vec<String> {
+    /// A reason per output that is not in `folder` as it was written.
+    pub fn changed_outputs(&self, folder: &Path) -> Vec<Reason> {
         let change = |(name, record): (&String, &OutputRecord)| match std::fs::read(folder.join(name)) {
-            Err(_) => Some(format!("output `{name}` is missing")),
-            Ok(bytes) if sha256_hex(&bytes) != record.sha256 => Some(format!("output `{name}` was changed")),
+            Err(_) => Some(Reason::OutputMissing { file: name.clone() }),
+            Ok(bytes) if sha256_hex(&bytes) != record.sha256 => Some(Reason::OutputChanged { file: name.clone() }),
             Ok(_) => None,
         };
         self.outputs.iter().filter_map(change).collect()
@@ -66,11 +67,11 @@ impl Manifest {
         self.outputs.keys().for_each(|name| remove_output(folder, name));
     }
 
-    /// One line per earlier stage whose files in `folder` are not those this stage was made from.
-    pub fn changed_stages(&self, folder: &Path) -> Vec<String> {
+    /// A reason per earlier stage whose files in `folder` are not those this stage was made from.
+    pub fn changed_stages(&self, folder: &Path) -> Vec<Reason> {
         let change = |(role, sum): (&String, &String)| {
             let earlier = Self::of_stage(folder, role.strip_prefix("stage ")?)?;
-            (earlier.made_sha256() != *sum).then(|| format!("input `{role}` changed"))
+            (earlier.made_sha256() != *sum).then(|| Reason::Input { role: role.clone() })
         };
         self.inputs.iter().filter_map(change).collect()
     }

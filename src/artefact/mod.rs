@@ -5,9 +5,11 @@
 //! every output still has the bytes the manifest names.
 
 mod manifest;
+mod reason;
 mod stage;
 mod write;
 
 pub use manifest::{Manifest, OutputRecord, Provenance};
+pub use reason::Reason;
 pub use stage::{Produced, Stage, StageError, StageOutcome};
 pub use write::{WriteError, no_more_writes, sha256_hex, write_whole};

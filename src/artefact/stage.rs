@@ -1,6 +1,7 @@
 //! A stage on disk: skipped when nothing that matters has changed.
 
 use super::manifest::{Manifest, OutputRecord, Provenance, remove_output};
+use super::reason::Reason;
 use super::write::{WriteError, sha256_hex, write_whole};
 use serde::Serialize;
 use serde_json::Value;
@@ -36,7 +37,7 @@ pub struct StageOutcome {
     /// Whether the files were already there.
     pub skipped: bool,
     /// Why it ran (see [`Stage::why`]); empty when it was skipped or forced.
-    pub reasons: Vec<String>,
+    pub reasons: Vec<Reason>,
     /// The manifest, old or new.
     pub manifest: Manifest,
 }
@@ -133,21 +134,21 @@ impl Stage {
         Manifest::of_stage(&self.folder, &self.name)
     }
 
-    /// Why the stage would run now: one line per changed input or setting; empty when it would be skipped.
-    pub fn why(&self) -> Vec<String> {
+    /// Why the stage would run now: a reason per changed input or setting; empty when it would be skipped.
+    pub fn why(&self) -> Vec<Reason> {
         let Some(old) = self.previous() else {
-            return vec!["it has not finished before".to_owned()];
+            return vec![Reason::NotFinished];
         };
         let mut reasons = Vec::new();
         for role in self.inputs.keys().chain(old.inputs.keys().filter(|role| !self.inputs.contains_key(*role))) {
             if self.inputs.get(role) != old.inputs.get(role) {
-                reasons.push(format!("input `{role}` changed"));
+                reasons.push(Reason::Input { role: role.clone() });
             }
         }
         changed_settings("", &old.settings, &self.settings, &mut reasons);
         reasons.extend(old.changed_outputs(&self.folder));
         if reasons.is_empty() && old.key != self.key() {
-            reasons.push("the program, the stage's code or the seed changed".to_owned());
+            reasons.push(Reason::Program);
         }
         reasons
     }
@@ -211,7 +212,7 @@ impl Stage {
     }
 }
 
-fn changed_settings(path: &str, old: &Value, new: &Value, reasons: &mut Vec<String>) {
+fn changed_settings(path: &str, old: &Value, new: &Value, reasons: &mut Vec<Reason>) {
     if let (Value::Object(a), Value::Object(b)) = (old, new) {
         for name in b.keys().chain(a.keys().filter(|name| !b.contains_key(*name))) {
             let dotted = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
@@ -223,7 +224,7 @@ fn changed_settings(path: &str, old: &Value, new: &Value, reasons: &mut Vec<Stri
             );
         }
     } else if old != new {
-        reasons.push(format!("setting `{path}` changed from {old} to {new}"));
+        reasons.push(Reason::Setting { name: path.to_owned(), old: old.clone(), new: new.clone() });
     }
 }
 
@@ -249,15 +250,26 @@ mod tests {
         };
         assert!(!stage(b"1", 1).run(false, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped);
         assert!(stage(b"1", 1).run(false, never).unwrap().skipped);
-        assert_eq!(stage(b"2", 1).why(), ["input `scan` changed"]);
-        assert_eq!(stage(b"1", 2).why(), ["setting `depth` changed from 1 to 2"]);
+        assert_eq!(stage(b"2", 1).why(), [Reason::Input { role: "scan".to_owned() }]);
+        assert_eq!(stage(b"1", 2).why()[0].to_string(), "setting `depth` changed from 1 to 2");
         assert!(
             !stage(b"1", 1).run(true, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped,
             "--force computes again"
         );
         std::fs::write(folder.path().join("a/x.txt"), "tampered").unwrap();
-        assert_eq!(stage(b"1", 1).why(), ["output `a/x.txt` was changed"]);
+        assert_eq!(stage(b"1", 1).why(), [Reason::OutputChanged { file: "a/x.txt".to_owned() }]);
         assert!(!stage(b"1", 1).run(false, || Ok::<_, Infallible>(produce("hello"))).unwrap().skipped);
+    }
+
+    #[test]
+    fn a_file_that_is_made_no_more_goes_with_its_manifest() {
+        let folder = tempfile::tempdir().unwrap();
+        let stage = |setting: i32| Stage::new("s", 1, folder.path(), &setting);
+        stage(1).run(false, || Ok::<_, Infallible>(produce("hello"))).unwrap();
+        let other = || Produced { files: vec![("b.txt".to_owned(), vec![1])], ..Produced::default() };
+        stage(2).run(false, || Ok::<_, Infallible>(other())).unwrap();
+        assert!(folder.path().join("b.txt").exists());
+        assert_eq!(std::fs::read_dir(folder.path().join("a")).unwrap().count(), 0);
     }
 
     #[test]
@@ -266,6 +278,6 @@ mod tests {
         let stage = Stage::new("s", 1, folder.path(), &());
         assert!(stage.run(false, || Err::<Produced, _>("no")).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        assert_eq!(stage.why(), ["it has not finished before"]);
+        assert_eq!(stage.why(), [Reason::NotFinished]);
     }
 }

@@ -19,15 +19,8 @@ pub struct Args {
     #[command(flatten)]
     prior: PriorOptions,
     /// Only every N-th sample, beginning with the K-th (from 1); any order, any machine, the same bytes
-    #[arg(long, value_name = "K/N", value_parser = shard)]
+    #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-}
-
-fn shard(text: &str) -> Result<Shard, String> {
-    let wrong = || format!("`{text}` is not K/N with 1 <= K <= N, such as 2/4");
-    let (number, of) = text.split_once('/').ok_or_else(wrong)?;
-    let (number, of): (usize, usize) = (number.parse().map_err(|_| wrong())?, of.parse().map_err(|_| wrong())?);
-    if (1..=of).contains(&number) { Ok(Shard { number, of }) } else { Err(wrong()) }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -45,17 +38,4 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.emit(&case.outcome()?, &in_words(&case, Goal::Sweep)?)?;
     }
     Ok(case.quality_gate()?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shard_is_a_part_of_a_whole() {
-        assert_eq!(shard("2/4"), Ok(Shard { number: 2, of: 4 }));
-        for wrong in ["0/4", "5/4", "1", "a/b", "1/", "-1/2"] {
-            assert!(shard(wrong).unwrap_err().contains(wrong));
-        }
-    }
 }

@@ -39,7 +39,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     let line = |e: &Explained| {
-        let what = if e.would_run { e.reasons.join("; ") } else { "up to date".to_owned() };
+        let what = if e.would_run {
+            e.reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+        } else {
+            "up to date".to_owned()
+        };
         format!("{:<16} {what}\n", e.stage)
     };
     let text: String = explained.iter().map(line).collect();

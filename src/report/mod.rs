@@ -11,6 +11,7 @@ pub mod hand_off;
 pub mod html;
 pub mod lettering;
 pub mod material_figure;
+pub mod material_tables;
 pub mod median_samples;
 pub mod mesh_figure;
 pub mod page;

@@ -4,7 +4,7 @@ use super::error::WorkflowError;
 use super::plan::{StageName, Subject};
 use super::settings::Settings;
 use super::stages::{EstimateFacts, MeshFacts};
-use crate::artefact::Manifest;
+use crate::artefact::{Manifest, Reason};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::mesh::TetMesh;
@@ -44,14 +44,18 @@ pub enum CaseError {
     Patient { folder: PathBuf },
     #[error("{}: the case was made from another {which} scan", folder.display())]
     OtherScan { folder: PathBuf, which: &'static str },
-    #[error("{}: {what} is not of the present state: {}", folder.display(), reasons.join("; "))]
-    Stale { folder: PathBuf, what: String, reasons: Vec<String> },
+    #[error("{}: {what} is not of the present state: {}", folder.display(), in_words(reasons))]
+    Stale { folder: PathBuf, what: String, reasons: Vec<Reason> },
     #[error("{}: another job works in this folder{}", folder.display(), by(holder))]
     Held { folder: PathBuf, holder: String },
     #[error("the phantom in this folder has {made} and {asked} were asked for", made = tissues(*made), asked = tissues(*asked))]
     OtherTissues { made: usize, asked: usize },
     #[error("{}: no result holds an array `{name}`", folder.display())]
     NoField { folder: PathBuf, name: String },
+}
+
+fn in_words(reasons: &[Reason]) -> String {
+    reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
 fn by(holder: &str) -> String {

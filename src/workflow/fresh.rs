@@ -4,7 +4,7 @@
 use super::case::{Case, CaseError};
 use super::error::WorkflowError;
 use super::plan::{StageName, Subject};
-use crate::artefact::{Manifest, sha256_hex};
+use crate::artefact::{Manifest, Reason, sha256_hex};
 use crate::layout;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,7 +51,7 @@ impl Case {
     /// # Errors
     /// [`CaseError::Stale`] with what has changed since it was gathered.
     pub fn check_outcome(&self) -> Result<(), WorkflowError> {
-        let stale = |reason: String| {
+        let stale = |reason: Reason| {
             let folder = self.folder().to_path_buf();
             Err(CaseError::Stale { folder, what: layout::OUTCOME.to_owned(), reasons: vec![reason] }.into())
         };
@@ -64,14 +64,14 @@ impl Case {
         let provenance: Provenance = serde_json::from_str(&text).map_err(damaged)?;
         for (file, sum) in &provenance.gathered {
             if sha256_hex(&self.read(file)?) != *sum {
-                return stale(format!("{file} is not the one it was gathered with"));
+                return stale(Reason::OutputChanged { file: file.clone() });
             }
         }
         for record in &provenance.stages {
             match Manifest::of_stage(self.folder(), &record.stage) {
-                None => return stale(format!("stage {} was taken away or not finished", record.stage)),
+                None => return stale(Reason::Input { role: format!("stage {}", record.stage) }),
                 Some(now) if StageRecord::of(&now) != *record => {
-                    return stale(format!("stage {} was made again", record.stage));
+                    return stale(Reason::Input { role: format!("stage {}", record.stage) });
                 }
                 Some(_) => {}
             }

@@ -18,6 +18,7 @@ use crate::fem::Scenario;
 use crate::layout::REST_MESH;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use std::str::FromStr;
 
 /// A part of a sweep's samples (see [`shard`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +27,17 @@ pub struct Shard {
     pub number: usize,
     /// Of how many.
     pub of: usize,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not K/N with 1 <= K <= N, such as 2/4");
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let (number, of): (usize, usize) = (number.parse().map_err(|_| wrong())?, of.parse().map_err(|_| wrong())?);
+        if (1..=of).contains(&number) { Ok(Self { number, of }) } else { Err(wrong()) }
+    }
 }
 
 /// The stages of images, with their figures.
@@ -261,6 +273,19 @@ impl<'w, 'a> Patient<'w, 'a> {
             noise_floor: Some(self.floor()),
             loads: vec![loads],
             ..self.prepared.outcome()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shard_is_a_part_of_a_whole() {
+        assert_eq!("2/4".parse(), Ok(Shard { number: 2, of: 4 }));
+        for wrong in ["0/4", "5/4", "1", "a/b", "1/", "-1/2"] {
+            assert!(wrong.parse::<Shard>().unwrap_err().contains(wrong));
         }
     }
 }

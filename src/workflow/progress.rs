@@ -1,6 +1,7 @@
 //! How a job tells whoever started it what it is doing.
 
 use super::plan::StageName;
+use crate::artefact::Reason;
 
 /// Listens to a job. Every method may be left out.
 #[allow(unused_variables, reason = "the names say what is handed over")]
@@ -29,7 +30,7 @@ pub struct StageEnded<'a> {
     /// Whether its files were there already.
     pub skipped: bool,
     /// Why it was made again; empty where it was skipped, new or asked for.
-    pub reasons: &'a [String],
+    pub reasons: &'a [Reason],
     /// What a reader must know of its files.
     pub warnings: &'a [String],
 }

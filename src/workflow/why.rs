@@ -7,7 +7,7 @@ use super::plan::{self, Goal, StageName, Subject, plan};
 use super::progress::Silent;
 use super::stages;
 use super::work::{Made, Place, Work};
-use crate::artefact::{Manifest, Stage, sha256_hex};
+use crate::artefact::{Manifest, Reason, Stage, sha256_hex};
 use crate::workflow::settings::Settings;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub struct Explained {
     /// Whether it would run.
     pub would_run: bool,
     /// Why.
-    pub reasons: Vec<String>,
+    pub reasons: Vec<Reason>,
 }
 
 /// Which stages of a case would run again if the job were done with these settings, and why.
@@ -53,7 +53,7 @@ pub fn why(asked: &Asked, place: &Place, settings: &Settings) -> Result<Vec<Expl
     Ok(explained)
 }
 
-fn entry(stage: &str, reasons: Vec<String>) -> Explained {
+fn entry(stage: &str, reasons: Vec<Reason>) -> Explained {
     Explained { stage: stage.to_owned(), would_run: !reasons.is_empty(), reasons }
 }
 
@@ -120,6 +120,6 @@ fn follow(explained: &mut [Explained], recorded: &[Manifest]) {
             continue;
         }
         explained[n].would_run = true;
-        explained[n].reasons = vec![format!("it follows {}, unless that makes the same again", moved.join(" and "))];
+        explained[n].reasons = vec![Reason::Follows { stages: moved }];
     }
 }

@@ -69,6 +69,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("error", &["report", &at("nowhere")]);
     prints("doctor", &["doctor"]);
     prints("schema", &["schema"]);
+    prints("layout", &["layout"]);
     prints("completions", &["completions", "fish"]);
     prints("man", &["man", "-o", &at("pages")]);
     prints("synth", &["synth", "--spacing-mm", "4", "-o", &at("synth")]);

@@ -6,10 +6,10 @@ use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
 use crate::material::Task;
 use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior, nine_levels, sample_prior};
-use crate::material::gp::{JointPosterior, Spread};
-use crate::material::meta_model::{Fit, FitError, MetaModel};
+use crate::material::gp::Spread;
+use crate::material::meta_model::{FitError, MetaModel};
+use crate::report::material_tables::{Sampled, curves_csv, materials_csv, posterior_csv, quantiles};
 use anyhow::anyhow;
-use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -57,14 +57,6 @@ fn spread(text: &str) -> Result<Spread, String> {
         "study" => Ok(Spread::Study),
         _ => Err("say tissue or study".to_owned()),
     }
-}
-
-/// One material, from a level or a draw.
-#[derive(Serialize)]
-struct Sampled {
-    sd_level: Option<f64>,
-    draw: Option<u64>,
-    fit: Fit,
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -123,17 +115,6 @@ fn shown(sampled: &[Sampled]) -> Vec<&Sampled> {
     sampled.iter().take(20).collect()
 }
 
-fn quantiles(sampled: &[Sampled]) -> serde_json::Value {
-    let mut moduli: Vec<f64> = sampled.iter().map(|s| s.fit.shear_modulus_pa).collect();
-    moduli.sort_by(f64::total_cmp);
-    let at = |p: f64| moduli[((moduli.len() - 1) as f64 * p).round() as usize];
-    json!({
-        "count": moduli.len(), "stable": sampled.iter().filter(|s| s.fit.stability.everywhere()).count(),
-        "lowest": at(0.0), "p2.5": at(0.025), "p16": at(0.16), "median": at(0.5), "p84": at(0.84), "p97.5": at(0.975),
-        "highest": at(1.0),
-    })
-}
-
 fn summary(facts: &serde_json::Value, file: &str) -> String {
     let mut text = String::new();
     let rows = facts["materials"].as_array().map_or(&[][..], Vec::as_slice);
@@ -162,45 +143,4 @@ fn summary(facts: &serde_json::Value, file: &str) -> String {
         );
     }
     text + file
-}
-
-fn materials_csv(sampled: &[Sampled], law: MetaModel) -> String {
-    let names = law.parameter_names().join(",");
-    let mut text = format!("sd_level,draw,law,{names},shear_modulus_pa,cost,r_squared,stable\n");
-    for s in sampled {
-        let level = s.sd_level.map_or_else(String::new, |v| v.to_string());
-        let draw = s.draw.map_or_else(String::new, |v| v.to_string());
-        let parameters: Vec<String> = s.fit.parameters.iter().map(ToString::to_string).collect();
-        let Fit { shear_modulus_pa, cost, r_squared, stability, .. } = &s.fit;
-        let stable = stability.everywhere();
-        let parameters = parameters.join(",");
-        let _ = writeln!(text, "{level},{draw},{law},{parameters},{shear_modulus_pa},{cost},{r_squared},{stable}");
-    }
-    text
-}
-
-fn posterior_csv(joint: &JointPosterior) -> String {
-    let prior = &joint.prior;
-    let mut text = String::from("stretch,mean_ln_pa,latent_sd,observation_sd\n");
-    for i in 0..prior.stretches.len() {
-        let (mean, latent, observation) = (prior.mean[i], prior.latent_sd[i], prior.observation_sd[i]);
-        let _ = writeln!(text, "{},{mean},{latent},{observation}", prior.stretches[i]);
-    }
-    text
-}
-
-/// One row a stretch, one column a draw, ln(W / Pa + offset).
-fn curves_csv(joint: &JointPosterior, draws: u64, seed: u64, spread: Spread) -> String {
-    let curves: Vec<Vec<f64>> = (0..draws).map(|draw| joint.draw(seed, draw, spread)).collect();
-    let mut text = String::from("stretch");
-    for draw in 0..draws {
-        let _ = write!(text, ",draw_{draw}");
-    }
-    for (i, stretch) in joint.prior.stretches.iter().enumerate() {
-        let _ = write!(text, "\n{stretch}");
-        for curve in &curves {
-            let _ = write!(text, ",{}", curve[i]);
-        }
-    }
-    text + "\n"
 }

@@ -12,8 +12,8 @@ use crate::material::statistics::{COMPARED, Comparison, CostDigits, compare};
 use crate::material::task::stretches;
 use crate::material::training::TrainingData;
 use crate::report::material_figure::{FittedCurve, meta_model_figure, posterior_figure};
+use crate::report::material_tables::{TaskModuli, moduli_csv};
 use anyhow::anyhow;
-use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -36,13 +36,6 @@ pub struct Args {
     /// Where to write
     #[arg(short, long, value_name = "DIR", default_value = "gp")]
     output: PathBuf,
-}
-
-/// Shear moduli of one task, Pa, at the nine levels.
-#[derive(Serialize)]
-struct Row {
-    task: String,
-    shear_modulus_pa: Vec<f64>,
 }
 
 /// Points over a window: the published table's and, for the tests between laws, the published tests'.
@@ -72,7 +65,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             let prior = prior(task, TABLE_STRETCHES);
             let moduli = sample_prior(&prior, &nine_levels(), &settings)?;
             let shear_modulus_pa = moduli.iter().map(|m| m.shear_modulus_pa).collect();
-            rows.push(Row { task: task.to_string(), shear_modulus_pa });
+            rows.push(TaskModuli { task: task.to_string(), shear_modulus_pa });
             let own = studies.models.iter().filter(|model| model.task == task);
             panels.push((prior, own.map(|model| model.curve(studies.curves)).collect()));
         }
@@ -122,21 +115,7 @@ fn fitted(model: &LiteratureModel, studies: &Studies, settings: &SampleSettings)
     Ok(FittedCurve { name: format!("{}: {} ({})", model.id, model.study, model.citation), curve, fits })
 }
 
-fn moduli_csv(rows: &[Row]) -> String {
-    let mut text = String::from("task");
-    for level in nine_levels() {
-        let _ = write!(text, ",{level}");
-    }
-    for row in rows {
-        let _ = write!(text, "\n{}", row.task);
-        for modulus in &row.shear_modulus_pa {
-            let _ = write!(text, ",{modulus}");
-        }
-    }
-    text + "\n"
-}
-
-fn text(rows: &[Row], tests: &[(String, Comparison)]) -> String {
+fn text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> String {
     let mut text = format!("{:<22}", "shear modulus (Pa), sd");
     for level in nine_levels() {
         let _ = write!(text, "{level:>11.1}");

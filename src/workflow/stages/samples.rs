@@ -68,8 +68,7 @@ pub(crate) fn samples(
             && let Some(reason) = stage.why().first()
         {
             // The values are this program's data; the user's own are in the settings file.
-            let reason = reason.split(" changed from ").next().unwrap_or(reason).to_owned();
-            return Err(WorkflowError::SampleMissing { sample: sample.id.clone(), reason });
+            return Err(WorkflowError::SampleMissing { sample: sample.id.clone(), reason: reason.in_short() });
         }
         let name = StageName::Sample(sample.id.clone());
         let mut own = made.clone();

@@ -1,0 +1,98 @@
+//! Tables of sampled materials: one line a material, the posterior and the drawn curves over the stretch.
+
+use crate::material::generative::nine_levels;
+use crate::material::gp::{JointPosterior, Spread};
+use crate::material::meta_model::{Fit, MetaModel};
+use serde::Serialize;
+use serde_json::json;
+use std::fmt::Write;
+
+/// One material, from a level or a draw.
+#[derive(Clone, Debug, Serialize)]
+pub struct Sampled {
+    /// Standard deviations from the mean, of a level.
+    pub sd_level: Option<f64>,
+    /// Its number, of a draw.
+    pub draw: Option<u64>,
+    /// The law fitted.
+    pub fit: Fit,
+}
+
+/// How the shear moduli of some materials are spread.
+pub fn quantiles(sampled: &[Sampled]) -> serde_json::Value {
+    let mut moduli: Vec<f64> = sampled.iter().map(|s| s.fit.shear_modulus_pa).collect();
+    moduli.sort_by(f64::total_cmp);
+    let at = |p: f64| moduli[((moduli.len() - 1) as f64 * p).round() as usize];
+    json!({
+        "count": moduli.len(), "stable": sampled.iter().filter(|s| s.fit.stability.everywhere()).count(),
+        "lowest": at(0.0), "p2.5": at(0.025), "p16": at(0.16), "median": at(0.5), "p84": at(0.84), "p97.5": at(0.975),
+        "highest": at(1.0),
+    })
+}
+
+/// A line per material.
+pub fn materials_csv(sampled: &[Sampled], law: MetaModel) -> String {
+    let names = law.parameter_names().join(",");
+    let mut text = format!("sd_level,draw,law,{names},shear_modulus_pa,cost,r_squared,stable\n");
+    for s in sampled {
+        let level = s.sd_level.map_or_else(String::new, |v| v.to_string());
+        let draw = s.draw.map_or_else(String::new, |v| v.to_string());
+        let parameters: Vec<String> = s.fit.parameters.iter().map(ToString::to_string).collect();
+        let Fit { shear_modulus_pa, cost, r_squared, stability, .. } = &s.fit;
+        let stable = stability.everywhere();
+        let parameters = parameters.join(",");
+        let _ = writeln!(text, "{level},{draw},{law},{parameters},{shear_modulus_pa},{cost},{r_squared},{stable}");
+    }
+    text
+}
+
+/// The posterior over the stretch.
+pub fn posterior_csv(joint: &JointPosterior) -> String {
+    let prior = &joint.prior;
+    let mut text = String::from("stretch,mean_ln_pa,latent_sd,observation_sd\n");
+    for i in 0..prior.stretches.len() {
+        let (mean, latent, observation) = (prior.mean[i], prior.latent_sd[i], prior.observation_sd[i]);
+        let _ = writeln!(text, "{},{mean},{latent},{observation}", prior.stretches[i]);
+    }
+    text
+}
+
+/// One row a stretch, one column a draw, ln(W / Pa + offset).
+pub fn curves_csv(joint: &JointPosterior, draws: u64, seed: u64, spread: Spread) -> String {
+    let curves: Vec<Vec<f64>> = (0..draws).map(|draw| joint.draw(seed, draw, spread)).collect();
+    let mut text = String::from("stretch");
+    for draw in 0..draws {
+        let _ = write!(text, ",draw_{draw}");
+    }
+    for (i, stretch) in joint.prior.stretches.iter().enumerate() {
+        let _ = write!(text, "\n{stretch}");
+        for curve in &curves {
+            let _ = write!(text, ",{}", curve[i]);
+        }
+    }
+    text + "\n"
+}
+
+/// Shear moduli of one task, Pa, at the nine levels.
+#[derive(Clone, Debug, Serialize)]
+pub struct TaskModuli {
+    /// Kind of study and region.
+    pub task: String,
+    /// From two standard deviations below the mean to two above.
+    pub shear_modulus_pa: Vec<f64>,
+}
+
+/// A line per task, a column per level.
+pub fn moduli_csv(rows: &[TaskModuli]) -> String {
+    let mut text = String::from("task");
+    for level in nine_levels() {
+        let _ = write!(text, ",{level}");
+    }
+    for row in rows {
+        let _ = write!(text, "\n{}", row.task);
+        for modulus in &row.shear_modulus_pa {
+            let _ = write!(text, ",{modulus}");
+        }
+    }
+    text + "\n"
+}
