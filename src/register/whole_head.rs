@@ -73,7 +73,7 @@ impl Subject {
         let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&flat, mm)).collect();
         let known = levels.iter().map(|l| known.as_ref().map(|k| on_grid_of(k, l))).collect();
         let coefficients = levels.iter().map(along_thick_axes).collect();
-        let foreground = head::foreground(&levels[1]);
+        let foreground = not_air(&levels[1]);
         Self { levels, coefficients, known, foreground }
     }
 }
@@ -107,8 +107,7 @@ pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: u
         other: Interpolated {
             image: &subject.coefficients[n],
             mask: subject.known[n].as_ref(),
-            // Fat is brighter than all else and says little more than that it is fat.
-            range: head::range_within(image, &subject.foreground, 0.002, 0.97),
+            range: range_of_tissue(image, &subject.foreground),
         },
         bins: Bins { sampled: bins, interpolated: bins + 4 },
         spacing_mm: LEVELS_MM[n],
@@ -129,11 +128,7 @@ fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
     let mut gain = coarse.map(|_| 1.0);
     // The second time the foreground is that of the flattened image: a coil's shadow has become head.
     for _ in 0..2 {
-        // In logarithms the air stays apart from a brain that is a tenth as bright as the scalp.
-        let unit = 0.01 * head::range_of(flat.data.iter().copied(), 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
-        let logarithm = flat.map(|x| (1.0 + x / unit).ln());
-        let [_, threshold] = head::otsu(&logarithm.data);
-        let inside = logarithm.map(|x| f32::from(u8::from(x > threshold)));
+        let inside = not_air(&flat).map(|inside| f32::from(u8::from(inside)));
         let share = gaussian(&inside, SIGMA_MM);
         let bright = Volume::from_fn(coarse.grid, |n| inside.data[n] * coarse.data[n]);
         let count = inside.data.iter().sum::<f32>().max(1.0);
@@ -152,6 +147,24 @@ fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
         let gain = gain.trilinear(gain.grid.position(inside)).unwrap_or(1.0);
         image.data[n] / gain.max(least)
     })
+}
+
+/// All that is brighter than air. In logarithms the air stays apart from a brain that is a tenth as bright as the scalp.
+fn not_air(image: &Volume<f32, Native>) -> Mask<Native> {
+    let unit = 0.01 * head::range_of(image.data.iter().copied(), 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
+    let logarithm = image.map(|x| (1.0 + x.max(0.0) / unit).ln());
+    let [_, threshold] = head::otsu(&logarithm.data);
+    logarithm.map(|x| x > threshold)
+}
+
+/// From dark to the brightest tissue: fat is brighter than all else, by how much says nothing.
+fn range_of_tissue(image: &Volume<f32, Native>, inside: &Mask<Native>) -> [f32; 2] {
+    /// White matter is 1.2 to 1.6 times as bright as a head's middle value.
+    const BRIGHTEST: f32 = 2.2;
+    let [low, most] = head::range_within(image, inside, 0.002, 0.97);
+    let [middle, _] = head::range_within(image, inside, 0.5, 0.97);
+    let low = low.min(0.0);
+    [low, most.min(BRIGHTEST * middle).max(low + 1e-3)]
 }
 
 /// Finds the rigid motion that takes a head onto the mean head.
@@ -215,11 +228,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
     let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&optimum.pose.linear));
     let moving_from_head: RigidTransform<Native, Native> =
         RigidTransform::new(rotation, optimum.pose.target - rotation * optimum.pose.centre);
-    Ok(RigidFit {
-        fixed_from_moving: moving_from_head.inverse().relabelled(),
-        quality,
-        warnings: quality.warnings(),
-    })
+    Ok(RigidFit { fixed_from_moving: moving_from_head.inverse().relabelled(), quality, warnings: quality.warnings() })
 }
 
 /// The rotation of a linear map's polar decomposition.

@@ -315,7 +315,7 @@ mod tests {
 
     /// The affine part of it, as a start.
     fn larger() -> AffineTransform<Mni, Mni> {
-        AffineTransform::from_parts(Matrix3::identity() * 1.05, Vector3::zeros())
+        AffineTransform::from_parts(Matrix3::identity() * 1.06, -1.06 * Vector3::new(1.0, -2.0, 1.5))
     }
 
     fn imaged(grid: &Grid<Mni>, value: impl Fn(Point3<f64>) -> f64) -> Volume<f32, Mni> {
@@ -389,6 +389,8 @@ mod tests {
         let blind = fit_atlas(&ball, &ball, &larger(), Some(&all), &usual).unwrap_err();
         assert!(matches!(blind, DeformableError::TooLittleKnown { .. }), "{blind}");
         let wrong = DeformableSettings { iterations: vec![1], ..usual };
-        assert!(fit_atlas(&ball, &ball, &larger(), None, &wrong).unwrap_err().to_string().contains("`iterations` is 1"));
+        assert!(
+            fit_atlas(&ball, &ball, &larger(), None, &wrong).unwrap_err().to_string().contains("`iterations` is 1")
+        );
     }
 }
