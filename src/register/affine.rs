@@ -29,8 +29,11 @@ pub fn subject_from_mean_head<F: Frame>(
     let mut pose = Pose { linear: Matrix3::identity(), centre, target: centre };
     for n in [1, 2] {
         let level = level(&head, &subject, n, if n == 1 { 30_000 } else { 60_000 });
-        let stopping =
-            Stopping { longest_step_mm: 0.5 * level.spacing_mm, shortest_step_mm: 0.02 * level.spacing_mm, evaluations: 40 };
+        let stopping = Stopping {
+            longest_step_mm: 0.5 * level.spacing_mm,
+            shortest_step_mm: 0.02 * level.spacing_mm,
+            evaluations: 40,
+        };
         pose = optimise(&level, &pose, Freedom::Affine(TETHER), None, stopping).pose;
     }
     AffineTransform::from_parts(pose.linear, pose.target - pose.linear * pose.centre)

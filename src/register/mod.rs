@@ -16,7 +16,5 @@ pub mod transform_text;
 mod whole_head;
 
 pub use affine::subject_from_mean_head;
-pub use rigid::{
-    FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid,
-};
+pub use rigid::{FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid};
 pub use whole_head::{MeanHead, register_to_mean_head};

@@ -60,8 +60,7 @@ impl Tether {
     /// to turns, and the logarithm of the stretch to first order.
     fn loss(&self, linear: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
         let strain = 0.5 * (linear.transpose() * linear - Matrix3::identity());
-        let precision =
-            Matrix3::from_fn(|a, b| self.weight / if a == b { self.stretch } else { self.shear }.powi(2));
+        let precision = Matrix3::from_fn(|a, b| self.weight / if a == b { self.stretch } else { self.shear }.powi(2));
         let stress = strain.component_mul(&precision);
         (0.5 * stress.dot(&strain), linear * stress)
     }
@@ -74,7 +73,9 @@ impl Freedom {
         let target = base.target + parameters.fixed_rows::<3>(0);
         let linear = match self {
             Self::Rigid => *Rotation3::from_scaled_axis(parameters.fixed_rows::<3>(3) / radius_mm).matrix(),
-            Self::Affine(_) => Matrix3::identity() + Matrix3::from_column_slice(&parameters.as_slice()[3..12]) / radius_mm,
+            Self::Affine(_) => {
+                Matrix3::identity() + Matrix3::from_column_slice(&parameters.as_slice()[3..12]) / radius_mm
+            }
         };
         Pose { linear: linear * base.linear, target, ..*base }
     }

@@ -215,11 +215,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
     let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&optimum.pose.linear));
     let moving_from_head: RigidTransform<Native, Native> =
         RigidTransform::new(rotation, optimum.pose.target - rotation * optimum.pose.centre);
-    Ok(RigidFit {
-        fixed_from_moving: moving_from_head.inverse().relabelled(),
-        quality,
-        warnings: quality.warnings(),
-    })
+    Ok(RigidFit { fixed_from_moving: moving_from_head.inverse().relabelled(), quality, warnings: quality.warnings() })
 }
 
 /// The rotation of a linear map's polar decomposition.

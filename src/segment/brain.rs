@@ -51,7 +51,8 @@ impl Window {
         let border = model.csf_grey_border();
         Self {
             low: [border, border + 0.25 * (grey - border)].map(|x| x as f32),
-            high: [white + 3.0 * model.deviations[2], 0.5 * (grey + white) + 0.5 * model.deviations[1]].map(|x| x as f32),
+            high: [white + 3.0 * model.deviations[2], 0.5 * (grey + white) + 0.5 * model.deviations[1]]
+                .map(|x| x as f32),
         }
     }
 

@@ -2,10 +2,10 @@
 
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, segment_with_priors};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
-use crate::image::{Mask, Volume};
 use crate::image::resample::{Interpolation, resample};
-use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
+use crate::image::{Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
+use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
 use thiserror::Error;
 
 /// What is left of the misfit between the carried template and a head, mm: about a voxel of the fit's finest level.
@@ -157,7 +157,9 @@ mod tests {
     fn slow_a_small_head_far_askew_under_a_surface_coil_is_found() {
         let (scan, truth) = a_child_askew();
         let found = pose_of_head(&scan).unwrap().fixed_from_moving;
-        for corner in [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -90.0, 0.0], [0.0, -20.0, 70.0]] {
+        for corner in
+            [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -90.0, 0.0], [0.0, -20.0, 70.0]]
+        {
             let p = truth.inverse().apply(Position::new(corner[0], corner[1], corner[2]));
             let apart = found.apply(p).distance_mm(&truth.apply(p));
             assert!(apart < 1.5, "{apart} mm at {corner:?}");

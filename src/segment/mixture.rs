@@ -90,7 +90,8 @@ pub(super) fn fit_mixture(
     let iterations = if begun.is_some() { settings.iterations.min(LAST_ITERATIONS) } else { settings.iterations };
     for iteration in 0..iterations {
         let before = means;
-        let smoothing = !neighbours.is_empty() && iteration >= if begun.is_some() { 1 } else { settings.bias_starts_at };
+        let smoothing =
+            !neighbours.is_empty() && iteration >= if begun.is_some() { 1 } else { settings.bias_starts_at };
         let previous = contents.clone();
         let appearance = Appearance::new(&means, &deviations);
         let seen = |n: usize| {

@@ -118,11 +118,7 @@ pub(super) fn with_shared_wall(
     let (inside, t1, brain) = (ventricle.cropped(&around), t1.cropped(&around), brain.cropped(&around));
     let deep = erode(&inside, 1.0);
     let full: Vec<f32> = (0..t1.data.len()).filter(|&n| deep.data[n]).map(|n| t1.data[n]).collect();
-    let csf = if full.len() < 500 {
-        model.means[0] as f32
-    } else {
-        full.iter().sum::<f32>() / full.len() as f32
-    };
+    let csf = if full.len() < 500 { model.means[0] as f32 } else { full.iter().sum::<f32>() / full.len() as f32 };
     let rim = dilate(&inside, 1.9);
     let border = model.csf_grey_border() as f32;
     let beyond = at_each(&t1, |n| brain.data[n] && !rim.data[n] && t1.data[n] > border);

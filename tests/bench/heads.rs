@@ -50,7 +50,10 @@ pub fn bars() -> Vec<Bar> {
         };
         passed += 1;
         let (brain, ventricle) = (labels.map(|l| l > 0).volume_cc(), labels.map(|l| l == label::VENTRICLE).volume_cc());
-        println!("{name:<15} 0      {:5.1}  {:4.2}   {brain:8.0}   {ventricle:8.1}", found.run.cpu_s, found.run.peak_gb);
+        println!(
+            "{name:<15} 0      {:5.1}  {:4.2}   {brain:8.0}   {ventricle:8.1}",
+            found.run.cpu_s, found.run.peak_gb
+        );
         if let Some(cc) = known_cc {
             let percent = 100.0 * (brain / cc - 1.0);
             let met = percent.abs() <= 100.0 * VOLUME_TOLERANCE;
@@ -85,7 +88,12 @@ fn labels(bytes: &[u8], name: &str) -> Option<LabelMap<Native>> {
 
 fn cost(run: &Finished) -> Bar {
     let met = run.cpu_s <= 12.0 && run.peak_gb <= 1.0;
-    Bar::new("heads segment at 1 mm", "<= 12 CPU-s, 1 GB", format!("{:.1} CPU-s, {:.2} GB", run.cpu_s, run.peak_gb), met)
+    Bar::new(
+        "heads segment at 1 mm",
+        "<= 12 CPU-s, 1 GB",
+        format!("{:.1} CPU-s, {:.2} GB", run.cpu_s, run.peak_gb),
+        met,
+    )
 }
 
 /// One good head turned, cropped, resized, shaded, noisy: the answer agrees with the first one, or there is none.
@@ -161,14 +169,16 @@ fn against_freesurfer(heads: &Path, folder: &Path) -> Vec<Bar> {
         return vec![Bar::new("heads FreeSurfer's head", "segmented", "refused", false)];
     };
     let dice = |mine: u8, theirs: &[i32]| labels.map(|l| l == mine).dice(&aseg.map(|x| theirs.contains(&(x as i32))));
-    let grey = dice(
-        label::GREY_MATTER,
-        &[3, 42, 8, 47, 10, 49, 11, 50, 12, 51, 13, 52, 17, 53, 18, 54, 26, 58],
-    );
+    let grey = dice(label::GREY_MATTER, &[3, 42, 8, 47, 10, 49, 11, 50, 12, 51, 13, 52, 17, 53, 18, 54, 26, 58]);
     let white = dice(label::WHITE_MATTER, &[2, 41, 7, 46, 16, 28, 60, 77, 85, 251, 252, 253, 254, 255]);
     let ventricle = dice(label::VENTRICLE, &[4, 43, 5, 44, 14, 31, 63]);
     let bar = |what: &str, least: f64, dice: f64| {
-        Bar::new(&format!("heads FreeSurfer's {what} Dice"), &format!(">= {least}"), format!("{dice:.3}"), dice >= least)
+        Bar::new(
+            &format!("heads FreeSurfer's {what} Dice"),
+            &format!(">= {least}"),
+            format!("{dice:.3}"),
+            dice >= least,
+        )
     };
     vec![bar("grey matter", 0.90, grey), bar("white matter", 0.93, white), bar("ventricle", 0.88, ventricle)]
 }

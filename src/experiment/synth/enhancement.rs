@@ -218,8 +218,7 @@ mod tests {
         let (pre, post) = (patient.pre.map(f32::from), patient.post.map(f32::from));
         let settings = RigidSettings::default();
         let pre_from_post = register_rigid(&post, &pre, RigidMasks::default(), &settings).unwrap().fixed_from_moving;
-        let mni_from_pre =
-            pose_of_head(&pre).unwrap().fixed_from_moving;
+        let mni_from_pre = pose_of_head(&pre).unwrap().fixed_from_moving;
         let (none, settings) = (GivenMasks::default(), PairSettings::default());
         let found = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &none, &settings, |_| {}).unwrap();
         let cavity = mask_on(&found.finding.cavity, &post.grid, &pre_from_post.then(&mni_from_pre));

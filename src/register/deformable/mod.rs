@@ -389,6 +389,8 @@ mod tests {
         let blind = fit_atlas(&ball, &ball, &larger(), Some(&all), &usual).unwrap_err();
         assert!(matches!(blind, DeformableError::TooLittleKnown { .. }), "{blind}");
         let wrong = DeformableSettings { iterations: vec![1], ..usual };
-        assert!(fit_atlas(&ball, &ball, &larger(), None, &wrong).unwrap_err().to_string().contains("`iterations` is 1"));
+        assert!(
+            fit_atlas(&ball, &ball, &larger(), None, &wrong).unwrap_err().to_string().contains("`iterations` is 1")
+        );
     }
 }
