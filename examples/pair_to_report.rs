@@ -18,6 +18,9 @@ impl Progress for Told {
 }
 
 /// The whole job on a coarse mesh.
+///
+/// # Errors
+/// Scans that cannot be used, a stage that fails, a disk that refuses.
 pub fn run(pre: &Path, post: &Path, folder: &Path) -> Result<Case, WorkflowError> {
     let mut settings = Settings::default();
     settings.mesh.size = MeshSize::Cells(3000);

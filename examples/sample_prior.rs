@@ -9,6 +9,9 @@ use hgm::material::generative::{SampleSettings, nine_levels, sample_shear_moduli
 use std::error::Error;
 
 /// Shear moduli in Pa, from two standard deviations below the mean to two above.
+///
+/// # Errors
+/// A law that cannot be fitted to a drawn curve.
 pub fn run() -> Result<Vec<f64>, Box<dyn Error>> {
     let samples = sample_shear_moduli(Task::HYPERELASTIC_WHITE, &nine_levels(), &SampleSettings::default())?;
     for sample in &samples {

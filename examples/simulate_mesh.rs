@@ -14,6 +14,9 @@ use nalgebra::Point3;
 use std::error::Error;
 
 /// The largest displacement of a ball of grey matter of 30 mm that lies on its lowest nodes, mm.
+///
+/// # Errors
+/// A mesh or a scenario that the solver refuses.
 pub fn run() -> Result<f64, Box<dyn Error>> {
     let grid = Grid::<Native>::axis_aligned([40, 40, 40], [2.0; 3], [-40.0; 3]);
     let inside = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.coords.norm() < 30.0;

@@ -37,6 +37,7 @@ pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
         json!({"path": file.path, "what": file.what, "space": file.space, "maker": file.maker, "bids": bids})
     };
     let files: Vec<_> = TABLE.iter().map(file).collect();
-    let text: String = TABLE.iter().map(|file| format!("{:<55} {}\n", file.path, file.what)).collect();
+    let line = |text: String, file: &crate::layout::Entry| text + &format!("{:<55} {}\n", file.path, file.what);
+    let text = TABLE.iter().fold(String::new(), line);
     session.emit(&json!({ "files": files, "cohort": COHORT }), &text)
 }

@@ -37,6 +37,7 @@ pub(super) fn submerged(mut heights: [f64; 4], level: f64) -> [f64; 2] {
 }
 
 /// Forces of the fluid on the nodes, N, and how they change.
+#[allow(clippy::struct_field_names, reason = "the unit is in the name")]
 pub(super) struct Buoyancy {
     /// Against gravity.
     pub lift_n: Vec<[f64; 3]>,

@@ -121,7 +121,7 @@ mod tests {
         let mut nodes = Vec::new();
         for k in 0..=wide {
             for j in 0..2 {
-                nodes.extend((0..=cubes).map(|i| [i as f64, j as f64, k as f64]));
+                nodes.extend((0..=cubes).map(|i| [i as f64, f64::from(j), k as f64]));
             }
         }
         let mut tets = Vec::new();

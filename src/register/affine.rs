@@ -23,7 +23,7 @@ pub fn subject_from_mean_head<F: Frame>(
     head: &MeanHead<F>,
     known: Option<&Mask<F>>,
 ) -> AffineTransform<F, F> {
-    let subject = Subject::new(subject.clone().relabelled(), known.map(|k| k.clone().relabelled::<Native>()));
+    let subject = Subject::new(&subject.clone().relabelled(), known.map(|k| k.clone().relabelled::<Native>()).as_ref());
     let head = head.prepared();
     let centre = head.centre_mm;
     let mut pose = Pose { linear: Matrix3::identity(), centre, target: centre };

@@ -68,10 +68,10 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub(super) fn new(image: Volume<f32, Native>, known: Option<Mask<Native>>) -> Self {
-        let flat = without_gain(&reduced_to(&image, LEVELS_MM[2]));
+    pub(super) fn new(image: &Volume<f32, Native>, known: Option<&Mask<Native>>) -> Self {
+        let flat = without_gain(&reduced_to(image, LEVELS_MM[2]));
         let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&flat, mm)).collect();
-        let known = levels.iter().map(|l| known.as_ref().map(|k| on_grid_of(k, l))).collect();
+        let known = levels.iter().map(|l| known.map(|k| on_grid_of(k, l))).collect();
         let coefficients = levels.iter().map(along_thick_axes).collect();
         let foreground = not_air(&levels[1]);
         Self { levels, coefficients, known, foreground }
@@ -180,7 +180,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
     head: &MeanHead<'_, F>,
 ) -> Result<RigidFit<M, F>, RegisterError> {
     let moving = side("moving", moving, None)?;
-    let subject = Subject::new(moving.image, None);
+    let subject = Subject::new(&moving.image, None);
     let head = head.prepared();
     let start_level = level(&head, &subject, 0, 2500);
     let first = level(&head, &subject, 1, 15_000);

@@ -96,7 +96,9 @@ pub fn mesh_file(
     let refused = |source| WorkflowError::Engine { labels: name.clone(), source };
     programs.check(posed.engine).map_err(refused)?;
     let (labels, odd) = nifti::decode_labels(&bytes, &name, &settings.image)?;
-    odd.iter().for_each(|what| progress.odd(&name, what));
+    for what in &odd {
+        progress.odd(&name, what);
+    }
     let in_mni = files.in_mni.unwrap_or_else(|| name.contains("space-MNI") || nifti::says_mni(&bytes));
     if in_mni && tags.falx && posed.split.is_none() {
         posed.split = Some(falx_sheet());

@@ -102,9 +102,9 @@ pub fn run_to(
     }
     let patient = Patient::new(&work, prepared)?;
     if goal == Goal::Sweep {
-        patient.samples(None, SampleMode::Run)?
+        patient.samples(None, SampleMode::Run)?;
     } else {
-        patient.estimate()?
+        patient.estimate()?;
     }
     patient.gather()?;
     Ok(work.case.clone())

@@ -61,7 +61,7 @@ impl StageName {
         match (self, subject) {
             (Self::Registration | Self::Labels, _) => &[],
             (Self::Anat, _) => &[Registration],
-            (Self::Mesh, Subject::Patient) | (Self::Reference, Subject::Patient) => &[Anat],
+            (Self::Mesh | Self::Reference, Subject::Patient) => &[Anat],
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
             (Self::Sample(_), Subject::Patient) => &[Mesh, Reference],

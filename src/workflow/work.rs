@@ -66,7 +66,7 @@ impl Made {
     ) -> Stage {
         let stage = Stage::new(&name.to_string(), version, case.folder(), settings);
         let before = name.after(subject).iter().filter_map(|earlier| self.get(earlier));
-        before.fold(stage, |stage, earlier| stage.after(earlier))
+        before.fold(stage, Stage::after)
     }
 }
 

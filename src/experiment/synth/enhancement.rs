@@ -198,8 +198,8 @@ mod tests {
     use crate::geometry::{Post, Pre, RigidTransform};
     use crate::register::{RigidMasks, RigidSettings, register_rigid};
     use crate::resect::{GivenMasks, PairSettings, take_pair_apart};
-    use crate::segment::atlas;
     use crate::segment::native::mask_on;
+    use crate::segment::pose_of_head;
 
     /// Mean distance over the brain between a fit and the truth.
     fn rigid_error_mm(pre_from_post: &RigidTransform<Post, Pre>, patient: &SyntheticPatient) -> f64 {

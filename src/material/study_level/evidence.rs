@@ -44,10 +44,7 @@ impl MeanPosterior {
     /// Mean and covariance of one task's coefficients.
     pub(super) fn of(&self, task: Task) -> (Coefficients, Square) {
         let at = task.index() * SIZE;
-        (
-            self.mean.fixed_rows::<SIZE>(at).into_owned(),
-            self.covariance.fixed_view::<SIZE, SIZE>(at, at).into_owned(),
-        )
+        (self.mean.fixed_rows::<SIZE>(at).into_owned(), self.covariance.fixed_view::<SIZE, SIZE>(at, at).into_owned())
     }
 }
 

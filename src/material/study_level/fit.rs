@@ -43,11 +43,14 @@ pub struct StudyLevelFit {
     pub gradient_norm: f64,
 }
 
+/// A point with its value and gradient, scaled.
+type Evaluated = (Vec<f64>, f64, Vec<f64>);
+
 struct Search<'a> {
     studies: &'a Studies,
     /// Values are divided by it.
     scale: f64,
-    last: RefCell<Option<(Vec<f64>, f64, Vec<f64>)>>,
+    last: RefCell<Option<Evaluated>>,
 }
 
 impl Search<'_> {
@@ -73,7 +76,7 @@ const LOG_LIMIT: f64 = 12.0;
 
 fn density(studies: &Studies, logs: &[f64]) -> Option<(f64, [f64; SPREADS])> {
     let logs: [f64; SPREADS] = logs.try_into().ok()?;
-    if logs.iter().any(|x| !(x.abs() < LOG_LIMIT)) {
+    if logs.iter().any(|x| x.is_nan() || x.abs() >= LOG_LIMIT) {
         return None;
     }
     let spreads = Spreads::from_logs(&logs);
