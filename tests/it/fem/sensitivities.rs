@@ -151,7 +151,7 @@ fn what_the_law_does_not_have_is_refused() {
     let model = Model::new(&mesh, &scenario).unwrap();
     let (_, state) = model.solve(&scenario.materials, None, &|_| ()).unwrap();
     for by in [
-        By::Material { name: "grey_matter".into(), parameter: Parameter::C1 },
+        By::Material { name: "grey_matter".into(), parameter: Parameter::Own(7) },
         By::Material { name: "skull".into(), parameter: Parameter::Stiffness },
         By::Load(Load::Patch(1)),
     ] {
