@@ -57,8 +57,8 @@ fn without_comments_and_texts(text: &str) -> String {
         let quote = |mark: char| rest.starts_with(mark) && rest[1..].starts_with(['\\', '"', '{', '}', ';', '/']);
         let length = if rest.starts_with("//") {
             rest.find('\n').unwrap_or(rest.len())
-        } else if rest.starts_with("r#\"") {
-            rest[3..].find("\"#").map_or(rest.len(), |end| end + 5)
+        } else if let Some(raw) = rest.strip_prefix("r#\"") {
+            raw.find("\"#").map_or(rest.len(), |end| end + 5)
         } else if c == '"' {
             let mut escaped = false;
             let end = rest[1..].find(|c| {

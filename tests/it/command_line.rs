@@ -153,7 +153,7 @@ fn slow_an_interrupted_job_leaves_only_whole_files() {
         }
         assert!(Command::new("kill").args([signal, &job.id().to_string()]).status().unwrap().success());
         assert_eq!(job.wait().unwrap().code(), Some(code));
-        let left = contents(&case);
+        let left = contents(case);
         assert!(left.contains_key(file));
         assert!(left.keys().all(|name| !name.ends_with(".part")), "{:?}", left.keys());
         for (name, bytes) in left.iter().filter(|(name, _)| name.ends_with(".json")) {

@@ -13,7 +13,7 @@ fn made(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
     let mut sum = Sha256::new();
     sum.update(std::fs::read(program()).unwrap());
     sum.update(std::fs::read(CHEAP[1]).unwrap());
-    let key: String = sum.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let key = sum.finalize().iter().take(8).fold(String::new(), |key, byte| key + &format!("{byte:02x}"));
     let all = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made");
     std::fs::create_dir_all(&all).unwrap();
     let lock = File::create(all.join(format!("{name}.lock"))).unwrap();
