@@ -169,6 +169,30 @@ pub enum SupportsError {
 }
 
 impl ResectionSettings {
+    /// Whether [`Self::supported`] looks at the labels.
+    pub fn needs_labels(&self) -> bool {
+        self.supports == Support::Sliding || self.csf.is_some()
+    }
+
+    /// What else holds and carries the brain, to follow a list of what is held.
+    pub fn supports_in_words(&self) -> String {
+        let mut words = String::new();
+        if self.supports == Support::Sliding {
+            let from = match self.skull.from {
+                SkullFrom::Cortex => "from the cortex",
+                SkullFrom::Scan => "outside the fluid that the scan shows",
+            };
+            words += &format!(", sliding on a skull {} mm {from}", self.skull.gap_mm);
+            if self.falx == Support::Sliding {
+                words += " and along the falx";
+            }
+        }
+        if let Some(csf) = &self.csf {
+            words += &format!(", {:.0} % of the fluid drained", 100.0 * csf.drained);
+        }
+        words
+    }
+
     /// The scenario with supports and fluid as these settings have them, by the labels of the pre-operative scan in the
     /// frame of the mesh.
     ///

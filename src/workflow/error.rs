@@ -10,6 +10,7 @@ use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
 use crate::experiment::outcome::OutcomeError;
 use crate::experiment::prior::PriorError;
+use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
@@ -77,6 +78,8 @@ pub enum WorkflowError {
          `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings"
     )]
     NoReferenceState { reason: String },
+    #[error("table [resection]: {0}")]
+    Supports(#[from] SupportsError),
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
     #[error(

@@ -183,9 +183,11 @@ impl<'w, 'a> Patient<'w, 'a> {
         let mesh_bytes = work.case.read(REST_MESH)?;
         let mesh = vtu::decode(&mesh_bytes, REST_MESH)?.mesh;
         let anatomy = Anatomy::read(&work.case)?;
+        let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
+        let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
     }
 
@@ -262,9 +264,10 @@ impl<'w, 'a> Patient<'w, 'a> {
         let rest = self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]);
         let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
         let loads = format!(
-            "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {} kg/m3, with {} held",
+            "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {} kg/m3, with {} held{}",
             settings.density_kg_per_m3,
-            settings.fixed.join(" and ")
+            self.scenario.fixed.join(" and "),
+            settings.supports_in_words()
         );
         ExperimentOutcome {
             reference: "ventricle wall and cavity surface of the post-operative scan (closest points)".to_owned(),

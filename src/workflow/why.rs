@@ -80,7 +80,10 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     };
     let sums = ScanSums { pre: sum(&asked.pre, "pre")?, post: sum(&asked.post, "post")? };
     let resection = &work.settings.resection;
-    let scenario = resection.scenario(&stages::mni_from_gravity_frame(&work.case, resection.gravity_frame)?);
+    let mut scenario = resection.scenario(&stages::mni_from_gravity_frame(&work.case, resection.gravity_frame)?);
+    if resection.needs_labels() {
+        scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.labels)?;
+    }
     let tissues = plan::tissues(work.settings, work.subject);
     let samples = if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject)? } else { Vec::new() };
     let pose = |step: &plan::Step| -> Option<Stage> {
