@@ -198,7 +198,7 @@ mod tests {
     use crate::geometry::{Post, Pre, RigidTransform};
     use crate::register::{RigidMasks, RigidSettings, register_rigid};
     use crate::resect::{GivenMasks, PairSettings, take_pair_apart};
-    use crate::segment::atlas;
+    use crate::segment::pose_of_head;
     use crate::segment::native::mask_on;
 
     /// Mean distance over the brain between a fit and the truth.
