@@ -11,6 +11,7 @@ pub mod resection;
 pub mod rmse;
 pub mod sample;
 pub mod setting;
+pub mod skull;
 pub mod smooth_noise;
 pub mod supports;
 pub mod sweep;

@@ -5,7 +5,7 @@ use super::sample::Tissue;
 use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
-use super::supports::{SkullSettings, level_when_drained};
+use super::skull::{SkullSettings, level_when_drained};
 use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
 use crate::geometry::Frame;
 use crate::image::LabelMap;

@@ -3,8 +3,8 @@
 //! Every tetrahedron loses the weight of the fluid that its submerged part displaces. That part is cut off exactly, so its
 //! volume grows smoothly while the level rises through an element, and so does every force.
 
-use super::load::Sharing;
 use super::scenario::{CsfLevel, Loads};
+use super::sharing::Sharing;
 use super::units::METRES_PER_MM;
 
 /// The part of a tetrahedron below a level, by the heights of its corners, and what it grows by per unit of the level.

@@ -21,6 +21,7 @@ mod outcome;
 mod reduce;
 mod scenario;
 mod sensitivity;
+mod sharing;
 mod solver;
 mod sparse;
 mod state;

@@ -6,9 +6,10 @@ use super::check::{check_held_together, check_materials, check_settings, materia
 use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
 use super::linear::{Symbolic, Tangent};
-use super::load::{NodalForces, Sharing, nodal_forces_n};
+use super::load::{NodalForces, nodal_forces_n};
 use super::order::{Graph, renumbered, reverse_cuthill_mckee};
 use super::scenario::{MassKind, Materials, Method, Scenario};
+use super::sharing::Sharing;
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
 use super::{FemError, State};

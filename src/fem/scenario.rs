@@ -1,13 +1,10 @@
 //! What is to be simulated: the contents of SCENARIO.toml.
 
-use super::FemError;
-use super::contact::{Contact, Support, Tether, body_of};
+use super::contact::{Contact, Support, Tether};
 use super::element::ElementKind;
 use crate::material::law::Material;
 use crate::material::toml_text::line_of;
-use crate::mesh::TetMesh;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -261,15 +258,6 @@ impl Scenario {
     pub fn held(&self) -> impl Iterator<Item = &String> {
         let supports = self.supports.iter().filter(|(_, support)| **support == Support::Fixed);
         self.fixed.iter().chain(supports.map(|(set, _)| set))
-    }
-
-    /// The mesh as the supports need it: cut open along sheets that slide, new nodes behind the mesh's own. A mesh that
-    /// is cut already, or needs no cut, comes back as it is. Outcomes are numbered by it.
-    ///
-    /// # Errors
-    /// [`FemError::UnknownSet`], and [`FemError::NoSheet`] for a set that cannot be cut along.
-    pub fn body<'a>(&self, mesh: &'a TetMesh) -> Result<Cow<'a, TetMesh>, FemError> {
-        body_of(mesh, self)
     }
 
     /// The number of a label name: from `labels`, else as in DSEG files.

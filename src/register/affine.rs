@@ -2,16 +2,11 @@
 
 use super::bfgs::Stopping;
 use super::mutual_information::Pose;
-use super::search::{Freedom, Tether, optimise};
+use super::search::{Freedom, TETHER, optimise};
 use super::whole_head::{MeanHead, Subject, level};
 use crate::geometry::{AffineTransform, Frame, Native};
 use crate::image::{Mask, Volume};
 use nalgebra::Matrix3;
-
-/// How far heads differ from the mean one: the standard deviation of length, width or height among adults is about 5 %;
-/// three-year-olds, the old with wide ventricles and other scanners' gradients ask for more. Shears come from gradients
-/// and asymmetric skulls. A stretch of one standard deviation costs about what moving a head by a mm costs.
-pub(super) const TETHER: Tether = Tether { stretch: 0.08, shear: 0.05, weight: 0.01 };
 
 /// The affine map from the mean head to a head that lies rigidly aligned with it.
 ///

@@ -5,7 +5,6 @@
 //! out first (a surface coil makes the scalp ten times as bright as the thalamus), sizes may differ within what heads do, and
 //! of several starts the winner is the one whose anatomy agrees locally, not the one whose histogram is best.
 
-use super::affine::TETHER;
 use super::bfgs::Stopping;
 use super::bspline::prefilter;
 use super::deformable::force::local_correlation;
@@ -14,7 +13,7 @@ use super::mutual_information::{Bins, Interpolated, Pose};
 use super::pyramid::{on_grid_of, reduced_to};
 use super::rigid::{FitQuality, RegisterError, RigidFit, side};
 use super::sample::{Draw, draw};
-use super::search::{Freedom, Level, Reach, coarse, optimise, rank, turns_about_axes};
+use super::search::{Freedom, Level, Reach, TETHER, coarse, optimise, rank, turns_about_axes};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};

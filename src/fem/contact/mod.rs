@@ -11,12 +11,13 @@ mod settings;
 mod sheet;
 
 pub use settings::{Contact, Support, Tether, Wall};
-pub(super) use sheet::{all_contacts, body_of};
+pub(super) use sheet::all_contacts;
 
 use super::FemError;
 use super::linear::Tangent;
-use super::load::{Sharing, area_m2, facets_of};
+use super::load::{area_m2, facets_of};
 use super::scenario::Scenario;
+use super::sharing::Sharing;
 use super::sparse::HELD;
 use super::units::{METRES_PER_MM, metres, millimetres};
 use crate::geometry::SmoothField;
@@ -99,7 +100,7 @@ pub(super) struct Numbering<'a> {
 }
 
 impl Supports {
-    /// The scenario's walls and springs on its mesh (cut open, as [`body_of`] leaves it).
+    /// The scenario's walls and springs on its mesh (cut open, as [`Scenario::body`] leaves it).
     pub(super) fn new(sharing: &Sharing, scenario: &Scenario, at: &Numbering) -> Result<Self, FemError> {
         let mut supports = Self { standing: Vec::new(), tethered: Vec::new(), walls: Vec::new() };
         for contact in all_contacts(scenario) {

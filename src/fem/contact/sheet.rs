@@ -14,19 +14,24 @@ pub(in crate::fem) fn all_contacts(scenario: &Scenario) -> Vec<Contact> {
     scenario.contact.iter().cloned().chain(own).collect()
 }
 
-/// The mesh as the scenario's supports need it: cut open along every sheet that slides. A mesh that is cut already, or needs no
-/// cut, is left as it is. New nodes follow the mesh's own.
-pub(in crate::fem) fn body_of<'a>(mesh: &'a TetMesh, scenario: &Scenario) -> Result<Cow<'a, TetMesh>, FemError> {
-    let mut body = Cow::Borrowed(mesh);
-    let sheets = scenario.contact.iter().filter(|c| matches!(c.wall, Wall::Sheet)).map(|c| &c.set);
-    let sliding = scenario.supports.iter().filter(|(_, s)| **s == Support::Sliding).map(|(set, _)| set);
-    for set in sheets.chain(sliding) {
-        let facets = sheet_of(&body, set)?;
-        if !facets.is_empty() {
-            body = Cow::Owned(body.cut_along(set, &facets));
+impl Scenario {
+    /// The mesh as the supports need it: cut open along sheets that slide, new nodes behind the mesh's own. A mesh that
+    /// is cut already, or needs no cut, comes back as it is. Outcomes are numbered by it.
+    ///
+    /// # Errors
+    /// [`FemError::UnknownSet`], and [`FemError::NoSheet`] for a set that cannot be cut along.
+    pub fn body<'a>(&self, mesh: &'a TetMesh) -> Result<Cow<'a, TetMesh>, FemError> {
+        let mut body = Cow::Borrowed(mesh);
+        let sheets = self.contact.iter().filter(|c| matches!(c.wall, Wall::Sheet)).map(|c| &c.set);
+        let sliding = self.supports.iter().filter(|(_, s)| **s == Support::Sliding).map(|(set, _)| set);
+        for set in sheets.chain(sliding) {
+            let facets = sheet_of(&body, set)?;
+            if !facets.is_empty() {
+                body = Cow::Owned(body.cut_along(set, &facets));
+            }
         }
+        Ok(body)
     }
-    Ok(body)
 }
 
 /// The facets of a set that lie between two tetrahedra, when they are most of it.
