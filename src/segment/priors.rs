@@ -126,6 +126,8 @@ impl AtlasPriors {
     /// expected.
     #[must_use]
     pub fn rigid(grid: &Grid<Mni>) -> Self {
-        Self::through(grid, |p| p, 3.0)
+        let priors = Self::through(grid, |p| p, 3.0);
+        // That is more than tells a nucleus from the capsule beside it: place alone says nothing.
+        Self { deep_grey: Volume::filled(*grid, 0.0), ..priors }
     }
 }
