@@ -3,12 +3,17 @@
 use crate::layout;
 use crate::mesh::engine::EngineError;
 use crate::workflow::cohort::{CohortError, DatasetError};
-use crate::workflow::{CaseError, InputError, MaskRole, MeshFileError, SimulationError, Subject, WorkflowError};
+use crate::workflow::{
+    CaseError, InputError, MaskRole, MeshFileError, SettingsError, SimulationError, Subject, WorkflowError,
+};
 
 /// What to add to the message; nothing where the message says it all.
 pub fn remedy(error: &anyhow::Error) -> Option<String> {
     error.chain().find_map(|cause| {
         cause.downcast_ref().and_then(of_workflow).or_else(|| cause.downcast_ref().and_then(of_dataset)).or_else(|| {
+            if let Some(error) = cause.downcast_ref() {
+                return of_settings(error);
+            }
             let lost = matches!(cause.downcast_ref()?, CohortError::Log { .. });
             lost.then(|| "`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject".to_owned())
         })
@@ -33,12 +38,15 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Mesh(MeshFileError::Output { .. }) | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o".to_owned(),
         WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out".to_owned(),
         WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => "run again with --force".to_owned(),
-        WorkflowError::Settings(error) if error.file.is_none() && error.table.as_deref() == Some("mesh") => {
-            "correct --cells, --edge-mm or the settings file".to_owned()
-        }
+        WorkflowError::Settings(error) => return of_settings(error),
         WorkflowError::Engine { source: EngineError::Setting { .. }, .. } => "see --cells and --edge-mm".to_owned(),
         _ => return None,
     })
+}
+
+fn of_settings(error: &SettingsError) -> Option<String> {
+    let of_mesh = error.file.is_none() && error.table.as_deref() == Some("mesh");
+    of_mesh.then(|| "correct --cells, --edge-mm or the settings file".to_owned())
 }
 
 fn of_case(error: &CaseError) -> Option<String> {

@@ -152,9 +152,11 @@ mod tests {
         for direction in [[1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.577, 0.577, 0.577]] {
             for r in [14.0, 17.0, 20.0, 22.0] {
                 let at = field.at(direction.map(|d| d * r));
-                assert!((at.value - (20.0 - r)).abs() < 1.0, "{r}: {}", at.value);
+                // A Gaussian makes r + s^2 / r of a distance r in space; voxels add less than one.
+                let rounded = SMOOTHING_MM * SMOOTHING_MM / r;
+                assert!((at.value - (20.0 - r - rounded)).abs() < 0.75, "{r}: {}", at.value);
                 let slope: f64 = (0..3).map(|i| at.gradient[i] * direction[i]).sum();
-                assert!((slope + 1.0).abs() < 0.05, "{r}: {slope}");
+                assert!((slope + 1.0 - rounded / r).abs() < 0.05, "{r}: {slope}");
             }
         }
         assert!(SkullSettings::default().distance(&ball(-1.0)).is_none());

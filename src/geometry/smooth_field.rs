@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn far_beyond_the_grid_the_field_is_even() {
         let field = sampled(|p| p[0]);
-        assert_eq!(field.at([1e6, 0.0, 0.0]).gradient, [0.0; 3]);
+        assert!(field.at([1e6, 0.0, 0.0]).gradient.iter().all(|slope| slope.abs() < 1e-12));
         assert!((field.at([1e6, 0.0, 0.0]).value - 16.0).abs() < 1e-6);
     }
 

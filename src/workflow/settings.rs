@@ -299,7 +299,7 @@ mod tests {
         let own = "[mesh]\nengine = \"gmsh\"\n[register]\nseed = 7\n".parse().unwrap();
         let settings = Settings::resolve([&own]).unwrap();
         let layer = Settings::layer(&settings.to_toml(), "settings.toml").unwrap();
-        assert_eq!(layer.len(), ROOMS.len() - 1, "[image] has nothing to say by default");
+        assert_eq!(layer.len(), ROOMS.len());
         assert_eq!(Settings::resolve([&layer]).unwrap(), settings);
     }
 }

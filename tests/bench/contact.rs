@@ -119,7 +119,7 @@ fn random_scenario(n: u64, settings: &ResectionSettings, field: &Arc<SmoothField
         sliding.fixed.retain(|set| set != "falx");
     }
     if n.is_multiple_of(4) {
-        sliding.solver.element = hgm::fem::ElementKind::Tet4Nodal;
+        sliding.solver.element = hgm::fem::ElementKind::TET4_NODAL;
     }
     sliding
 }

@@ -85,11 +85,26 @@ fn scaled(d: &Coefficients, m: &Square) -> Square {
     Square::from_fn(|i, j| d[i] * m[(i, j)] * d[j])
 }
 
-/// Inverse of I + m and half the logarithm of its determinant; `None` where rounding has the better of it.
-fn shrink(m: &Square) -> Option<(Square, f64)> {
-    let factor = Cholesky::new(Square::identity() + m)?;
-    let half_log = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
-    Some((factor.inverse(), half_log))
+/// I + m in factors; `None` where rounding has the better of it. What is taken away from large sums is solved for with the
+/// triangle: an inverse would lose half the digits.
+struct Shrinkage {
+    inverse: Square,
+    triangle: Square,
+    half_log_determinant: f64,
+}
+
+impl Shrinkage {
+    fn new(m: &Square) -> Option<Self> {
+        let factor = Cholesky::new(Square::identity() + m)?;
+        let triangle = factor.l();
+        let half_log_determinant = triangle.diagonal().iter().map(|x| x.ln()).sum();
+        Some(Self { inverse: factor.inverse(), triangle, half_log_determinant })
+    }
+
+    /// L^-1 m and L^-1 v.
+    fn behind(&self, m: &Square, v: &Coefficients) -> Option<(Square, Coefficients)> {
+        Some((self.triangle.solve_lower_triangular(m)?, self.triangle.solve_lower_triangular(v)?))
+    }
 }
 
 fn see(curve: &StudyCurve, spreads: &Spreads, log_likelihood: &mut f64) -> Option<Seen> {
@@ -97,13 +112,15 @@ fn see(curve: &StudyCurve, spreads: &Spreads, log_likelihood: &mut f64) -> Optio
     let (d, behind) = spreads.deviations(Part::Curve, curve.task);
     let deviations = Coefficients::from(d);
     let (information, score) = (curve.squares / noise, curve.products / noise);
-    let (shrunk, half_log) = shrink(&scaled(&deviations, &information))?;
-    let inner = scaled(&deviations, &shrunk);
+    let shrinkage = Shrinkage::new(&scaled(&deviations, &information))?;
+    let (behind_matrix, behind_score) =
+        shrinkage.behind(&scaled_rows(&deviations, &information), &deviations.component_mul(&score))?;
     let points = curve.strains.len() as f64;
-    *log_likelihood -= 0.5 * points * (std::f64::consts::TAU * noise).ln() + half_log;
-    *log_likelihood -= 0.5 * (curve.sum_of_squares / noise - score.dot(&(inner * score)));
-    let outer = information - information * inner * information;
-    let outer_score = score - information * (inner * score);
+    *log_likelihood -= 0.5 * points * (std::f64::consts::TAU * noise).ln() + shrinkage.half_log_determinant;
+    *log_likelihood -= 0.5 * (curve.sum_of_squares / noise - behind_score.norm_squared());
+    let outer = information - behind_matrix.transpose() * behind_matrix;
+    let outer_score = score - behind_matrix.transpose() * behind_score;
+    let shrunk = shrinkage.inverse;
     Some(Seen { task: curve.task, deviations, behind, information, score, shrunk, outer, outer_score })
 }
 
@@ -129,9 +146,11 @@ fn read_publication(curves: &[StudyCurve], spreads: &Spreads, log_likelihood: &m
             None => by_task.push((curve.task.index(), part)),
         }
     }
-    let (shrunk, half_log) = shrink(&scaled(&deviations, &all))?;
+    let shrinkage = Shrinkage::new(&scaled(&deviations, &all))?;
     let score = deviations.component_mul(&score);
-    *log_likelihood += 0.5 * score.dot(&(shrunk * score)) - half_log;
+    let (_, behind_score) = shrinkage.behind(&all, &score)?;
+    *log_likelihood += 0.5 * behind_score.norm_squared() - shrinkage.half_log_determinant;
+    let shrunk = shrinkage.inverse;
     Some(Published { curves, kind: task.kind, deviations, behind, shrunk, score, by_task })
 }
 

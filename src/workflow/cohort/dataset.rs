@@ -154,7 +154,7 @@ mod tests {
             "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii.gz",
         ]);
         let doubtful = dataset.pair("sub-01", &[]).unwrap_err();
-        assert!(matches!(&doubtful, DatasetError::SeveralScans { entity, .. } if entity == "run-2"), "{doubtful}");
+        assert!(matches!(&doubtful, DatasetError::SeveralScans { entity, .. } if entity == "run-21"), "{doubtful}");
         assert!(doubtful.to_string().contains("2 scans fit"));
         let chosen = dataset.pair("sub-01", &["run-2".to_owned()]).unwrap();
         assert!(chosen.pre.0.ends_with("run-2_T1w.nii.gz"));
