@@ -132,7 +132,7 @@ fn hurt(t1: &Volume<f32, Native>, seed: u64) -> (Volume<f32, Native>, RigidTrans
     let centre = t1_from_hurt.inverse().apply(hgm::geometry::Position::from_point(middle)).mm;
     let (spacing_mm, whole) = (1.1, [200, 230, 230]);
     // Every second one ends 44 mm higher.
-    let cut = if seed % 2 == 0 { 0 } else { 40 };
+    let cut = if seed.is_multiple_of(2) { 0 } else { 40 };
     let dims = [whole[0], whole[1], whole[2] - cut];
     let mut origin = [0, 1, 2].map(|a| centre[a] - 0.5 * spacing_mm * whole[a] as f64);
     origin[2] += spacing_mm * cut as f64;

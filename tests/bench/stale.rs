@@ -17,7 +17,9 @@ pub fn bars() -> Vec<Bar> {
         refused += tally.refused;
         wrong.extend(tally.wrong);
     }
-    wrong.iter().for_each(|told| println!("  wrong: {told}"));
+    for told in &wrong {
+        println!("  wrong: {told}");
+    }
     vec![Bar::new(
         "workflow: random commands in one folder",
         "30 sequences, 0 wrong",
