@@ -34,7 +34,7 @@ pub struct MidplaneSplit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSettings {
-    /// The engine; see [`EnginePrograms::preferred`].
+    /// The engine; see [`super::EnginePrograms::preferred`].
     pub engine: Engine,
     /// How fine.
     pub size: MeshSize,
