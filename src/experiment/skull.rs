@@ -152,11 +152,12 @@ mod tests {
         for direction in [[1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.577, 0.577, 0.577]] {
             for r in [14.0, 17.0, 20.0, 22.0] {
                 let at = field.at(direction.map(|d| d * r));
-                // A Gaussian makes r + s^2 / r of a distance r in space; voxels add less than one.
+                // A Gaussian makes r + s^2 / r of a distance r in space. Voxels and the grid of 3 mm add up to .51 mm and
+                // .07 of slope, as reckoned with scipy's distance transform and cubic splines.
                 let rounded = SMOOTHING_MM * SMOOTHING_MM / r;
                 assert!((at.value - (20.0 - r - rounded)).abs() < 0.75, "{r}: {}", at.value);
                 let slope: f64 = (0..3).map(|i| at.gradient[i] * direction[i]).sum();
-                assert!((slope + 1.0 - rounded / r).abs() < 0.05, "{r}: {slope}");
+                assert!((slope + 1.0 - rounded / r).abs() < 0.08, "{r}: {slope}");
             }
         }
         assert!(SkullSettings::default().distance(&ball(-1.0)).is_none());
