@@ -160,7 +160,8 @@ mod tests {
                 assert!((slope + 1.0 - rounded / r).abs() < 0.08, "{r}: {slope}");
             }
         }
-        assert!(SkullSettings::default().distance(&ball(-1.0)).is_none());
+        let nothing = ball(20.0).map(|_| label::BACKGROUND);
+        assert!(SkullSettings::default().distance(&nothing).is_none());
     }
 
     #[test]
