@@ -3,7 +3,7 @@
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::mesh::engine::EngineError;
-use crate::segment::SegmentError;
+use crate::segment::HeadError;
 use crate::tag::TagError;
 use crate::workflow::cohort::{CohortError, DatasetError};
 use crate::workflow::{CaseError, InputError, MaskRole, MeshFileError, SimulationError, Subject, WorkflowError};
@@ -20,7 +20,9 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     if let Some(NiftiError { problem, .. }) = cause.downcast_ref() {
         return of_image(problem);
     }
-    if let Some(SegmentError::ImplausibleBrain { .. }) = cause.downcast_ref() {
+    if let Some(HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_)) =
+        cause.downcast_ref()
+    {
         return Some("--brain-mask takes one");
     }
     if let Some(SynthError::LobeTooSmall { .. }) = cause.downcast_ref() {

@@ -58,3 +58,16 @@ pub fn comparison(outcome: &ExperimentOutcome, estimate: &SampleOutcome) -> Stri
     }
     text
 }
+
+/// A phantom's samples with their errors; which is best, and which is nearest to what went in.
+pub fn phantom_summary(outcome: &ExperimentOutcome, nearest: Option<&str>) -> String {
+    let mut text = String::from("sample                  shear modulus (Pa)          RMSE (mm)\n");
+    for sample in &outcome.samples {
+        let moduli: Vec<String> = sample.shear_modulus_pa.values().map(|m| format!("{m:.1}")).collect();
+        let rmse = sample.rmse_mm.get("all").map_or("no equilibrium".to_owned(), |r| format!("{r:.6}"));
+        let mark = if outcome.best_sample.as_deref() == Some(&sample.id) { "  best" } else { "" };
+        let near = if nearest == Some(sample.id.as_str()) { "  nearest to the reference" } else { "" };
+        text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
+    }
+    text
+}
