@@ -72,16 +72,22 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
     fn from(error: E) -> Self {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
-        let error = match (remedy(&error), kind) {
-            (Some(remedy), _) => anyhow!("{}; {remedy}", in_one_line(&error)),
-            (None, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
-            (None, _) => error,
+        let error = match (with_remedy(error), kind) {
+            (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
+            (error, _) => error,
         };
         match kind {
             ErrorKind::Rejected => Self::Rejected(error),
             ErrorKind::Failed => Self::Failed(error),
             ErrorKind::QualityGate => Self::QualityGate(error),
         }
+    }
+}
+
+fn with_remedy(error: anyhow::Error) -> anyhow::Error {
+    match remedy(&error) {
+        Some(remedy) => anyhow!("{}; {remedy}", in_one_line(&error)),
+        None => error,
     }
 }
 
@@ -106,7 +112,7 @@ pub trait Reject<T> {
 
 impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
     fn reject(self) -> Result<T, Failure> {
-        self.map_err(|error| Failure::Rejected(error.into()))
+        self.map_err(|error| Failure::Rejected(with_remedy(error.into())))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::flags::{Flags, MeshOptions, PriorOptions};
 use super::{Failure, Session};
 use crate::experiment::outcome::ExperimentOutcome;
+use crate::report::in_words::phantom_summary;
 use crate::workflow;
 use std::path::PathBuf;
 
@@ -53,18 +54,6 @@ pub fn made(
     let settings = session.settings(flags)?;
     let case = workflow::phantom(every_task, &session.place(folder), &settings, &mut session.listener())?;
     let (outcome, nearest) = (case.outcome()?, workflow::nearest_sample(&settings, every_task)?);
-    let text = summary(&outcome, nearest.as_deref()) + &case.page().display().to_string();
+    let text = phantom_summary(&outcome, nearest.as_deref()) + &case.page().display().to_string();
     Ok((outcome, text))
-}
-
-fn summary(outcome: &ExperimentOutcome, nearest: Option<&str>) -> String {
-    let mut text = String::from("sample                  shear modulus (Pa)          RMSE (mm)\n");
-    for sample in &outcome.samples {
-        let moduli: Vec<String> = sample.shear_modulus_pa.values().map(|m| format!("{m:.1}")).collect();
-        let rmse = sample.rmse_mm.get("all").map_or("no equilibrium".to_owned(), |r| format!("{r:.6}"));
-        let mark = if outcome.best_sample.as_deref() == Some(&sample.id) { "  best" } else { "" };
-        let near = if nearest == Some(sample.id.as_str()) { "  nearest to the reference" } else { "" };
-        text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
-    }
-    text
 }

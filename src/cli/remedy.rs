@@ -1,7 +1,10 @@
 //! What to do about an error, in words of the command line: the library's messages name no options.
 
-use crate::layout;
+use crate::experiment::synth::SynthError;
+use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::mesh::engine::EngineError;
+use crate::segment::HeadError;
+use crate::tag::TagError;
 use crate::workflow::cohort::{CohortError, DatasetError};
 use crate::workflow::{
     CaseError, InputError, MaskRole, MeshFileError, SettingsError, SimulationError, Subject, WorkflowError,
@@ -10,38 +13,72 @@ use crate::workflow::{
 /// What to add to the message; nothing where the message says it all.
 pub fn remedy(error: &anyhow::Error) -> Option<String> {
     error.chain().find_map(|cause| {
-        cause.downcast_ref().and_then(of_workflow).or_else(|| cause.downcast_ref().and_then(of_dataset)).or_else(|| {
-            if let Some(error) = cause.downcast_ref() {
-                return of_settings(error);
-            }
-            let lost = matches!(cause.downcast_ref()?, CohortError::Log { .. });
-            lost.then(|| "`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject".to_owned())
-        })
+        let of_case = cause.downcast_ref().and_then(of_workflow).or_else(|| cause.downcast_ref().and_then(of_dataset));
+        of_case.or_else(|| cause.downcast_ref().and_then(of_settings)).or_else(|| of_rooms(cause).map(str::to_owned))
     })
 }
 
-fn of_workflow(error: &WorkflowError) -> Option<String> {
-    Some(match error {
-        WorkflowError::Case(error) => return of_case(error),
-        WorkflowError::Input(InputError::MaskGrid { role, .. }) => format!("the mask was given as {}", option(*role)),
-        WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1".to_owned(),
-        WorkflowError::NoTissue { .. } => "or give a brain mask (--brain-mask)".to_owned(),
-        WorkflowError::Observed(_) => {
-            "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)".to_owned()
+fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    if let Some(NiftiError { problem, .. }) = cause.downcast_ref() {
+        return of_image(problem);
+    }
+    if let Some(HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_)) =
+        cause.downcast_ref()
+    {
+        return Some("--brain-mask takes one");
+    }
+    if let Some(SynthError::LobeTooSmall { .. }) = cause.downcast_ref() {
+        return Some("see --resection-cc");
+    }
+    let CohortError::Log { .. } = cause.downcast_ref()? else { return None };
+    Some("`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject")
+}
+
+fn of_image(problem: &NiftiProblem) -> Option<&'static str> {
+    match problem {
+        NiftiProblem::SeveralVolumes { .. } | NiftiProblem::NoSuchVolume { .. } => Some("--volume N chooses"),
+        NiftiProblem::NoSuchOrientation { .. } | NiftiProblem::OrientationsDisagree { .. } => {
+            Some("--prefer sform or --prefer qform chooses")
         }
-        WorkflowError::EstimateLaw { .. } => "or try samples of that law with `hgm sweep --law`".to_owned(),
+        _ => None,
+    }
+}
+
+fn of_engine(error: &EngineError) -> &'static str {
+    match error {
+        EngineError::NoSuchLabel { .. } | EngineError::Factor { .. } => "see --edge-in and --edge-near",
+        EngineError::Missing { .. } => "`hgm doctor` tells how to install it, --mesher lattice is always there",
+        EngineError::Program { .. } | EngineError::Invalid { .. } => "--mesher lattice is always there",
+        _ => "see --cells and --edge-mm",
+    }
+}
+
+fn of_workflow(error: &WorkflowError) -> Option<String> {
+    let said = match error {
+        WorkflowError::Case(error) => return of_case(error),
+        WorkflowError::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
+        WorkflowError::Engine { source, .. } => of_engine(source),
+        WorkflowError::Pair(_) => "--cavity-mask, --resected-mask and --brain-mask take masks of your own",
+        WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
+        WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
+        WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
+        WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
+        WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
+        WorkflowError::EstimateLaw { .. } => "or try samples of that law with `hgm sweep --law`",
         WorkflowError::SampleMissing { .. } => {
             "run `hgm sweep CASE` on the shard it belongs to with the settings of the other shards (`hgm why CASE` tells \
              what differs)"
-                .to_owned()
         }
-        WorkflowError::Mesh(MeshFileError::Output { .. }) | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o".to_owned(),
-        WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out".to_owned(),
-        WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => "run again with --force".to_owned(),
+        WorkflowError::Mesh(MeshFileError::Output { .. })
+        | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o",
+        WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out",
+        WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => {
+            "run again with --force"
+        }
         WorkflowError::Settings(error) => return of_settings(error),
-        WorkflowError::Engine { source: EngineError::Setting { .. }, .. } => "see --cells and --edge-mm".to_owned(),
         _ => return None,
-    })
+    };
+    Some(said.to_owned())
 }
 
 fn of_settings(error: &SettingsError) -> Option<String> {
@@ -50,24 +87,21 @@ fn of_settings(error: &SettingsError) -> Option<String> {
 }
 
 fn of_case(error: &CaseError) -> Option<String> {
+    let again = |folder: &std::path::Path, subject: &Option<Subject>| match subject {
+        Some(Subject::Phantom { .. }) => format!("run `hgm phantom -o {} --force` again", folder.display()),
+        _ => format!("run `hgm prep PRE POST -o {}` again (it takes masks of your own)", folder.display()),
+    };
     Some(match error {
         CaseError::NotACase { .. } => "name a folder that `hgm prep`, `hgm run` or `hgm phantom` has made".to_owned(),
-        CaseError::Missing { folder, subject, .. } | CaseError::Damaged { folder, subject, .. } => match subject {
-            Some(Subject::Phantom { .. }) => format!("run `hgm phantom -o {} --force` again", folder.display()),
-            _ => format!("run `hgm prep PRE POST -o {}` again", folder.display()),
-        },
-        CaseError::Grid { folder, .. } => format!(
-            "run `hgm prep PRE POST -o {}` again (--cavity-mask and --resected-mask take masks of your own)",
-            folder.display()
-        ),
-        CaseError::OtherMesh { folder, .. } => format!("run `hgm phantom -o {} --force` again", folder.display()),
+        CaseError::Missing { folder, subject, .. } | CaseError::Damaged { folder, subject, .. } => {
+            again(folder, subject)
+        }
+        CaseError::Grid { folder, .. } => again(folder, &Some(Subject::Patient)),
+        CaseError::OtherMesh { folder, .. } => again(folder, &Some(Subject::Phantom { every_task: false })),
         CaseError::Phantom { .. } => "`hgm estimate`, `hgm report` and `hgm why` take a phantom; give a folder that \
                                       `hgm prep` or `hgm run` has made"
             .to_owned(),
         CaseError::OtherTissues { asked, .. } => format!("make another with `hgm phantom --tissues {asked}`"),
-        CaseError::NoField { .. } => {
-            format!("`hgm report` shows what is there; {} names the best sample", layout::OUTCOME)
-        }
         CaseError::Patient { .. } => "name another folder (-o)".to_owned(),
         CaseError::OtherScan { .. } => {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
@@ -78,7 +112,7 @@ fn of_case(error: &CaseError) -> Option<String> {
             folder.display()
         ),
         CaseError::Held { .. } => "wait until it has ended".to_owned(),
-        CaseError::Unreadable { .. } => return None,
+        CaseError::NoField { .. } | CaseError::Unreadable { .. } => return None,
     })
 }
 
@@ -93,9 +127,9 @@ fn of_dataset(error: &DatasetError) -> Option<String> {
 
 fn option(role: MaskRole) -> &'static str {
     match role {
-        MaskRole::Brain => "--brain-mask",
-        MaskRole::Ventricle => "--ventricle-mask",
-        MaskRole::Cavity => "--cavity-mask",
-        MaskRole::Resected => "--resected-mask",
+        MaskRole::Brain => "see --brain-mask",
+        MaskRole::Ventricle => "see --ventricle-mask",
+        MaskRole::Cavity => "see --cavity-mask",
+        MaskRole::Resected => "see --resected-mask",
     }
 }

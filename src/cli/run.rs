@@ -1,9 +1,8 @@
 //! `hgm run`: prep, sweep or estimate, report.
 
 use super::flags::{AnalysisOptions, Flags, MeshOptions, PairOptions};
-use super::{Failure, Session, estimate};
-use crate::experiment::outcome::ExperimentOutcome;
-use crate::experiment::resection::improvement;
+use super::{Failure, Session};
+use crate::report::in_words::{comparison, estimate_table, summary};
 use crate::workflow::{Case, Goal, Settings, run_to};
 
 /// T1 pair -> everything: prep, a sweep over the prior, per-node errors, report; resumable
@@ -47,24 +46,5 @@ pub fn in_words(case: &Case, goal: Goal) -> Result<String, Failure> {
         return Ok(summary(&outcome) + &page);
     }
     let facts = case.estimate()?;
-    Ok(estimate::table(&facts) + &estimate::comparison(&outcome, &facts) + &page)
-}
-
-/// Best sample, errors and verdicts.
-fn summary(outcome: &ExperimentOutcome) -> String {
-    let mut text = String::new();
-    let floor = outcome.noise_floor.unwrap_or_default();
-    if let Some(best) = outcome.best() {
-        let moduli: Vec<String> = best.shear_modulus_pa.iter().map(|(t, m)| format!("{t} {m:.0} Pa")).collect();
-        text += &format!("best sample {} ({})\n", best.id, moduli.join(", "));
-        for (set, deformed) in &best.rmse_mm {
-            let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
-            let verdict = improvement(rest, *deformed, &floor);
-            text += &format!("RMSE at {set}: rest {rest:.3} mm, deformed {deformed:.3} mm: {verdict}\n");
-        }
-    }
-    if let Some(floor_mm) = floor.combined_mm() {
-        text += &format!("noise floor {floor_mm:.3} mm\n");
-    }
-    text
+    Ok(estimate_table(&facts.estimate) + &comparison(&outcome, &facts.record) + &page)
 }

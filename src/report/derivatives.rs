@@ -15,9 +15,9 @@ const BIDS_VERSION: &str = "1.10.0";
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum DerivativesError {
-    #[error("{file}: cannot be read; run this subject again (`hgm bids BIDS_DIR OUT participant --participant-label`)")]
+    #[error("{file}: cannot be read; run this subject again")]
     Read { file: String, source: std::io::Error },
-    #[error("{file}: not a manifest of this version; run this subject again with --force")]
+    #[error("{file}: not a manifest of this version; make this subject's case again")]
     Manifest { file: String, source: serde_json::Error },
 }
 

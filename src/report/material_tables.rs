@@ -3,6 +3,7 @@
 use crate::material::generative::nine_levels;
 use crate::material::gp::{JointPosterior, Spread};
 use crate::material::meta_model::{Fit, MetaModel};
+use crate::material::statistics::{COMPARED, Comparison};
 use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
@@ -95,4 +96,33 @@ pub fn moduli_csv(rows: &[TaskModuli]) -> String {
         }
     }
     text + "\n"
+}
+
+/// The same for a terminal, with the tests whether the laws fit equally well.
+pub fn moduli_text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> String {
+    let mut text = format!("{:<22}", "shear modulus (Pa), sd");
+    for level in nine_levels() {
+        let _ = write!(text, "{level:>11.1}");
+    }
+    for row in rows {
+        let _ = write!(text, "\n{:<22}", row.task);
+        for modulus in &row.shear_modulus_pa {
+            let _ = write!(text, "{modulus:>11.1}");
+        }
+    }
+    let laws = COMPARED.map(MetaModel::name).join(", ");
+    let _ = write!(
+        text,
+        "\n\nDo {laws} fit equally well? Costs at 11 levels from -2 to 2 sd.\n\
+         Friedman: each curve fitted by all three laws (paired). Kruskal-Wallis: the costs as three independent samples, \
+         with those of the mean curve once more (the paper's).\n"
+    );
+    for (task, Comparison { friedman, kruskal_wallis, .. }) in tests {
+        let _ = writeln!(
+            text,
+            "{task:<22}Friedman H = {:.2}, p = {:.2e}    Kruskal-Wallis H = {:.2}, p = {:.2e}",
+            friedman.h, friedman.p, kruskal_wallis.h, kruskal_wallis.p
+        );
+    }
+    text
 }

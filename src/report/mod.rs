@@ -9,6 +9,7 @@ pub mod derivatives;
 pub mod figure;
 pub mod hand_off;
 pub mod html;
+pub mod in_words;
 pub mod lettering;
 pub mod material_figure;
 pub mod material_tables;

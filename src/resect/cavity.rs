@@ -94,7 +94,7 @@ pub enum ResectError {
     /// Post looks like pre.
     #[error(
         "no cavity of at least {smallest_cc} cc was found on the post-operative scan (largest loss of tissue: \
-         {largest_cc:.2} cc); check that the files are not swapped or the same, or give --cavity-mask"
+         {largest_cc:.2} cc); check that the files are not swapped or the same, or give a cavity mask"
     )]
     NoCavity {
         /// The largest candidate.
@@ -105,7 +105,7 @@ pub enum ResectError {
     /// What pre lacks, post has.
     #[error(
         "the pre-operative scan has {before_cc:.1} cc of fluid where the post-operative one has tissue, which lacks only \
-         {after_cc:.1} cc: the two files look swapped; give the pre-operative scan first, or give --cavity-mask"
+         {after_cc:.1} cc: the two files look swapped; give the pre-operative scan first, or give a cavity mask"
     )]
     Swapped {
         /// Largest part that is fluid on pre and tissue on post.
@@ -116,7 +116,7 @@ pub enum ResectError {
     /// A given cavity lies elsewhere.
     #[error(
         "the cavity or resected mask lies outside the brain: only {percent:.0} % of it was tissue before; check the \
-         masks (--cavity-mask, --resected-mask) and their grids"
+         masks and their grids"
     )]
     OutsideBrain {
         /// Share of the cavity that was tissue on the pre-operative scan.
@@ -322,7 +322,7 @@ mod tests {
         let h = head(0.0);
         let known = h.brain.map(|_| true);
         let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
-        assert!(error.to_string().contains("--cavity-mask"));
+        assert!(error.to_string().contains("give a cavity mask"));
     }
 
     #[test]

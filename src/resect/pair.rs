@@ -109,13 +109,13 @@ pub enum PairError {
     Resect(#[from] ResectError),
     /// Nothing was taken out.
     #[error(
-        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain; check --cavity-mask, or \
-         give --resected-mask"
+        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain; check the cavity \
+         mask, or give a mask of the resected tissue"
     )]
     NothingResected,
     /// The operation's ventricle cannot be told from the cavity.
     #[error(
-        "no ventricle is left on the post-operative scan: it is empty or lies within the cavity; check --cavity-mask"
+        "no ventricle is left on the post-operative scan: it is empty or lies within the cavity; check the cavity mask"
     )]
     NoVentricle,
 }

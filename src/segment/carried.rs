@@ -23,7 +23,7 @@ pub enum HeadError {
     /// The deformed template does not look like the head.
     #[error(
         "the template does not fit this head (local correlation {correlation:.2}, at least {least:.2} is needed): the scan must \
-         be T1-weighted and show the whole brain; look at the pose, or give a brain mask (--brain-mask) of an unusual brain"
+         be T1-weighted and show the whole brain; look at the pose, or give a brain mask of an unusual brain"
     )]
     PoorFit {
         /// Mean local correlation over the brain after the fit.
@@ -34,7 +34,7 @@ pub enum HeadError {
     /// The brain found is not the one that the fitted template expects.
     #[error(
         "the brain found has {found_cc:.0} cc where the fitted template expects {expected_cc:.0} cc: scalp or neck was taken for \
-         brain, or a part is missing; look at the labels, and for the pre-operative scan give a brain mask (--brain-mask)"
+         brain, or a part is missing; look at the labels, and for the pre-operative scan give a brain mask"
     )]
     UnlikeTemplate {
         /// Volume found.

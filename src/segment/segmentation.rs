@@ -150,7 +150,7 @@ pub enum SegmentError {
     /// The mask found (or given) is no brain.
     #[error(
         "the brain's volume is {found_cc:.0} cc, outside {smallest_cc:.0} to {largest_cc:.0} cc: check the voxel size \
-         and the registration, or, for the pre-operative scan, give a brain mask (--brain-mask)"
+         and the registration, or, for the pre-operative scan, give a brain mask"
     )]
     ImplausibleBrain {
         /// Volume found.

@@ -152,7 +152,7 @@ pub enum TagError {
     #[error(
         "boundary set `{set}` is empty: {reason}. The mesh spans {low_mm:.0?} to {high_mm:.0?} mm; boundary sets need \
          the MNI frame (rigid), RAS+, mm: check the registration to the template and the segmentation, or do without \
-         them (`hgm mesh --sets none`)"
+         them"
     )]
     Empty { set: String, reason: &'static str, low_mm: [f64; 3], high_mm: [f64; 3] },
 }

@@ -8,14 +8,13 @@ use crate::material::generative::{SampleSettings, nine_levels, sample_prior};
 use crate::material::gp::posterior;
 use crate::material::literature::LiteratureModel;
 use crate::material::meta_model::{FitError, MetaModel, fit};
-use crate::material::statistics::{COMPARED, Comparison, CostDigits, compare};
+use crate::material::statistics::{CostDigits, compare};
 use crate::material::task::stretches;
 use crate::material::training::TrainingData;
 use crate::report::material_figure::{FittedCurve, meta_model_figure, posterior_figure};
-use crate::report::material_tables::{TaskModuli, moduli_csv};
+use crate::report::material_tables::{TaskModuli, moduli_csv, moduli_text};
 use anyhow::anyhow;
 use serde_json::json;
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Figures of the posterior and of the meta-models, shear moduli per task, tests between the laws
@@ -80,7 +79,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             ("fig-3-meta-models.svg".to_owned(), meta_model_figure(&fitted).into_bytes()),
             ("shear-moduli.csv".to_owned(), moduli_csv(&rows).into_bytes()),
         ];
-        let facts = json!({ "sd_levels": nine_levels(), "moduli": rows, "tests": tests, "text": text(&rows, &tests) });
+        let facts =
+            json!({ "sd_levels": nine_levels(), "moduli": rows, "tests": tests, "text": moduli_text(&rows, &tests) });
         Ok::<_, FitError>(Produced { files, facts, ..Produced::default() })
     });
     let mut facts = facts(outcome)?;
@@ -113,32 +113,4 @@ fn fitted(model: &LiteratureModel, studies: &Studies, settings: &SampleSettings)
     let fits = MetaModel::PAPER.map(|law| fit(law, &curve.stretches, &targets, &settings.meta_model));
     let fits = fits.into_iter().collect::<Result<_, _>>()?;
     Ok(FittedCurve { name: format!("{}: {} ({})", model.id, model.study, model.citation), curve, fits })
-}
-
-fn text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> String {
-    let mut text = format!("{:<22}", "shear modulus (Pa), sd");
-    for level in nine_levels() {
-        let _ = write!(text, "{level:>11.1}");
-    }
-    for row in rows {
-        let _ = write!(text, "\n{:<22}", row.task);
-        for modulus in &row.shear_modulus_pa {
-            let _ = write!(text, "{modulus:>11.1}");
-        }
-    }
-    let laws = COMPARED.map(MetaModel::name).join(", ");
-    let _ = write!(
-        text,
-        "\n\nDo {laws} fit equally well? Costs at 11 levels from -2 to 2 sd.\n\
-         Friedman: each curve fitted by all three laws (paired). Kruskal-Wallis: the costs as three independent samples, \
-         with those of the mean curve once more (the paper's).\n"
-    );
-    for (task, Comparison { friedman, kruskal_wallis, .. }) in tests {
-        let _ = writeln!(
-            text,
-            "{task:<22}Friedman H = {:.2}, p = {:.2e}    Kruskal-Wallis H = {:.2}, p = {:.2e}",
-            friedman.h, friedman.p, kruskal_wallis.h, kruskal_wallis.p
-        );
-    }
-    text
 }

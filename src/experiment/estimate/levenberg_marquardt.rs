@@ -104,7 +104,7 @@ pub enum EstimateError {
     /// Nothing to fit.
     #[error(
         "only {observations} observed components for {parameters} unknowns: no node lies deep enough in the brain, or \
-         a surface is empty; lower `depth_mm` in the table [estimate.displacement] or use a finer mesh (--cells)"
+         a surface is empty; lower `depth_mm` in the table [estimate.displacement] or use a finer mesh"
     )]
     TooFewObservations {
         /// Residuals.
@@ -115,7 +115,7 @@ pub enum EstimateError {
     /// A residual is NaN or infinite.
     #[error(
         "the displacement of observation {0} is not a finite number: a file of the case is damaged; make the case \
-         again with `hgm prep` or `hgm phantom`"
+         again"
     )]
     NotFinite(usize),
 }

@@ -137,7 +137,7 @@ pub enum SynthError {
     },
     /// The lobe is smaller than what is to be taken from it.
     #[error(
-        "--resection-cc {wanted_cc:.1}: this patient's {side} temporal lobe has {lobe_cc:.1} cc; ask for at most {:.1} \
+        "a resection of {wanted_cc:.1} cc: this patient's {side} temporal lobe has {lobe_cc:.1} cc; ask for at most {:.1} \
          cc (80 % of it)",
         0.8 * lobe_cc
     )]

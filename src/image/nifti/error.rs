@@ -81,13 +81,13 @@ pub enum NiftiProblem {
         rule: String,
     },
     /// Several volumes and no choice.
-    #[error("dim: the file holds {volumes} volumes; choose one with --volume N (0 to {})", .volumes - 1)]
+    #[error("dim: the file holds {volumes} volumes; choose one (0 to {})", .volumes - 1)]
     SeveralVolumes {
         /// Number of volumes.
         volumes: u64,
     },
     /// The chosen volume does not exist.
-    #[error("dim: volume {chosen} was asked for and the file holds {volumes}, counted from 0; choose --volume N from 0 to {}", .volumes - 1)]
+    #[error("dim: volume {chosen} was asked for and the file holds {volumes}, counted from 0; choose 0 to {}", .volumes - 1)]
     NoSuchVolume {
         /// The volume asked for.
         chosen: u64,
@@ -143,7 +143,7 @@ pub enum NiftiProblem {
     NoOrientation,
     /// The preferred one of two affines is not there.
     #[error(
-        "{wanted}_code is 0: {wanted} was asked for (--prefer, or [image] prefer of the settings file) and the file has \
+        "{wanted}_code is 0: {wanted} was asked for and the file has \
          none; leave the choice out"
     )]
     NoSuchOrientation {
@@ -152,8 +152,7 @@ pub enum NiftiProblem {
     },
     /// sform and qform put the voxels at different places.
     #[error(
-        "sform and qform disagree by up to {difference_mm:.3} mm (allowed: {allowed_mm:.3} mm): choose the one you trust \
-         with --prefer sform or --prefer qform"
+        "sform and qform disagree by up to {difference_mm:.3} mm (allowed: {allowed_mm:.3} mm): choose the one you trust"
     )]
     OrientationsDisagree {
         /// Largest distance between the two positions of a corner.

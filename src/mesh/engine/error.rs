@@ -13,34 +13,34 @@ pub enum EngineError {
     #[error("`{name}` is {value:?}: it must be {rule}")]
     Setting { name: &'static str, value: f64, rule: &'static str },
     #[error(
-        "--edge-in or --edge-near (or [mesh.sizing]) names label {label}, which is not meshed; name one of {present:?} \
+        "[mesh.sizing] names label {label}, which is not meshed; name one of {present:?} \
          or drop it"
     )]
     NoSuchLabel { label: u8, present: Vec<u8> },
     #[error(
-        "--edge-in or --edge-near (or [mesh.sizing]): the factor at {place} {label} must be between {least} and \
+        "[mesh.sizing]: the factor at {place} {label} must be between {least} and \
          {most}, got {factor}"
     )]
     Factor { place: &'static str, label: u8, factor: f64, least: f64, most: f64 },
     #[error(
         "a target edge of {} mm would give about {cells:.1e} tetrahedra; the most is {most:.0e}; ask for a larger edge \
-         (--edge-mm) or fewer cells (--cells)",
+         or fewer cells",
         three_digits(*edge_mm)
     )]
     TooFine { edge_mm: f64, cells: f64, most: f64 },
     #[error(
         "engine `{engine}`: the labelled region near {centre_mm:.1?} mm ({volume_mm3:.1} mm3) is too small for \
-         tetrahedra of {edge_mm:.2} mm; ask for more of them (--cells) or a smaller edge (--edge-mm)"
+         tetrahedra of {edge_mm:.2} mm; ask for more of them or a smaller edge"
     )]
     TooSmall { engine: &'static str, centre_mm: [f64; 3], volume_mm3: f64, edge_mm: f64 },
     #[error(
-        "engine `{engine}` is not installed (no program {program} was found); install it (`hgm doctor` tells how) or \
-         use --mesher lattice"
+        "engine `{engine}` is not installed (no program {program} was found); install it or use \
+         the engine `lattice`"
     )]
     Missing { engine: &'static str, program: &'static str },
     #[error("engine `{engine}`: {source}")]
     Program { engine: &'static str, source: ProcessError },
-    #[error("engine `{engine}`: the result is not a valid mesh: {source}; use --mesher lattice")]
+    #[error("engine `{engine}`: the result is not a valid mesh: {source}; use the engine `lattice`")]
     Invalid { engine: &'static str, source: MeshError },
 }
 

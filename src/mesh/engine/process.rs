@@ -25,19 +25,19 @@ impl Default for Limits {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ProcessError {
-    #[error("it cannot be started ({0}); install it (`hgm doctor` tells how), or use --mesher lattice")]
+    #[error("it cannot be started ({0}); install it, or use the engine `lattice`")]
     Start(std::io::Error),
     #[error(
         "it was stopped after {time_s} s; raise `time_s` in the table [mesh.limits], ask for fewer cells, or use \
-         --mesher lattice"
+         the engine `lattice`"
     )]
     TimedOut { time_s: f64 },
     #[error(
-        "it failed ({status}): {last_words}; use --mesher lattice, or give it more memory (`memory_mb` in the table \
+        "it failed ({status}): {last_words}; use the engine `lattice`, or give it more memory (`memory_mb` in the table \
          [mesh.limits])"
     )]
     Failed { status: String, last_words: String },
-    #[error("its answer is not a mesh; use --mesher lattice")]
+    #[error("its answer is not a mesh; use the engine `lattice`")]
     Answer,
 }
 

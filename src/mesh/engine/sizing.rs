@@ -59,7 +59,7 @@ impl Sizing {
                 return Err(EngineError::Factor { place, label, factor, least, most });
             }
             if !(reach_mm > 0.0 && reach_mm.is_finite()) {
-                let name = "sizing.walls.reach_mm (--edge-near LABEL=FACTOR@MM)";
+                let name = "sizing.walls.reach_mm";
                 return Err(EngineError::Setting { name, value: reach_mm, rule: "above 0" });
             }
         }

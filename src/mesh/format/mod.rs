@@ -89,7 +89,7 @@ pub enum WriteError {
     FieldLength { field: String, components: usize, places: usize, expected: usize, found: usize },
     #[error("two arrays would be named `{name}`: rename the mesh's set of that name")]
     Duplicate { name: String },
-    #[error("{what}: {count} is more than the format can number; mesh it coarser (--cells)")]
+    #[error("{what}: {count} is more than the format can number; mesh it coarser")]
     TooMany { what: String, count: usize },
 }
 

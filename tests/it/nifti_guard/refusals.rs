@@ -58,8 +58,12 @@ fn each_malformed_file_is_refused_by_file_field_and_remedy() {
             File::with(|f| (f.qform_code, f.sform_code) = (0, 0)),
             &["qform_code and sform_code", "left", "dcm2niix"],
         ),
-        ("forms disagree", File::with(|f| f.srow[0][3] = 14.0), &["sform and qform", "4.000", "--prefer"]),
-        ("mirrored sform", File::with(|f| f.srow[0] = [-1.0, 0.0, 0.0, 13.0]), &["sform and qform", "--prefer"]),
+        ("forms disagree", File::with(|f| f.srow[0][3] = 14.0), &["sform and qform", "4.000", "the one you trust"]),
+        (
+            "mirrored sform",
+            File::with(|f| f.srow[0] = [-1.0, 0.0, 0.0, 13.0]),
+            &["sform and qform", "the one you trust"],
+        ),
         ("singular sform", File::with(|f| f.srow[2] = [1.0, 0.0, 1e-9, 0.0]), &["srow", "correct the header"]),
         (
             "flat sform",
@@ -94,8 +98,8 @@ fn each_malformed_file_is_refused_by_file_field_and_remedy() {
         ("no dimensions", File::with(|f| f.dim[0] = 0), &["dim", "dim[0]", "1 to 7"]),
         ("flat", File::with(|f| f.dim[0] = 2), &["dim", "dim[3] is 1", "export"]),
         ("negative dimension", File::with(|f| f.dim[2] = -3), &["dim", "dim[2] is -3", "export"]),
-        ("two volumes", File::with(|f| f.dim = [4, 2, 3, 2, 2, 1, 1, 1]), &["dim", "2 volumes", "--volume N"]),
-        ("vectors", File::with(|f| f.dim = [5, 2, 2, 2, 1, 3, 1, 1]), &["dim", "3 volumes", "--volume N"]),
+        ("two volumes", File::with(|f| f.dim = [4, 2, 3, 2, 2, 1, 1, 1]), &["dim", "2 volumes", "choose one (0 to 1)"]),
+        ("vectors", File::with(|f| f.dim = [5, 2, 2, 2, 1, 3, 1, 1]), &["dim", "3 volumes", "choose one (0 to 2)"]),
         ("empty time", File::with(|f| f.dim = [4, 4, 3, 2, 0, 1, 1, 1]), &["dim", "dim[4] is 0", "at least 1"]),
         ("huge", File::with(|f| f.dim = [3, 30000, 30000, 30000, 1, 1, 1, 1]), &["dim", "voxels are more", "export"]),
         (
