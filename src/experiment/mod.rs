@@ -1,6 +1,7 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
 pub mod estimate;
+pub mod field;
 mod law_outcome;
 pub mod nodal_field;
 pub mod observed;

@@ -51,6 +51,8 @@ pub enum Maker {
     Sample,
     /// The most probable moduli.
     Estimate,
+    /// Displacement fields, and what they carry.
+    Fields,
     /// The numbers gathered, with the settings and the provenance.
     Outcome,
     /// The page and the files for other viewers.

@@ -33,6 +33,7 @@ mod plan;
 mod programs;
 mod progress;
 mod settings;
+mod shift;
 mod simulation;
 mod stages;
 mod why;

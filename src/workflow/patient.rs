@@ -6,7 +6,7 @@ use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
 use super::plan::{self, StageName};
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, FieldsInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
@@ -253,7 +253,14 @@ impl<'w, 'a> Patient<'w, 'a> {
         if let Some(facts) = stages::present_estimate(work, &mut made, &self.asked(&tissues))? {
             with_estimate(&mut outcome, &facts);
         }
-        let own = made.get(&StageName::Estimate);
+        let best = outcome
+            .best_sample
+            .as_ref()
+            .filter(|best| outcome.samples.iter().any(|s| s.id == **best && s.file.is_some()));
+        let model = if outcome.estimate.is_some() { Some("estimate".to_owned()) } else { best.cloned() };
+        stages::fields(work, &mut made, &FieldsInput { model, samples: &manifests })?;
+        let own = [StageName::Estimate, StageName::Fields];
+        let own = own.iter().filter_map(|stage| made.get(stage));
         let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&manifests).chain(own).collect();
         finish(work, &outcome, &all)
     }

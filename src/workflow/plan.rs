@@ -52,6 +52,8 @@ pub enum StageName {
     Sample(String),
     /// The most probable moduli.
     Estimate,
+    /// Displacement fields of a patient.
+    Fields,
 }
 
 impl StageName {
@@ -61,6 +63,8 @@ impl StageName {
         match (self, subject) {
             (Self::Registration | Self::Labels, _) => &[],
             (Self::Anat, _) => &[Registration],
+            // With the samples or the estimate whose state it is.
+            (Self::Fields, _) => &[Registration, Anat],
             (Self::Mesh | Self::Reference, Subject::Patient) => &[Anat],
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
@@ -79,6 +83,7 @@ impl StageName {
             Self::Reference => Maker::Reference,
             Self::Sample(_) => Maker::Sample,
             Self::Estimate => Maker::Estimate,
+            Self::Fields => Maker::Fields,
         })
     }
 
@@ -99,6 +104,7 @@ impl StageName {
             "mesh" => Self::Mesh,
             "reference" => Self::Reference,
             "estimate" => Self::Estimate,
+            "fields" => Self::Fields,
             other => Self::Sample(other.strip_prefix("sim-")?.to_owned()),
         })
     }
@@ -114,6 +120,7 @@ impl fmt::Display for StageName {
             Self::Reference => f.write_str("reference"),
             Self::Sample(id) => write!(f, "sim-{id}"),
             Self::Estimate => f.write_str("estimate"),
+            Self::Fields => f.write_str("fields"),
         }
     }
 }
@@ -151,6 +158,9 @@ pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Ste
         }
         Goal::Estimate => stages.push(StageName::Estimate),
         Goal::Images | Goal::Mesh => {}
+    }
+    if subject == Subject::Patient && matches!(goal, Goal::Sweep | Goal::Estimate) {
+        stages.push(StageName::Fields);
     }
     Ok(stages.into_iter().map(|stage| Step { after: stage.after(subject), stage }).collect())
 }

@@ -4,6 +4,7 @@
 //! patient's left and right is worse than none: gzip CRC and length, header against real size before anything is reserved,
 //! data type, scaling, orientation (none, two that disagree, singular), voxel size. NaN voxels become 0 and are counted.
 
+mod displacement;
 mod encode;
 mod error;
 mod gzip;
@@ -11,7 +12,8 @@ mod header;
 mod orientation;
 mod which;
 
-pub use encode::{encode_f32, encode_i16, encode_mask, encode_u8, encode_vectors};
+pub use displacement::{decode_displacement, encode_displacement};
+pub use encode::{encode_f32, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
 pub use error::{NiftiError, NiftiProblem};
 pub use which::Orientation;
 

@@ -6,6 +6,7 @@
 mod anat;
 mod brain_shift;
 mod estimate;
+mod fields;
 mod labels;
 mod mesh;
 mod reference;
@@ -20,12 +21,13 @@ pub use registration::RegistrationFacts;
 pub(crate) use anat::{Anatomy, anat, anat_stage};
 pub(crate) use brain_shift::SeenShift;
 pub(crate) use estimate::{EstimateInput, estimate, present_estimate};
+pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{mesh, mesh_stage};
 pub(crate) use reference::{
     known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference, reference_stage,
 };
-pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage};
+pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples};
 
 use crate::image::nifti::ReadOptions;
