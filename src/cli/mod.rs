@@ -9,6 +9,7 @@ mod completions;
 mod demo;
 mod doctor;
 mod estimate;
+mod evaluate;
 mod failure;
 mod flags;
 mod gp;
@@ -30,6 +31,7 @@ mod session;
 mod simulate;
 mod sweep;
 mod synth;
+mod warp;
 mod why;
 
 pub use failure::{Failure, Reject};
@@ -57,6 +59,8 @@ enum Command {
     Sweep(sweep::Args),
     Reduce(reduce::Args),
     Estimate(estimate::Args),
+    Warp(warp::Args),
+    Evaluate(evaluate::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
     Gp(gp::Args),
@@ -86,6 +90,8 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args, &session),
         Command::Reduce(args) => reduce::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),
+        Command::Warp(args) => warp::run(&args, &session),
+        Command::Evaluate(args) => evaluate::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Gp(args) => gp::run(&args, &session),

@@ -86,7 +86,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("synth.post_slice_mm", args.slice_mm.or(args.spacing_mm.map(|spacing| slices.max(spacing))));
     let settings = session.settings(flags)?.synth;
 
-    let stage = Stage::new("synth", 2, &args.output, &settings).frame("pre, post").seed(settings.seed);
+    let stage = Stage::new("synth", 3, &args.output, &settings).frame("pre, post").seed(settings.seed);
     let outcome = stage.run(session.options.force, || {
         let patient = synthesize(&settings)?;
         let facts = serde_json::to_value(&patient.truth).unwrap_or_default();

@@ -2,6 +2,7 @@
 
 pub mod estimate;
 pub mod field;
+pub mod landmarks;
 mod law_outcome;
 pub mod nodal_field;
 pub mod observed;

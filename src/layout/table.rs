@@ -92,6 +92,8 @@ pub const SHIFT_REACH: Family = Family("xfm/from-pre_to-deformed_desc-{state}_re
 pub const SHIFT_MASK: Family = Family("xfm/from-pre_to-deformed_desc-{state}_mask.nii.gz");
 /// The numbers of the fields.
 pub const SHIFT_JSON: &str = "sim/brain_shift.json";
+/// Landmarks against the fields.
+pub const LANDMARKS_JSON: &str = "sim/landmarks.json";
 /// The pre-operative scan as it was given, header blanked.
 pub const PRE_NATIVE_T1: &str = "anat/pre_space-native_T1w.nii.gz";
 /// The pre-operative scan carried to the deformed state.
@@ -251,6 +253,12 @@ pub const TABLE: &[Entry] = &[
     file(SHIFT_REACH.0, "its 95 % reach, mm", Space::Pre, Maker::Fields),
     file(SHIFT_MASK.0, "where it is believed", Space::Pre, Maker::Fields),
     file(SHIFT_JSON, "the brain shift in numbers", Space::None, Maker::Fields),
+    file(
+        LANDMARKS_JSON,
+        "landmarks against rigid motion, images and model, of `hgm evaluate`",
+        Space::None,
+        Maker::Report,
+    ),
     field(
         (WARPED_T1, "pre-operative scan carried to the deformed state", Space::Pre),
         (Scan::Pre, "desc-warped_T1w.nii.gz", "The scan carried by the brain shift"),

@@ -1,10 +1,12 @@
 //! Why a job did not end well.
 
 use super::case::CaseError;
+use super::evaluate::LandmarkError;
 use super::inputs::InputError;
 use super::meshing::MeshFileError;
 use super::settings::SettingsError;
 use super::simulation::SimulationError;
+use super::warp::WarpError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
@@ -16,6 +18,7 @@ use crate::image::nifti::NiftiError;
 use crate::layout;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
+use crate::overlay::OverlayError;
 use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
@@ -93,6 +96,12 @@ pub enum WorkflowError {
     Mesh(#[from] MeshFileError),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
+    #[error(transparent)]
+    Warp(#[from] WarpError),
+    #[error(transparent)]
+    Landmark(#[from] LandmarkError),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
     #[error(transparent)]

@@ -22,9 +22,11 @@
 
 mod case;
 mod error;
+mod evaluate;
 mod fresh;
 mod inputs;
 mod lock;
+mod maps;
 mod meshing;
 mod outcome;
 mod patient;
@@ -36,6 +38,7 @@ mod settings;
 mod shift;
 mod simulation;
 mod stages;
+mod warp;
 mod why;
 mod work;
 
@@ -43,7 +46,9 @@ pub mod cohort;
 
 pub use case::{Case, CaseError};
 pub use error::{ErrorKind, WorkflowError};
+pub use evaluate::{LandmarkError, Landmarks, evaluate_landmarks};
 pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
+pub use maps::WarpTo;
 pub use meshing::{MeshFileError, MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
@@ -52,6 +57,7 @@ pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
 pub use simulation::{Simulation, SimulationError, SimulationFiles, simulate};
 pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed, RegistrationFacts, mesh_outcome};
+pub use warp::{PointCounts, Through, Warp, WarpError, Warped, warp};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 

@@ -57,18 +57,11 @@ pub(crate) struct CaseShift<'a> {
     pub mni_from_pre: RigidTransform<Pre, Mni>,
     /// Grid of the fields in the post-operative scan's frame.
     pub post_grid: Grid<Post>,
-    /// The scan's own grid.
-    pub pre_grid: Grid<Pre>,
     around: Surroundings,
     seen: DisplacementField<Mni>,
     model: Option<Model>,
     /// The samples of the sweep, for its spread.
     samples: Vec<String>,
-}
-
-/// The name of a case's model: the estimate, else the best sample.
-pub(crate) fn model_of(case: &Case) -> Result<Option<String>, WorkflowError> {
-    Ok(brain_shift(case)?.and_then(|shift| shift.model))
 }
 
 /// The numbers of a case's fields, where there are any.
@@ -124,7 +117,6 @@ impl<'a> CaseShift<'a> {
             post_from_pre: pre_from_post.inverse(),
             mni_from_pre,
             post_grid: spaced(grid_of(case, POST_NATIVE_BRAIN)?, settings.spacing_mm),
-            pre_grid,
             around,
             seen: DisplacementField::from_displacement(&seen.relabelled()),
             model: None,
@@ -176,11 +168,6 @@ impl<'a> CaseShift<'a> {
         let sd: Vec<f64> = sums.iter().map(sd).collect();
         let reach = mean.iter().zip(&sd).map(|(u, sd)| length(u) + 1.96 / 3f64.sqrt() * sd).collect();
         Ok((sd, reach))
-    }
-
-    /// The state of the model.
-    pub fn model(&self) -> Option<&str> {
-        self.model.as_ref().map(|model| model.name.as_str())
     }
 
     /// The field of a state by its name.
@@ -265,11 +252,6 @@ impl<'a> CaseShift<'a> {
     fn put_right<'m>(&self, model: &'m Model) -> &'m Fused {
         let Nodes { displacement_mm, sd_mm, .. } = &model.nodes;
         model.fused.get_or_init(|| fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model)))
-    }
-
-    /// The resected tissue on the fields' grid.
-    pub fn resected(&self) -> &Mask<Pre> {
-        &self.around.resected
     }
 }
 

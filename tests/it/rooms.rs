@@ -16,6 +16,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "mesh",
         "tag",
         "material",
+        "overlay",
         "fem",
         "experiment",
         "layout",
@@ -32,14 +33,15 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("mesh", vec!["geometry", "image", "segment", "artefact"]),
         ("tag", vec!["geometry", "segment", "mesh"]),
         ("material", vec!["artefact"]),
+        ("overlay", vec!["geometry", "mesh"]),
         ("fem", vec!["geometry", "mesh", "material"]),
-        ("experiment", all[..10].to_vec()),
+        ("experiment", all[..11].to_vec()),
         ("layout", vec!["geometry"]),
         (
             "report",
             vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment", "layout"],
         ),
-        ("workflow", all[..13].to_vec()),
+        ("workflow", all[..14].to_vec()),
         ("cli", all.to_vec()),
     ])
 }

@@ -8,6 +8,7 @@ mod field;
 mod files;
 mod frame;
 mod head;
+mod landmarks;
 mod resection;
 mod sag;
 mod sag_fem;

@@ -60,6 +60,14 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
     Ok(image)
 }
 
+/// Reads numbers or labels of any kind: a scan, a label map, a map of one value.
+///
+/// # Errors
+/// [`NiftiError`] as [`decode`], but for an image of one value.
+pub fn decode_intensities(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Volume<f32, Native>, NiftiError> {
+    read(bytes, name, options).map(|image| image.volume)
+}
+
 /// Reads a label map: whole numbers from 0 to 255. Returns the warnings beside it.
 ///
 /// # Errors
