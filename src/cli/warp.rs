@@ -1,6 +1,6 @@
 //! `hgm warp`: a user's image, points, streamlines or surface carried by a case.
 
-use super::flags::Flags;
+use super::flags::{Flags, word};
 use super::{Failure, Session};
 use crate::report::in_words::warped;
 use crate::workflow::{Through, Warp, WarpTo, warp};
@@ -20,7 +20,7 @@ pub struct Args {
     output: PathBuf,
     /// post: from the pre-operative scan to the post-operative one; deformed: brain shift alone; pre: from the post-operative
     /// scan back; mni: rigidly to MNI space
-    #[arg(long, value_parser = to, value_name = "post|deformed|pre|mni", default_value = "post")]
+    #[arg(long, value_parser = word::<WarpTo>, value_name = "post|deformed|pre|mni", default_value = "post")]
     to: WarpTo,
     /// estimate, fused, observed or a sample such as sample-05 [default: the estimate, else the best sample]
     #[arg(long)]
@@ -31,16 +31,6 @@ pub struct Args {
     /// Whether the image is a map of labels [default: found out]
     #[arg(long, value_name = "true|false")]
     labels: Option<bool>,
-}
-
-fn to(text: &str) -> Result<WarpTo, String> {
-    match text {
-        "post" => Ok(WarpTo::Post),
-        "deformed" => Ok(WarpTo::Deformed),
-        "pre" => Ok(WarpTo::Pre),
-        "mni" => Ok(WarpTo::Mni),
-        _ => Err("say post, deformed, pre or mni".to_owned()),
-    }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {

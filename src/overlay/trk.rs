@@ -85,7 +85,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let dims = [6, 8, 10].map(|at| f64::from(i16_at(bytes, at)));
     let sizes = [12, 16, 20].map(|at| f64::from(f32_at(bytes, at)));
     let vox_to_ras = Matrix4::from_fn(|r, c| f64::from(f32_at(bytes, 440 + 4 * (4 * r + c))));
-    if vox_to_ras[(3, 3)] != 1.0 || sizes.iter().any(|s| !(*s > 0.0)) {
+    if vox_to_ras[(3, 3)] != 1.0 || sizes.iter().any(|s| s.is_nan() || *s <= 0.0) {
         let problem =
             "it is not set, so nobody knows where the lines are; save the file with its reference image (dipy does)";
         return Err(damaged(name, "vox_to_ras", problem));
@@ -148,10 +148,10 @@ impl Tracks {
             bytes.extend((*count as i32).to_le_bytes());
             for (n, p) in points.by_ref().take(*count).enumerate() {
                 let x = file_from_mm.transform_point(&Point3::from(*p));
-                x.iter().for_each(|x| bytes.extend((*x as f32).to_le_bytes()));
-                kept[n * self.scalars..(n + 1) * self.scalars].iter().for_each(|s| bytes.extend(s.to_le_bytes()));
+                bytes.extend(x.iter().flat_map(|x| (*x as f32).to_le_bytes()));
+                bytes.extend(kept[n * self.scalars..(n + 1) * self.scalars].iter().flat_map(|s| s.to_le_bytes()));
             }
-            kept[count * self.scalars..].iter().for_each(|s| bytes.extend(s.to_le_bytes()));
+            bytes.extend(kept[count * self.scalars..].iter().flat_map(|s| s.to_le_bytes()));
         }
         bytes
     }

@@ -85,9 +85,9 @@ impl Points {
                 let end = if n + 1 < points_mm.len() { "\n" } else { "" };
                 bytes.extend(format!("{}{end}", p.map(written).join(" ")).bytes());
             } else if self.double {
-                p.iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+                bytes.extend(p.iter().flat_map(|x| x.to_be_bytes()));
             } else {
-                p.iter().for_each(|x| bytes.extend((*x as f32).to_be_bytes()));
+                bytes.extend(p.iter().flat_map(|x| (*x as f32).to_be_bytes()));
             }
         }
         bytes.extend(&self.after);

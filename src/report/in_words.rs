@@ -4,6 +4,7 @@ use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::resection::improvement;
+use crate::material::meta_model::{Fit, StabilityRange};
 use std::path::Path;
 
 /// What was carried; `points`: all, in removed tissue, beyond the field.
@@ -101,4 +102,40 @@ pub fn phantom_summary(outcome: &ExperimentOutcome, nearest: Option<&str>) -> St
         text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
     }
     text
+}
+
+/// A law that was fitted, with its standard deviations and its verdict of stability.
+pub fn law_fit(fit: &Fit, parameter_names: &[&str], parameter_sd: &[f64]) -> String {
+    let mut text = format!("\n{:<14}", fit.model.name());
+    for ((name, value), sd) in parameter_names.iter().zip(&fit.parameters).zip(parameter_sd) {
+        let bound = if fit.at_bound.iter().any(|b| b == name) { " (at its bound)" } else { "" };
+        text += &format!("{name} = {value:.4} (sd {sd:.3}){bound}  ");
+    }
+    text + &format!(
+        "\n{:<14}shear modulus {:.1} Pa, R2 {:.4}, cost {:.4}{}\n{:<14}{}\n",
+        "",
+        fit.shear_modulus_pa,
+        fit.r_squared,
+        fit.cost,
+        if fit.converged { "" } else { ", the search did not converge" },
+        "",
+        law_verdict(fit)
+    )
+}
+
+fn law_verdict(fit: &Fit) -> String {
+    if fit.stability.everywhere() {
+        return "stable at every stretch: energy grows, energy is convex, true stress rises".to_owned();
+    }
+    let where_ = |range: StabilityRange| match range {
+        StabilityRange::Everywhere => "at every stretch",
+        StabilityRange::Window => "in the window only",
+        StabilityRange::Nowhere => "not even in the window",
+    };
+    format!(
+        "energy grows {}, is convex {}, true stress rises {}",
+        where_(fit.stability.energy_grows),
+        where_(fit.stability.convex),
+        where_(fit.stability.true_stress_rises)
+    )
 }

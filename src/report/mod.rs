@@ -18,5 +18,6 @@ pub mod mesh_figure;
 pub mod page;
 pub mod picture;
 pub mod render;
+pub mod shift_figure;
 pub mod slice;
 pub mod viewer;

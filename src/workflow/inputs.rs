@@ -86,6 +86,11 @@ pub enum InputError {
         if [pre, post].contains(&found) { ": it lies elsewhere" } else { "" }
     )]
     MaskGrid { role: MaskRole, name: String, found: [usize; 3], pre: [usize; 3], post: [usize; 3] },
+    #[error(
+        "{}: the mask's grid ({} voxels) is not its image's ({}) or lies elsewhere; resample it onto the image",
+        path.display(), size(*found), size(*image)
+    )]
+    ImageGrid { path: PathBuf, found: [usize; 3], image: [usize; 3] },
 }
 
 fn size([x, y, z]: [usize; 3]) -> String {
@@ -101,6 +106,28 @@ pub fn read_input(path: &Path) -> Result<Vec<u8>, InputError> {
         return Err(InputError::Folder { path: path.to_path_buf() });
     }
     std::fs::read(path).map_err(|source| InputError::Unreadable { path: path.to_path_buf(), source })
+}
+
+/// A mask on the grid of an image; what is odd about it is added to the warnings.
+///
+/// # Errors
+/// A file that is no mask, or one on another grid.
+pub fn read_mask_of(
+    path: &Path,
+    grid: &Grid<Native>,
+    options: &ReadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Mask<Native>, WorkflowError> {
+    // What two programs may disagree about an origin.
+    const TOLERANCE_MM: f64 = 0.1;
+    let name = path.display().to_string();
+    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, options)?;
+    if !mask.grid.coincides(grid, TOLERANCE_MM) {
+        let (path, found, image) = (path.to_path_buf(), mask.grid.dims, grid.dims);
+        return Err(InputError::ImageGrid { path, found, image }.into());
+    }
+    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    Ok(mask)
 }
 
 /// A text file the user named.

@@ -3,7 +3,7 @@
 use super::case::{Case, CaseError};
 use super::error::WorkflowError;
 use super::settings::Settings;
-use super::shift::{CaseShift, ESTIMATE, brain_shift, grid_of};
+use super::shift::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
 use super::stages::transforms;
 use crate::experiment::field::{ShiftField, carried, inverse};
 use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
@@ -15,9 +15,11 @@ use crate::layout::{
 };
 use crate::overlay::{Carried, PointState};
 use crate::segment::atlas;
+use serde::Deserialize;
 
 /// Where something of a patient is carried.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum WarpTo {
     /// From the pre-operative scan to the post-operative one.
     Post,
@@ -147,11 +149,12 @@ impl Map {
     pub fn carry(&self, x_mm: [f64; 3]) -> Carried {
         let x = Position::new(x_mm[0], x_mm[1], x_mm[2]);
         let rigid: [f64; 3] = self.rigid.apply(x).mm.into();
-        let moved = self.forward.as_ref().and_then(|field| carried(field, x_mm));
         let Some(field) = &self.forward else {
             return Carried { mm: rigid, sd_mm: None, state: PointState::Tissue };
         };
-        let Some(mm) = moved else { return Carried { mm: rigid, sd_mm: None, state: PointState::Outside } };
+        let Some(mm) = carried(field, x_mm) else {
+            return Carried { mm: rigid, sd_mm: None, state: PointState::Outside };
+        };
         let at_rest = if self.backwards { Position::new(mm[0], mm[1], mm[2]) } else { x };
         let is = |mask: &Option<Mask<Native>>| mask.as_ref().map(|mask| mask.nearest(at_rest) == Some(true));
         if is(&self.resected) == Some(true) {
@@ -159,13 +162,11 @@ impl Map {
         }
         let still = (0..3).all(|a| (mm[a] - rigid[a]).abs() < 2e-3);
         let state = match is(&self.believed) {
-            Some(true) => PointState::Tissue,
-            None => PointState::Tissue,
+            Some(true) | None => PointState::Tissue,
             Some(false) if still => PointState::Outside,
             Some(false) => PointState::Fluid,
         };
         let sd_mm = self.sd.as_ref().filter(|_| state != PointState::Outside).and_then(|sd| sd.trilinear(at_rest));
-        debug_assert!(field.data.len() == field.grid.len());
         Carried { mm, sd_mm: sd_mm.map(f64::from), state }
     }
 
@@ -204,14 +205,13 @@ type Known = (Volume<[f32; 3], Native>, Option<Volume<f32, Native>>, Mask<Native
 /// A state whose fields are not kept in the folder.
 fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo) -> Result<Known, WorkflowError> {
     let settings = Settings::resolve([&case.settings()?])?;
-    let shift = brain_shift(case)?;
-    let model = shift.and_then(|shift| shift.model).filter(|_| !state.starts_with("sample-"));
-    let model = model.unwrap_or_else(|| state.to_owned());
+    let own = !matches!(state, FUSED | OBSERVED);
+    let model = if own { Some(state.to_owned()) } else { brain_shift(case)?.and_then(|shift| shift.model) };
     let samples = super::plan::samples(&settings, super::plan::Subject::Patient)?;
     let samples =
         samples.into_iter().map(|s| s.id).filter(|id| case.path(&crate::layout::SAMPLE_STATE.of(id)).exists());
     let believed_mm = settings.estimate.displacement.depth_mm;
-    let of_case = CaseShift::read(case, Some(&model), samples.collect(), (&settings.fields, believed_mm))?;
+    let of_case = CaseShift::read(case, model.as_deref(), samples.collect(), (&settings.fields, believed_mm))?;
     let field: ShiftField = of_case.state(state)?;
     let vectors = if family == PRE_FROM_POST_FIELD {
         let value = field.to_pre(&of_case.post_grid, &of_case.post_from_pre.inverse());

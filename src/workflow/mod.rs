@@ -47,7 +47,7 @@ pub mod cohort;
 pub use case::{Case, CaseError};
 pub use error::{ErrorKind, WorkflowError};
 pub use evaluate::{LandmarkError, Landmarks, evaluate_landmarks};
-pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
+pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_mask_of, read_text, shown};
 pub use maps::WarpTo;
 pub use meshing::{MeshFileError, MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;

@@ -30,6 +30,7 @@ pub(crate) const OBSERVED: &str = "observed";
 
 /// The displacement of a mesh's nodes with its spread, mm, MNI.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_field_names, reason = "the unit is in the name")]
 struct Nodes {
     displacement_mm: Vec<[f64; 3]>,
     sd_mm: Vec<f64>,
@@ -173,13 +174,12 @@ impl<'a> CaseShift<'a> {
     /// The field of a state by its name.
     pub fn state(&self, name: &str) -> Result<ShiftField, WorkflowError> {
         match (name, &self.model) {
-            (OBSERVED, _) => self.observed(),
+            (OBSERVED, _) | (FUSED, None) => self.observed(),
             (FUSED, Some(model)) => {
                 let found = self.put_right(model);
                 Ok(self.field(&model.mesh, &found.displacement_mm, (&found.sd_mm, &found.reach95_mm), None))
             }
             (_, Some(model)) if model.name == name => Ok(self.of_model(model)),
-            (FUSED, None) => self.observed(),
             _ => {
                 let other = self.state_of_model(name)?;
                 Ok(self.of_model(&other))
@@ -194,12 +194,11 @@ impl<'a> CaseShift<'a> {
 
     fn observed(&self) -> Result<ShiftField, WorkflowError> {
         let own;
-        let (mesh, depth) = match &self.model {
-            Some(model) => (&model.mesh, model.depth_mm.clone()),
-            None => {
-                own = vtu::decode(&self.case.read(REST_MESH)?, REST_MESH)?.mesh;
-                (&own, depth_mm(&own))
-            }
+        let (mesh, depth) = if let Some(model) = &self.model {
+            (&model.mesh, model.depth_mm.clone())
+        } else {
+            own = vtu::decode(&self.case.read(REST_MESH)?, REST_MESH)?.mesh;
+            (&own, depth_mm(&own))
         };
         let displacement_mm: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| moved_by(&self.seen, *x)).collect();
         let sd_mm: Vec<f64> = depth.iter().map(|d| 3f64.sqrt() * self.settings.seen_noise_at(*d)).collect();

@@ -10,6 +10,7 @@ mod dependencies;
 mod doubtful_inputs;
 mod examples;
 mod fem;
+mod fields;
 mod job;
 mod made;
 mod material;

@@ -157,7 +157,9 @@ fn part(mask: &Mask<Pre>, points: &[[f64; 3]], room_mm: f64) -> ([usize; 3], Gri
     for (n, _) in mask.data.iter().enumerate().filter(|(_, inside)| **inside) {
         hold(grid.voxel(n).map(|v| v as f64));
     }
-    points.iter().for_each(|p| hold(grid.voxel_at(Position::new(p[0], p[1], p[2])).into()));
+    for p in points {
+        hold(grid.voxel_at(Position::new(p[0], p[1], p[2])).into());
+    }
     let spacing = grid.spacing_mm();
     let mut first = [0; 3];
     let mut dims = [2; 3];

@@ -6,12 +6,15 @@ use crate::material::random::CounterRng;
 use crate::segment::label;
 use nalgebra::{Point3, Vector3};
 
+/// Where a point is before and after, mm.
+type Pair = ([f64; 3], [f64; 3]);
+
 /// How many there are.
 const COUNT: usize = 200;
 
 impl SyntheticPatient {
     /// The landmarks on both scans, each in its scanner's frame, mm.
-    pub fn landmarks(&self) -> Vec<([f64; 3], [f64; 3])> {
+    pub fn landmarks(&self) -> Vec<Pair> {
         let grid = self.tissue_pre.grid;
         let tissue = |n: &usize| {
             let l = self.tissue_pre.data[*n];
@@ -36,8 +39,8 @@ impl SyntheticPatient {
     /// The same as two tables.
     pub(super) fn landmark_tables(&self) -> [Vec<u8>; 2] {
         let landmarks = self.landmarks();
-        let table = |of: &dyn Fn(&([f64; 3], [f64; 3])) -> [f64; 3]| {
-            let row = |(n, pair): (usize, &([f64; 3], [f64; 3]))| {
+        let table = |of: &dyn Fn(&Pair) -> [f64; 3]| {
+            let row = |(n, pair): (usize, &Pair)| {
                 let [x, y, z] = of(pair);
                 format!("{},{x:.3},{y:.3},{z:.3}\n", n + 1)
             };
