@@ -1,5 +1,6 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
+pub mod compare;
 pub mod estimate;
 pub mod nodal_field;
 pub mod observed;
@@ -13,3 +14,4 @@ pub mod setting;
 pub mod smooth_noise;
 pub mod sweep;
 pub mod synth;
+pub mod verdict;
