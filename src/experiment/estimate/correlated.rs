@@ -3,10 +3,11 @@
 
 use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
+use super::mesh_error::made_up_by;
 use super::outcome::{Fitted, ROUGH, differences};
 use super::process::{Factor, Process, spread_out};
 use super::re_registration::{Instrument, MovedNode, without_own_error};
-use super::rigid_remainder::{RIGID, RigidModes, Weighted, whitened, with_remainder};
+use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
 use super::{
     Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, ProblemError, estimate, information,
 };
@@ -69,6 +70,24 @@ pub struct Findings {
     pub rigid_remainder_mm: f64,
     /// The shift.
     pub shift: Shift,
+    /// The places that were looked at, mm, and their nodes.
+    pub places_mm: Vec<[f64; 3]>,
+    /// Their nodes.
+    pub nodes: Vec<u32>,
+    factor: Factor,
+    /// The Jacobian through the factor, and the prior's inverse covariance, rigid remainder included.
+    white_jacobian: DMatrix<f64>,
+    precision: DMatrix<f64>,
+}
+
+impl Findings {
+    /// The change of the first `own` parameters that makes up for a change (mm) of the model at the places, row by row.
+    pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Vec<f64> {
+        let rows = 3 * self.nodes.len();
+        let change = DMatrix::from_fn(rows, 1, |row, _| change_mm(row));
+        let white = self.factor.whiten(&change).column(0).into_owned();
+        made_up_by(&self.white_jacobian, &self.precision, &white, own)
+    }
 }
 
 /// One-sided 95 % of a Gaussian.
@@ -174,9 +193,7 @@ pub(super) fn fit(
     let unexplained = if evidence.log_evidence > exact.log_evidence { evidence.unexplained } else { exact.unexplained };
 
     let findings = fit.findings(errors, &seen_there, &pattern_mm, &descent, unexplained, [evidence, exact])?;
-    let factor = unexplained.factor(&fit.places_mm).ok_or(EstimateError::Covariance)?;
     let precisions: Vec<f64> = fit.prior[own..].iter().map(LogPrior::precision).collect();
-    let white = whitened(&descent.linearisation, &factor);
     let residuals = descent.linearisation.residuals_mm.as_slice();
     let residual_rms_mm = root_mean_square(residuals).unwrap_or(0.0);
     let observations = residuals.len();
@@ -187,9 +204,9 @@ pub(super) fn fit(
     };
     descent.log_parameters.truncate(own);
     Ok(Fitted {
-        fisher: information(&white.jacobian_mm, own, &precisions),
+        fisher: information(&findings.white_jacobian, own, &precisions),
         noise_mm: total_sd_mm,
-        independent: independent(&factor, &fit.places_mm, total_sd_mm),
+        independent: independent(&findings.factor, &fit.places_mm, total_sd_mm),
         residual_rms_mm,
         observations,
         taken_out_rms_mm,
@@ -257,7 +274,13 @@ impl Fit<'_, '_> {
         let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
         // What was seen without the instrument's own error is what the model was held against.
         let shifted = flat(&|n| self.body.observed_nodes()[n].1) - &remainder;
+        let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
         Ok(Findings {
+            white_jacobian: factor.whiten(&descent.linearisation.jacobian_mm),
+            precision: super::precision(&self.prior),
+            factor,
+            places_mm: self.places_mm.clone(),
+            nodes: seen.iter().map(|(n, _)| *n).collect(),
             unexplained,
             measured_noise: errors.noise,
             odds,

@@ -9,6 +9,7 @@ mod correlated;
 mod displacement;
 mod evidence;
 mod levenberg_marquardt;
+mod mesh_error;
 mod outcome;
 mod posterior;
 mod process;

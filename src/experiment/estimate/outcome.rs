@@ -3,6 +3,7 @@
 use super::body::{Body, BodyError, Observation, Solved, Unknown};
 use super::correlated::{self, CorrelatedErrors, Odds, Shift};
 use super::evidence::Unexplained;
+use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
 use super::{
     Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace,
@@ -47,8 +48,11 @@ pub struct Problem<'a> {
     pub observation: Observation,
     /// How far it is believed.
     pub errors: Errors,
-    /// Standard deviation of ln(modulus) that mesh, supports and outer surface add; 0 for a body known exactly.
+    /// Standard deviation of ln(modulus) that mesh and element add; 0 for a body known exactly. Only taken where it cannot be
+    /// found from a coarser mesh.
     pub model_log_sd: f64,
+    /// The same body in a coarser mesh: what mesh and element add is found from it, case by case.
+    pub coarser: Option<&'a TetMesh>,
     /// Whether body and load are known exactly (a phantom's): then nothing is held against what is known of tissue.
     pub body_known: bool,
     /// Where to start; the prior's mean when empty.
@@ -65,9 +69,12 @@ pub struct EstimateOutcome {
     pub posterior: Posterior,
     /// What was known before.
     pub prior: Vec<LogPrior>,
-    /// Standard deviation of ln(modulus) that the model itself adds to the intervals.
+    /// Largest standard deviation of ln(modulus) that the mesh itself adds to the intervals.
     #[serde(default)]
     pub model_log_sd: f64,
+    /// The same per parameter, in their order, where a coarser mesh was there to find it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh_log_sd: Vec<f64>,
     /// Observations (nodes of the observed sets, or components of displacements).
     pub observations: usize,
     /// How many of them count as independent.
@@ -165,7 +172,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
     let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
     let density_known = !unknowns.contains(&Unknown::Density);
-    let model_error: Vec<f64> = unknowns
+    let mut model_error: Vec<f64> = unknowns
         .iter()
         .map(|u| if matches!(u, Unknown::ShearModulus(_)) { problem.model_log_sd } else { 0.0 })
         .collect();
@@ -182,7 +189,19 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let Solved { outcome: state, sensitivities } = body.solve(&fitted.descent.log_parameters)?;
     // A model that is too stiff is made up for by a modulus that is too low: its error is not one of the displacement.
     let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
-    let posterior = posterior.with_model_error(&model_error);
+    let mut mesh_log_sd = Vec::new();
+    if let (Some(coarse), Some(found)) = (problem.coarser, &fitted.correlated) {
+        let mut coarse_body =
+            Body::new(coarse, problem.template, unknown.clone(), problem.poisson_ratio, Observation::Nodes(Vec::new()))?;
+        let there = coarse_body.solve(&fitted.descent.log_parameters)?.outcome.displacement_mm;
+        let there = at_places(coarse, &there, &found.places_mm);
+        let change = |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
+        let made = found.made_up_by(change, prior.len());
+        let left = left_of_difference(problem.mesh, coarse);
+        mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
+        model_error = mesh_log_sd.clone();
+    }
+    let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
     let posed = Posed { prior: &prior, tissues: &tissues, weight_alone: only_weight && density_known, body_known: problem.body_known };
     let verdict = verdict(&fitted, settings, &posterior, &posed);
     let materials = tissue_materials(&unknown, &fitted.descent.log_parameters, problem.poisson_ratio);
@@ -199,7 +218,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         convergence: fitted.descent.convergence,
         solves: body.solves,
         tangent_solves: body.tangent_solves,
-        model_log_sd: problem.model_log_sd,
+        model_log_sd: model_error.iter().copied().fold(0.0, f64::max),
+        mesh_log_sd,
         unexplained: correlated.as_ref().map(|c| c.unexplained),
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
@@ -410,6 +430,7 @@ mod tests {
             observation: Observation::Nodes(observed),
             errors: Errors::Independent { share: 1.0 },
             model_log_sd: 0.0,
+            coarser: None,
             body_known: true,
             start: vec![2299f64.ln(), 1195f64.ln()],
             instrument: None,

@@ -129,13 +129,13 @@ impl Posterior {
     }
 
     /// With the model's own error (mesh, supports, the body's outer surface) added to the uncertainty of the parameters
-    /// whose `error` is given: standard deviations of their logarithms, in the order of the names.
+    /// whose `error` is given, at these values: standard deviations of their logarithms, in the order of the names.
     #[must_use]
-    pub fn with_model_error(mut self, error: &[f64]) -> Self {
+    pub fn with_model_error(mut self, error: &[f64], values: &[f64], prior: &[LogPrior]) -> Self {
         for (p, error) in error.iter().enumerate().filter(|(_, e)| **e > 0.0) {
             self.log_covariance[p][p] += error * error;
             self.log_sd[p] = self.log_covariance[p][p].sqrt();
-            self.interval_95[p] = [-Z_95, Z_95].map(|z| self.mode[p] * (z * self.log_sd[p]).exp());
+            self.interval_95[p] = [-Z_95, Z_95].map(|z| prior[p].scale.value(values[p] + z * self.log_sd[p]));
         }
         self
     }

@@ -12,7 +12,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 pub struct RigidModes {
     /// Displacement of every place, three components each, per mm (shifts) and per radian (turns).
     pub columns_mm: DMatrix<f64>,
-    middle_mm: Vector3<f64>,
     /// Standard deviations: mm for shifts, radians for turns.
     sd: [f64; 6],
 }
@@ -36,7 +35,7 @@ impl RigidModes {
         // Three shifts of s: mean square 3 s^2. Turns of t about three axes: 2 t^2 arm^2.
         let shift = (error_mm * error_mm / 6.0).sqrt();
         let turn = (error_mm * error_mm / 4.0 / mean_squared_arm.max(1e-12)).sqrt();
-        Self { columns_mm, middle_mm, sd: [shift, shift, shift, turn, turn, turn] }
+        Self { columns_mm, sd: [shift, shift, shift, turn, turn, turn] }
     }
 
     /// What is known of them beforehand.
@@ -47,12 +46,6 @@ impl RigidModes {
             LogPrior { name, mean: 0.0, sd: Some(sd), scale: Scale::Plain, correlation: Vec::new() }
         };
         names.into_iter().zip(self.sd).map(prior)
-    }
-
-    /// How far they carry any point, mm.
-    pub fn at(&self, x: [f64; 3], amounts: &[f64]) -> Vector3<f64> {
-        let part = |k: usize| Vector3::new(amounts[k], amounts[k + 1], amounts[k + 2]);
-        part(0) + part(3).cross(&(Vector3::from(x) - self.middle_mm))
     }
 }
 
@@ -80,7 +73,7 @@ pub fn with_remainder(plain: &Linearisation, rigid: &RigidModes, amounts: &[f64]
 }
 
 /// The same, independent and of standard deviation 1.
-pub fn whitened(linear: &Linearisation, factor: &Factor) -> Linearisation {
+fn whitened(linear: &Linearisation, factor: &Factor) -> Linearisation {
     let residuals = DMatrix::from_column_slice(linear.residuals_mm.len(), 1, linear.residuals_mm.as_slice());
     let residuals_mm = factor.whiten(&residuals).column(0).into_owned();
     Linearisation { residuals_mm, jacobian_mm: factor.whiten(&linear.jacobian_mm) }
@@ -106,6 +99,13 @@ mod tests {
         (0..60).map(|n| [f64::from(n % 4) * 11.0, f64::from(n / 4 % 5) * 9.0, f64::from(n / 20) * 14.0]).collect()
     }
 
+    /// How far a shift and a turn about the middle of the places carry a point, mm.
+    fn carried(places: &[[f64; 3]], x: [f64; 3], amounts: &[f64]) -> Vector3<f64> {
+        let middle = places.iter().map(|x| Vector3::from(*x)).sum::<Vector3<f64>>() / places.len() as f64;
+        let part = |k: usize| Vector3::new(amounts[k], amounts[k + 1], amounts[k + 2]);
+        part(0) + part(3).cross(&(Vector3::from(x) - middle))
+    }
+
     #[test]
     fn the_movements_are_those_of_a_rigid_body_and_of_the_size_that_is_expected() {
         let places = places();
@@ -113,12 +113,12 @@ mod tests {
         let amounts = [0.3, -0.1, 0.2, 1e-3, -2e-3, 5e-4];
         let moved = &rigid.columns_mm * DVector::from_column_slice(&amounts);
         for (n, x) in places.iter().enumerate() {
-            let there = rigid.at(*x, &amounts);
+            let there = carried(&places, *x, &amounts);
             assert!((0..3).all(|a| (there[a] - moved[3 * n + a]).abs() < 1e-12));
         }
         // Lengths between places stay, to first order.
         let between = |a: usize, b: usize, moved: f64| {
-            let at = |n: usize| Vector3::from(places[n]) + moved * rigid.at(places[n], &amounts);
+            let at = |n: usize| Vector3::from(places[n]) + moved * carried(&places, places[n], &amounts);
             (at(a) - at(b)).norm()
         };
         assert!((between(3, 57, 1.0) - between(3, 57, 0.0)).abs() < 1e-3);
