@@ -24,7 +24,6 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Observed(_) => {
             "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)".to_owned()
         }
-        WorkflowError::EstimateLaw { .. } => "or try samples of that law with `hgm sweep --law`".to_owned(),
         WorkflowError::SampleMissing { .. } => {
             "run `hgm sweep CASE` on the shard it belongs to with the settings of the other shards (`hgm why CASE` tells \
              what differs)"

@@ -77,11 +77,6 @@ pub enum WorkflowError {
     NoReferenceState { reason: String },
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
-    #[error(
-        "table [prior]: `law` is {law}: an estimate is made with neo-hookean materials alone, and an interval of another \
-         law's modulus would not be this patient's; set `law = \"neo-hookean\"` for it"
-    )]
-    EstimateLaw { law: String },
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]

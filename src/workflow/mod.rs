@@ -48,7 +48,6 @@ pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed,
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
-use crate::material::meta_model::MetaModel;
 use crate::report::case::write_report;
 use patient::{Images, Patient, Prepared};
 use stages::SampleMode;
@@ -106,10 +105,6 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     let engine = work.settings.mesh.engine;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(engine).map_err(refused)?;
-    let law = work.settings.prior.law;
-    if goal == Goal::Estimate && law != MetaModel::NeoHookean {
-        return Err(WorkflowError::EstimateLaw { law: law.name().to_owned() });
-    }
     plan(work.settings, work.subject, goal).map(|_| ())
 }
 

@@ -191,6 +191,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             reference: &self.reference,
             shift: Some(&shift),
             noise_mm: self.floor().combined_mm().unwrap_or(work.settings.estimate.descent.noise_mm),
+            rigid_error_mm: work.settings.resection.registration_error_mm,
         };
         let mut made = prepared.made.clone();
         let facts = stages::estimate(work, &mut made, &input)?;

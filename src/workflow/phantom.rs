@@ -96,6 +96,7 @@ pub(crate) fn estimate(work: &Work<'_>) -> Result<EstimateFacts, WorkflowError> 
         reference: &Reference::Nodes(displacement),
         shift: None,
         noise_mm: work.settings.estimate.phantom_noise_mm,
+        rigid_error_mm: 0.0,
     };
     let facts = stages::estimate(work, &mut made, &input)?;
     let mut outcome = work.case.outcome()?;

@@ -3,18 +3,17 @@
 use super::brain_shift::SeenShift;
 use crate::artefact::Produced;
 use crate::experiment::estimate::{
-    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
-    Turn, Unknown, moved_by, solve_problem,
+    DisplacementSettings, Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation,
+    Problem, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
-use crate::experiment::phantom::neo_hookean;
-use crate::experiment::prior::log_prior;
-use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::prior::law_priors;
+use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::sweep::Reference;
 use crate::fem::{ElementKind, Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
-use crate::material::meta_model::MetaModel;
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
@@ -23,7 +22,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Estimate;
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
@@ -175,6 +174,8 @@ pub(crate) struct EstimateInput<'a> {
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
+    /// Expected error of the rigid registration, mm.
+    pub rigid_error_mm: f64,
 }
 
 /// The estimate's numbers, and its state as one more sample.
@@ -194,9 +195,6 @@ pub(crate) fn estimate(
 ) -> Result<EstimateFacts, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
-    if prior.law != MetaModel::NeoHookean {
-        return Err(WorkflowError::EstimateLaw { law: prior.law.name().to_owned() });
-    }
     let posed = serde_json::json!({
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
         "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
@@ -207,7 +205,7 @@ pub(crate) fn estimate(
         let mesh = input.mesh.0;
         let mut unknowns = Vec::new();
         for tissue in input.tissues {
-            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, prior)?));
+            unknowns.extend(law_priors(tissue, prior)?);
         }
         unknowns.extend(options.unknown_loads(&input.scenario.loads));
         let patient = matches!(input.reference, Reference::Surfaces(_));
@@ -215,7 +213,7 @@ pub(crate) fn estimate(
         if patient {
             scenario.solver.element = options.element;
         }
-        let (observation, independent_share, noise_mm) = observation(input, options);
+        let (observation, errors, noise_mm) = observation(input, options);
         let believed = &options.displacement;
         let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
             move |known: &[[f64; 3]]| {
@@ -230,8 +228,10 @@ pub(crate) fn estimate(
             unknowns,
             poisson_ratio: input.poisson_ratio,
             observation,
-            independent_share,
+            errors,
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
+            coarser: None,
+            body_known: !patient,
             start: Vec::new(),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
@@ -242,38 +242,44 @@ pub(crate) fn estimate(
     })
 }
 
-/// What is observed, the share of it that is independent, and the standard deviation of one observation in mm.
-fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, f64, f64) {
+/// What is observed, how far it is believed, and the standard deviation of one observation in mm.
+fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, Errors, f64) {
     let mesh = input.mesh.0;
     match (input.reference, input.shift) {
         (Reference::Nodes(u), _) => {
-            (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0, input.noise_mm)
+            let nodes = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+            (Observation::Nodes(nodes), Errors::Independent { share: 1.0 }, input.noise_mm)
         }
         (Reference::Surfaces(_), Some(shift)) if options.observed == Observed::Displacement => {
             let believed = &options.displacement;
             let nodes = believed.observed(mesh, |x| moved_by(&shift.seen, x));
-            (Observation::Nodes(nodes), believed.independent_share(mesh), believed.noise_mm)
+            (Observation::Nodes(nodes), Errors::Correlated(believed.errors(input.rigid_error_mm)), believed.noise_mm)
         }
         (Reference::Surfaces(surfaces), _) => {
             // A node of a surface mesh of edge h stands for sqrt(3)/2 h^2 of it.
             let area_mm2 = 0.75f64.sqrt() * mesh.median_edge_mm().powi(2);
             let share = (area_mm2 / options.correlation_mm.powi(2)).min(1.0);
-            (Observation::Surfaces(surfaces.clone()), share, input.noise_mm)
+            (Observation::Surfaces(surfaces.clone()), Errors::Independent { share }, input.noise_mm)
         }
     }
 }
 
 fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, WorkflowError> {
     let mesh = input.mesh.0;
-    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm } = found;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials } = found;
     let errors = input.reference.errors(mesh, &state.displacement_mm);
-    let tissue = |(n, t): (usize, &Tissue)| {
+    let tissue = |t: &Tissue| {
+        // The parameters are named after the tissue.
+        let name = Unknown::ShearModulus(t.clone()).name();
+        let n = outcome.posterior.names.iter().position(|of| *of == name).unwrap_or(0);
         let (mode, prior) = (outcome.posterior.mode[n], &outcome.prior[n]);
         let level = prior.sd.map_or(0.0, |sd| (mode.ln() - prior.mean) / sd);
-        (t.name.clone(), neo_hookean(level, mode, input.poisson_ratio))
+        let neo_hookean = || Material::neo_hookean(mode, input.poisson_ratio);
+        let material = materials.get(&t.name).cloned().unwrap_or_else(neo_hookean);
+        (t.name.clone(), TissueSample { sd_level: level, shear_modulus_pa: mode, material })
     };
     let sample =
-        Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().enumerate().map(tissue).collect(), task: None };
+        Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().map(tissue).collect(), task: None };
     let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
     let file = ESTIMATE_STATE.to_owned();
     let record = SampleOutcome {
