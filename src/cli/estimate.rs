@@ -40,8 +40,13 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 pub fn table(facts: &EstimateFacts) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         &facts.estimate;
-    let mut text = String::from("parameter                            mode   95 % interval\n");
-    for (n, name) in posterior.names.iter().enumerate() {
+    let verdict = &facts.estimate.verdict;
+    let mut text = format!("{}\n", verdict.sentence);
+    let shown = verdict.finding.has_stiffness();
+    if shown {
+        text += "parameter                            mode   95 % interval\n";
+    }
+    for (n, name) in posterior.names.iter().enumerate().filter(|_| shown) {
         let [low, high] = posterior.interval_95[n];
         text += &format!("{name:<32} {:>8.1}   {low:.1} to {high:.1}\n", posterior.mode[n]);
     }

@@ -52,11 +52,13 @@ pub fn in_words(case: &Case, goal: Goal) -> Result<String, Failure> {
 
 /// Best sample, errors and verdicts.
 fn summary(outcome: &ExperimentOutcome) -> String {
-    let mut text = String::new();
+    let mut text = format!("{}\n", outcome.verdict.sentence);
     let floor = outcome.noise_floor.unwrap_or_default();
-    if let Some(best) = outcome.best() {
+    if let Some(best) = outcome.best().filter(|_| outcome.verdict.finding.has_stiffness()) {
         let moduli: Vec<String> = best.shear_modulus_pa.iter().map(|(t, m)| format!("{t} {m:.0} Pa")).collect();
         text += &format!("best sample {} ({})\n", best.id, moduli.join(", "));
+    }
+    if let Some(best) = outcome.best() {
         for (set, deformed) in &best.rmse_mm {
             let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
             let verdict = improvement(rest, *deformed, &floor);

@@ -53,16 +53,23 @@ pub fn mask_surface(mask: &Mask<Mni>) -> TriMesh {
 }
 
 /// What mesh, segmentation and registration make of a brain that has not moved, root mean square in mm: how far the mesh's
-/// sets lie from the pre-operative surfaces they follow (`own`), and how far nodes that cannot have moved (`still`) lie from
-/// the brain's surface on the post-operative scan. The two are independent; `None` where there is nothing to be measured.
-pub fn error_at_rest_mm(mesh: &TetMesh, own: &BTreeMap<String, TriMesh>, still: &str, post_brain: &TriMesh) -> Option<f64> {
+/// sets lie from the pre-operative surfaces they follow (`own`), and how much further the brain's surface lies from nodes that
+/// cannot have moved (`still`) on one scan than on the other (`brains`). The two are independent; `None` where there is
+/// nothing to be measured.
+pub fn error_at_rest_mm(
+    mesh: &TetMesh,
+    own: &BTreeMap<String, TriMesh>,
+    still: &str,
+    brains: [&TriMesh; 2],
+) -> Option<f64> {
     let away = |set: &str, surface: &TriMesh| {
         let tree = ClosestPoint::new(surface)?;
         let points: Vec<[f64; 3]> = mesh.node_sets.get(set)?.iter().map(|&n| mesh.nodes_mm()[n as usize]).collect();
         Some(closest_distances_mm(&points, &tree))
     };
     let of_mesh: Vec<f64> = own.iter().filter_map(|(set, surface)| away(set, surface)).flatten().collect();
-    let of_scans = away(still, post_brain)?;
+    let [before, after] = [away(still, brains[0])?, away(still, brains[1])?];
+    let of_scans: Vec<f64> = before.iter().zip(&after).map(|(b, a)| a - b).collect();
     Some(root_mean_square(&of_mesh)?.hypot(root_mean_square(&of_scans)?))
 }
 
@@ -139,10 +146,11 @@ mod tests {
     #[test]
     fn the_error_at_rest_is_what_mesh_and_scans_are_off_together() {
         let mesh = block(3);
-        // The upper face lies .3 mm from the surface it follows, the base .4 mm from where the other scan has it.
+        // The upper face lies .3 mm from the surface it follows; the brain's surface .4 mm further off on the other scan.
         let own = BTreeMap::from([("superior".to_owned(), sheet(30.3))]);
-        let error = error_at_rest_mm(&mesh, &own, "base", &sheet(-0.4)).unwrap();
+        let brains = [&sheet(-1.0), &sheet(-1.4)];
+        let error = error_at_rest_mm(&mesh, &own, "base", brains).unwrap();
         assert!((error - 0.5).abs() < 1e-12, "{error}");
-        assert_eq!(error_at_rest_mm(&mesh, &own, "falx", &sheet(-0.4)), None);
+        assert_eq!(error_at_rest_mm(&mesh, &own, "falx", brains), None);
     }
 }

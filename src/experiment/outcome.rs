@@ -4,6 +4,7 @@
 //! (JSON has none). Maps are ordered by name, samples in order of their grid: the same experiment gives the same bytes.
 
 use super::estimate::EstimateOutcome;
+use super::verdict::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -66,6 +67,9 @@ pub struct ExperimentOutcome {
     /// Warnings in the order they were raised.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// What it comes down to; found once all else is there ([`ExperimentOutcome::with_verdict`]).
+    #[serde(default)]
+    pub verdict: Verdict,
 }
 
 /// One simulation of a sweep.
@@ -290,6 +294,13 @@ impl ExperimentOutcome {
     /// [`OutcomeError`] naming file and place.
     pub fn from_json(text: &str, name: &str) -> Result<Self, OutcomeError> {
         serde_json::from_str(text).map_err(|e| OutcomeError { name: name.to_owned(), reason: e.to_string() })
+    }
+
+    /// With its verdict: the estimate's, else the samples'.
+    #[must_use]
+    pub fn with_verdict(mut self) -> Self {
+        self.verdict = self.estimate.as_ref().map_or_else(|| Verdict::of_samples(&self), |e| e.verdict.clone());
+        self
     }
 
     /// The sample with the smallest RMSE, as named by `best_sample`.

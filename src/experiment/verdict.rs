@@ -24,6 +24,8 @@ pub enum Finding {
     CannotTell,
     /// The shift is explained, and says little of the stiffness: the interval is the prior's.
     PriorDominated,
+    /// The shift is explained but for more than the measurement's noise, and the intervals are as much wider.
+    Widened,
     /// The shift is explained, and the stiffness follows from it.
     Identified,
     /// A sample explains the surfaces better than rest does.
@@ -40,7 +42,7 @@ pub enum Finding {
 impl Finding {
     /// Whether the figures of the stiffness may be read as an answer.
     pub fn has_stiffness(self) -> bool {
-        matches!(self, Self::Identified | Self::PriorDominated | Self::CannotTell | Self::Better)
+        matches!(self, Self::Identified | Self::Widened | Self::PriorDominated | Self::CannotTell | Self::Better)
     }
 
     /// In a few words, for a column of a table.
@@ -51,6 +53,7 @@ impl Finding {
             Self::Conflict => "contradicts what is known",
             Self::CannotTell => "cannot tell",
             Self::PriorDominated => "the prior's",
+            Self::Widened => "widened by what is unexplained",
             Self::Identified => "identified",
             Self::Better => "better than rest",
             Self::NotDistinguishable => "not distinguishable from rest",
@@ -335,6 +338,10 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Answer)], r
              {}.",
             capitalised(&intervals)
         ),
+        Finding::Widened => format!(
+            "The model explains most of the shift{percent}, and {first}: the intervals are as much wider. {}.",
+            capitalised(&intervals)
+        ),
         Finding::Identified => format!("The model explains the shift{percent}: {intervals}."),
         Finding::Better if ranges.is_empty() => "A sample explains the surfaces better than rest does.".to_owned(),
         Finding::Better => format!("Better than rest; samples as good as the best have {ranges}."),
@@ -365,7 +372,7 @@ mod tests {
             let verdict = Verdict::new(finding, Some(0.9), vec![interval("grey_matter", 41526.0)], reasons.clone());
             assert!(!finding.has_stiffness() && !verdict.sentence.contains("41,500"), "{}", verdict.sentence);
         }
-        for finding in [Finding::Identified, Finding::PriorDominated, Finding::CannotTell] {
+        for finding in [Finding::Identified, Finding::Widened, Finding::PriorDominated, Finding::CannotTell] {
             let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());
             assert!(finding.has_stiffness() && verdict.sentence.contains("rey matter 1,170 Pa (936 to 1,460)"));
         }

@@ -75,6 +75,11 @@ pub enum WorkflowError {
          `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings"
     )]
     NoReferenceState { reason: String },
+    #[error(
+        "no model could be compared: evidence is found for `observed = \"displacement\"` in the table [estimate], and at least \
+         one model must have an equilibrium"
+    )]
+    NoEvidence,
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
     #[error(transparent)]

@@ -48,6 +48,7 @@ pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed,
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
+use crate::experiment::compare::Comparison;
 use crate::report::case::write_report;
 use patient::{Images, Patient, Prepared};
 use stages::SampleMode;
@@ -155,6 +156,22 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
         phantom::estimate(&work)?;
     }
     Ok(work.case)
+}
+
+/// Models of a prepared case beside each other: which of them what was seen speaks for.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn compare(
+    place: &Place,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<(Case, Comparison), WorkflowError> {
+    let work = Work::new(place, Subject::Patient, settings, progress);
+    let patient = Patient::new(&work, Prepared::read(&work.case)?)?;
+    let comparison = patient.compare()?;
+    drop(patient);
+    Ok((work.case, comparison))
 }
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples.

@@ -10,6 +10,7 @@ use super::stages::{
 };
 use super::work::{Made, Work};
 use crate::artefact::Manifest;
+use crate::experiment::compare::Comparison;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor, SampleOutcome};
 use crate::experiment::sample::shard;
@@ -132,6 +133,8 @@ pub(crate) struct Patient<'w, 'a> {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
+    /// What mesh and scans are off without any movement, mm.
+    at_rest_mm: Option<f64>,
 }
 
 impl<'w, 'a> Patient<'w, 'a> {
@@ -143,12 +146,15 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
+        let at_rest_mm = stages::error_at_rest(&work.case, &anatomy, &mesh)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
+        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference, at_rest_mm })
     }
 
+    /// What the pair shows at rest, with what is expected of its parts beside it.
     fn floor(&self) -> NoiseFloor {
-        self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm)
+        let expected = self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm);
+        NoiseFloor { at_rest_mm: self.at_rest_mm, ..expected }
     }
 
     /// Simulates the samples of one part, or all of them, and nothing else.
@@ -179,9 +185,18 @@ impl<'w, 'a> Patient<'w, 'a> {
         finish(self.work, &outcome, &manifests)
     }
 
-    /// Estimates the moduli against the post-operative surfaces. The samples of an `earlier` outcome stay beside it.
-    pub fn estimate(&self, earlier: Option<ExperimentOutcome>) -> Result<EstimateFacts, WorkflowError> {
+    /// Models of this patient beside each other.
+    pub fn compare(&self) -> Result<Comparison, WorkflowError> {
+        self.with_input(|made, input| stages::compare(self.work, made, input))
+    }
+
+    /// What an estimate needs, handed on.
+    fn with_input<T>(
+        &self,
+        then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
+    ) -> Result<T, WorkflowError> {
         let Self { work, mesh, prepared, .. } = self;
+        let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let input = EstimateInput {
             mesh: (mesh, &self.mesh_bytes),
@@ -189,12 +204,24 @@ impl<'w, 'a> Patient<'w, 'a> {
             tissues: &plan::tissues(work.settings, work.subject),
             poisson_ratio: work.settings.resection.poisson_ratio,
             reference: &self.reference,
+            coarser: Some(&coarser),
             shift: Some(&shift),
             noise_mm: self.floor().combined_mm().unwrap_or(work.settings.estimate.descent.noise_mm),
             rigid_error_mm: work.settings.resection.registration_error_mm,
         };
         let mut made = prepared.made.clone();
-        let facts = stages::estimate(work, &mut made, &input)?;
+        then(&mut made, &input)
+    }
+
+    /// Estimates the moduli from what the scans show. The samples of an `earlier` outcome stay beside it.
+    pub fn estimate(&self, earlier: Option<ExperimentOutcome>) -> Result<EstimateFacts, WorkflowError> {
+        let Self { work, prepared, .. } = self;
+        let mut made = Made::default();
+        let facts = self.with_input(|all, input| {
+            let facts = stages::estimate(work, all, input)?;
+            made = all.clone();
+            Ok(facts)
+        })?;
         let mut outcome = earlier.filter(|o| !o.samples.is_empty()).unwrap_or_else(|| self.posed_outcome());
         with_estimate(&mut outcome, &facts);
         let own = made.get(&StageName::Estimate);

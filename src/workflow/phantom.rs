@@ -94,6 +94,7 @@ pub(crate) fn estimate(work: &Work<'_>) -> Result<EstimateFacts, WorkflowError> 
         tissues: &settings.tissue_list(),
         poisson_ratio: settings.poisson_ratio,
         reference: &Reference::Nodes(displacement),
+        coarser: None,
         shift: None,
         noise_mm: work.settings.estimate.phantom_noise_mm,
         rigid_error_mm: 0.0,

@@ -256,7 +256,10 @@ impl Fit<'_, '_> {
 
         // How much of what the prior's most probable body would do is there, and how well that is known.
         let pattern = flat(&|n| pattern_mm[seen[n].0 as usize]);
-        let factor = nothing.unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
+        // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
+        let seen_at_all = odds.moved_to_still > super::STRONG;
+        let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
+        let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
         let columns = DMatrix::from_fn(rows, 1 + RIGID, |r, c| {
             if c == 0 { pattern[r] } else { self.rigid.columns_mm[(r, c - 1)] }
         });
@@ -286,7 +289,7 @@ impl Fit<'_, '_> {
             odds,
             rigid_remainder_mm: rms(&remainder),
             shift: Shift {
-                seen: odds.moved_to_still > super::STRONG,
+                seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),
                 explained_share: 1.0 - residuals.norm_squared() / shifted.norm_squared().max(f64::MIN_POSITIVE),
                 would_be_seen_mm: size.map_or(0.0, |(_, sd)| CONTRADICTION_SD * sd * largest_mm),

@@ -205,7 +205,11 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let posed = Posed { prior: &prior, tissues: &tissues, weight_alone: only_weight && density_known, body_known: problem.body_known };
     let verdict = verdict(&fitted, settings, &posterior, &posed);
     let materials = tissue_materials(&unknown, &fitted.descent.log_parameters, problem.poisson_ratio);
-    let posterior = if verdict.finding.has_stiffness() { posterior } else { posterior.withheld() };
+    let posterior = match verdict.finding {
+        Finding::Widened => posterior.widened(),
+        finding if finding.has_stiffness() => posterior,
+        _ => posterior.withheld(),
+    };
     let correlated = fitted.correlated;
     let outcome = EstimateOutcome {
         limits: verdict.because(),
@@ -344,6 +348,7 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
     let mut unexplained = Vec::new();
     let mut still = None;
     let mut share = None;
+    let mut wider = None;
     if let Some(found) = &fitted.correlated {
         share = Some(found.shift.explained_share);
         if !found.shift.seen {
@@ -351,8 +356,12 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
             still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
         }
         let (discrepancy_mm, noise_mm) = (found.unexplained.discrepancy.sd_mm, found.measured_noise.sd_mm);
-        if discrepancy_mm > noise_mm {
-            unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
+        let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
+        // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
+        if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
+            unexplained.push(reason);
+        } else if discrepancy_mm > noise_mm {
+            wider = Some(reason);
         }
         if found.odds.model_to_any_movement < super::STRONG {
             unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
@@ -377,6 +386,8 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
         Finding::Conflict
     } else if dominated {
         Finding::PriorDominated
+    } else if wider.is_some() {
+        Finding::Widened
     } else {
         Finding::Identified
     };
@@ -392,7 +403,7 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
         _ => Answer::Withheld,
     };
     let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
-    let mut reasons: Vec<Reason> = still.into_iter().chain(unexplained).chain(conflict).collect();
+    let mut reasons: Vec<Reason> = still.into_iter().chain(unexplained).chain(conflict).chain(wider).collect();
     if finding.has_stiffness() {
         let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != super::Knowledge::Identified);
         reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));

@@ -14,6 +14,8 @@ pub enum Knowledge {
     PriorDominated,
     /// Without prior the interval spans more than a factor 10 either way: not identifiable.
     NotIdentifiable,
+    /// The data narrow the prior, but less than the measurement would: what the model leaves unexplained widens the interval.
+    Widened,
     /// The figure is an average over models that cannot be told apart.
     Averaged,
     /// The figures stand under a model that the data do not bear out: they are not an answer.
@@ -119,11 +121,21 @@ pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]
 }
 
 impl Posterior {
+    /// With every figure marked that the data had narrowed: the interval is wider by what the model leaves unexplained.
+    #[must_use]
+    pub fn widened(self) -> Self {
+        self.marked(Knowledge::Widened)
+    }
+
     /// With every figure withheld that the data had narrowed: the model does not stand.
     #[must_use]
-    pub fn withheld(mut self) -> Self {
+    pub fn withheld(self) -> Self {
+        self.marked(Knowledge::Withheld)
+    }
+
+    fn marked(mut self, mark: Knowledge) -> Self {
         for verdict in self.identifiability.verdicts.iter_mut().filter(|v| **v == Knowledge::Identified) {
-            *verdict = Knowledge::Withheld;
+            *verdict = mark;
         }
         self
     }

@@ -20,6 +20,7 @@ pub fn section(estimate: &EstimateOutcome) -> String {
             Knowledge::Identified => "identified",
             Knowledge::PriorDominated => "little: the interval is the prior's",
             Knowledge::NotIdentifiable => "not identifiable",
+            Knowledge::Widened => "narrowed, less than the measurement would: the model leaves something unexplained",
             Knowledge::Averaged => "averaged over models that cannot be told apart",
             Knowledge::Withheld => "withheld: the model does not stand",
         };

@@ -7,7 +7,7 @@ use crate::experiment::estimate::{
     Problem, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
-use crate::experiment::prior::law_priors;
+use crate::experiment::prior::{PriorSettings, law_priors};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::sweep::Reference;
 use crate::fem::{ElementKind, Loads, Scenario};
@@ -57,6 +57,9 @@ pub struct EstimateOptions {
     /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
     /// 60,000 lay within 7 % of the finer one.
     pub model_log_sd: f64,
+    /// Solve for a patient in a mesh of a quarter of the tetrahedra as well: what the mesh adds to the moduli is found from
+    /// the difference instead of taken from `model_log_sd`.
+    pub two_meshes: bool,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -82,6 +85,7 @@ impl Default for EstimateOptions {
             correlation_mm: 5.0,
             element: ElementKind::Tet4Nodal,
             model_log_sd: 0.15,
+            two_meshes: true,
             density: false,
             density_log_sd: 0.56,
             gravity_direction: false,
@@ -170,6 +174,8 @@ pub(crate) struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
+    /// The same body in a coarser mesh, made when it is asked for.
+    pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
@@ -202,44 +208,58 @@ pub(crate) fn estimate(
     let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME);
     work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("estimate", 1));
-        let mesh = input.mesh.0;
-        let mut unknowns = Vec::new();
-        for tissue in input.tissues {
-            unknowns.extend(law_priors(tissue, prior)?);
-        }
-        unknowns.extend(options.unknown_loads(&input.scenario.loads));
-        let patient = matches!(input.reference, Reference::Surfaces(_));
-        let mut scenario = input.scenario.clone();
-        if patient {
-            scenario.solver.element = options.element;
-        }
-        let (observation, errors, noise_mm) = observation(input, options);
-        let believed = &options.displacement;
-        let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
-            move |known: &[[f64; 3]]| {
-                work.tell(|p| p.doing("registering the estimate"));
-                let shown = shift.registration().sees(mesh, known, &shift.seen)?;
-                Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
-            }
-        });
-        let problem = Problem {
-            mesh,
-            template: &scenario,
-            unknowns,
-            poisson_ratio: input.poisson_ratio,
-            observation,
-            errors,
-            model_log_sd: if patient { options.model_log_sd } else { 0.0 },
-            coarser: None,
-            body_known: !patient,
-            start: Vec::new(),
-            instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
-        };
-        let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let found = solve_problem(problem, &settings)?;
+        let found = solved(work, input, prior)?;
         work.tell(|p| p.end());
         produced(input, found)
     })
+}
+
+/// The estimate of an input under a prior.
+pub(super) fn solved(
+    work: &Work<'_>,
+    input: &EstimateInput<'_>,
+    prior: &PriorSettings,
+) -> Result<Estimate, WorkflowError> {
+    let options = &work.settings.estimate;
+    let mesh = input.mesh.0;
+    let mut unknowns = Vec::new();
+    for tissue in input.tissues {
+        unknowns.extend(law_priors(tissue, prior)?);
+    }
+    unknowns.extend(options.unknown_loads(&input.scenario.loads));
+    let patient = matches!(input.reference, Reference::Surfaces(_));
+    let mut scenario = input.scenario.clone();
+    if patient {
+        scenario.solver.element = options.element;
+    }
+    let (observation, errors, noise_mm) = observation(input, options);
+    let believed = &options.displacement;
+    let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
+        move |known: &[[f64; 3]]| {
+            work.tell(|p| p.doing("registering the estimate"));
+            let shown = shift.registration().sees(mesh, known, &shift.seen)?;
+            Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
+        }
+    });
+    let coarser = match input.coarser {
+        Some(make) if options.two_meshes && options.observed == Observed::Displacement => Some(make()?),
+        _ => None,
+    };
+    let problem = Problem {
+        mesh,
+        template: &scenario,
+        unknowns,
+        poisson_ratio: input.poisson_ratio,
+        observation,
+        errors,
+        model_log_sd: if patient { options.model_log_sd } else { 0.0 },
+        coarser: coarser.as_ref(),
+        body_known: !patient,
+        start: Vec::new(),
+        instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
+    };
+    let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
+    Ok(solve_problem(problem, &settings)?)
 }
 
 /// What is observed, how far it is believed, and the standard deviation of one observation in mm.
