@@ -55,7 +55,11 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
         weight,
         finding: m.verdict.finding,
         explained_share: m.shift.map_or(0.0, |s| s.explained_share),
-        moduli_pa: tissues(m).map(|(tissue, n)| (tissue, [m.posterior.mode[n], m.posterior.interval_95[n][0], m.posterior.interval_95[n][1]])).collect(),
+        moduli_pa: tissues(m)
+            .map(|(tissue, n)| {
+                (tissue, [m.posterior.mode[n], m.posterior.interval_95[n][0], m.posterior.interval_95[n][1]])
+            })
+            .collect(),
     });
     let candidates: Vec<Candidate> = candidates.collect();
     let (first, mut best) = models.first().cloned()?;
@@ -87,10 +91,14 @@ fn tissues(outcome: &EstimateOutcome) -> impl Iterator<Item = (String, usize)> {
 fn average(best: &mut EstimateOutcome, models: &[(String, EstimateOutcome)], weight: &[f64]) {
     for (tissue, n) in tissues(best).collect::<Vec<_>>() {
         // A model with other tissues says nothing of this one.
-        let parts: Vec<[f64; 3]> = models.iter().zip(weight).filter_map(|((_, m), &weight)| {
-            let (_, at) = tissues(m).find(|(name, _)| *name == tissue)?;
-            Some([weight, m.posterior.mode[at].ln(), m.posterior.log_sd[at]])
-        }).collect();
+        let parts: Vec<[f64; 3]> = models
+            .iter()
+            .zip(weight)
+            .filter_map(|((_, m), &weight)| {
+                let (_, at) = tissues(m).find(|(name, _)| *name == tissue)?;
+                Some([weight, m.posterior.mode[at].ln(), m.posterior.log_sd[at]])
+            })
+            .collect();
         let (_, sd) = moments(&parts);
         let p = &mut best.posterior;
         p.mode[n] = quantile(&parts, 0.5).exp();
@@ -126,7 +134,8 @@ fn quantile(parts: &[[f64; 3]], share: f64) -> f64 {
 /// Share of a standard Gaussian below x, to 1e-7 (Abramowitz and Stegun 26.2.17).
 fn normal_below(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
-    let series = t * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let series =
+        t * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
     let above = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * series;
     if x > 0.0 { 1.0 - above } else { above }
 }

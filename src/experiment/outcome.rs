@@ -371,7 +371,11 @@ mod tests {
     fn independent_errors_add_in_squares() {
         let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), ..NoiseFloor::default() };
         assert!((floor.combined_mm().unwrap() - 0.5).abs() < 1e-12);
-        assert_eq!(NoiseFloor { at_rest_mm: Some(0.8), ..floor }.combined_mm(), Some(0.8), "measured wins over expected");
+        assert_eq!(
+            NoiseFloor { at_rest_mm: Some(0.8), ..floor }.combined_mm(),
+            Some(0.8),
+            "measured wins over expected"
+        );
         assert!(NoiseFloor::default().combined_mm().is_none());
     }
 }

@@ -2,8 +2,8 @@
 
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::ExperimentOutcome;
-use crate::experiment::verdict::{Finding, compared};
 use crate::experiment::rmse::median_and_mad;
+use crate::experiment::verdict::{Finding, compared};
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};

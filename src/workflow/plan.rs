@@ -67,9 +67,7 @@ impl StageName {
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
             (Self::Sample(_), Subject::Patient) => &[Mesh, Reference],
-            (Self::Sample(_), Subject::Phantom { .. }) | (Self::Estimate | Self::Compare, _) => {
-                &[Reference]
-            }
+            (Self::Sample(_), Subject::Phantom { .. }) | (Self::Estimate | Self::Compare, _) => &[Reference],
         }
     }
 

@@ -73,7 +73,9 @@ impl Unknown {
     pub fn name(&self) -> String {
         match self {
             Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
-            Self::Shape(tissue, MetaModel::MooneyRivlin) => format!("share of c1_pa in c1_pa + c2_pa of {}", tissue.name),
+            Self::Shape(tissue, MetaModel::MooneyRivlin) => {
+                format!("share of c1_pa in c1_pa + c2_pa of {}", tissue.name)
+            }
             Self::Shape(tissue, _) => format!("alpha of {}", tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),

@@ -8,9 +8,7 @@ use super::outcome::{Fitted, ROUGH, differences};
 use super::process::{Factor, Process, spread_out};
 use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
-use super::{
-    Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, ProblemError, estimate, information,
-};
+use super::{Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, ProblemError, estimate, information};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::verdict::CONTRADICTION_SD;
 use nalgebra::{DMatrix, DVector};
@@ -260,9 +258,14 @@ impl Fit<'_, '_> {
         let seen_at_all = odds.moved_to_still > super::STRONG;
         let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
         let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
-        let columns = DMatrix::from_fn(rows, 1 + RIGID, |r, c| {
-            if c == 0 { pattern[r] } else { self.rigid.columns_mm[(r, c - 1)] }
-        });
+        let columns =
+            DMatrix::from_fn(
+                rows,
+                1 + RIGID,
+                |r, c| {
+                    if c == 0 { pattern[r] } else { self.rigid.columns_mm[(r, c - 1)] }
+                },
+            );
         let white = factor.whiten(&columns);
         let target = factor.whiten(&DMatrix::from_column_slice(rows, 1, seen_mm.as_slice()));
         let mut normal = white.transpose() * &white;

@@ -136,11 +136,7 @@ fn scaled(process: Process, log_factor: f64) -> Process {
 
 /// The highest point by a pattern search (Hooke and Jeeves, Journal of the ACM 8, 1961): a step along every axis, halved
 /// when none is better.
-fn climb(
-    score: &dyn Fn(&[f64]) -> Option<f64>,
-    start: Vec<f64>,
-    ranges: &[(f64, f64)],
-) -> Option<(Vec<f64>, f64)> {
+fn climb(score: &dyn Fn(&[f64]) -> Option<f64>, start: Vec<f64>, ranges: &[(f64, f64)]) -> Option<(Vec<f64>, f64)> {
     const FIRST_STEP: f64 = 0.5;
     const LAST_STEP: f64 = 0.03;
     let mut here = start;
@@ -195,9 +191,8 @@ mod tests {
             processes.iter().map(|p| p.covariance_mm2(distance)).sum::<f64>() + if r == c { 1e-9 } else { 0.0 }
         });
         let lower = covariance.cholesky().unwrap().unpack();
-        let parts: Vec<DVector<f64>> = (0..3)
-            .map(|a| &lower * DVector::from_fn(n, |i, _| rng.normal((3 * i + a) as u64)))
-            .collect();
+        let parts: Vec<DVector<f64>> =
+            (0..3).map(|a| &lower * DVector::from_fn(n, |i, _| rng.normal((3 * i + a) as u64))).collect();
         DVector::from_fn(3 * n, |row, _| parts[row % 3][row / 3])
     }
 

@@ -235,7 +235,15 @@ mod tests {
     }
 
     fn no_prior() -> Vec<LogPrior> {
-        ["a", "b"].map(|name| LogPrior { name: name.to_owned(), mean: 0.0, sd: None, scale: Scale::Logarithm, correlation: Vec::new() }).to_vec()
+        ["a", "b"]
+            .map(|name| LogPrior {
+                name: name.to_owned(),
+                mean: 0.0,
+                sd: None,
+                scale: Scale::Logarithm,
+                correlation: Vec::new(),
+            })
+            .to_vec()
     }
 
     #[test]
@@ -270,7 +278,13 @@ mod tests {
     #[test]
     fn a_tight_prior_holds_the_parameter() {
         let mut model = Compliance { observed: simulate(&[1.3, 0.4]) };
-        let tight = |mean| LogPrior { name: String::new(), mean, sd: Some(1e-6), scale: Scale::Logarithm, correlation: Vec::new() };
+        let tight = |mean| LogPrior {
+            name: String::new(),
+            mean,
+            sd: Some(1e-6),
+            scale: Scale::Logarithm,
+            correlation: Vec::new(),
+        };
         let descent =
             estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();
         assert!((descent.log_parameters[0] - 2.0).abs() < 1e-4 && descent.log_parameters[1].abs() < 1e-4);

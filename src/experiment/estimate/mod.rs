@@ -17,12 +17,12 @@ mod re_registration;
 mod rigid_remainder;
 
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};
+pub use correlated::{CorrelatedErrors, Odds, Shift};
 pub use displacement::DisplacementSettings;
+pub use evidence::{Evidence, NOISE_LOG_SD, STRONG, Unexplained, weights};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
-pub use correlated::{CorrelatedErrors, Odds, Shift};
-pub use evidence::{Evidence, NOISE_LOG_SD, STRONG, Unexplained, weights};
 pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, ProblemError, solve_problem};
 pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, laplace};
 pub use process::Process;

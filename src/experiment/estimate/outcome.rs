@@ -9,8 +9,8 @@ use super::{
     Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace,
 };
 use crate::experiment::rmse::root_mean_square;
-use crate::experiment::verdict::{Answer, CONTRADICTION_SD, Finding, Reason, Verdict};
 use crate::experiment::sample::Tissue;
+use crate::experiment::verdict::{Answer, CONTRADICTION_SD, Finding, Reason, Verdict};
 use crate::fem::{Outcome, Scenario};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
@@ -191,18 +191,29 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
     let mut mesh_log_sd = Vec::new();
     if let (Some(coarse), Some(found)) = (problem.coarser, &fitted.correlated) {
-        let mut coarse_body =
-            Body::new(coarse, problem.template, unknown.clone(), problem.poisson_ratio, Observation::Nodes(Vec::new()))?;
+        let mut coarse_body = Body::new(
+            coarse,
+            problem.template,
+            unknown.clone(),
+            problem.poisson_ratio,
+            Observation::Nodes(Vec::new()),
+        )?;
         let there = coarse_body.solve(&fitted.descent.log_parameters)?.outcome.displacement_mm;
         let there = at_places(coarse, &there, &found.places_mm);
-        let change = |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
+        let change =
+            |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
         let made = found.made_up_by(change, prior.len());
         let left = left_of_difference(problem.mesh, coarse);
         mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
         model_error = mesh_log_sd.clone();
     }
     let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
-    let posed = Posed { prior: &prior, tissues: &tissues, weight_alone: only_weight && density_known, body_known: problem.body_known };
+    let posed = Posed {
+        prior: &prior,
+        tissues: &tissues,
+        weight_alone: only_weight && density_known,
+        body_known: problem.body_known,
+    };
     let verdict = verdict(&fitted, settings, &posterior, &posed);
     let materials = tissue_materials(&unknown, &fitted.descent.log_parameters, problem.poisson_ratio);
     let posterior = match verdict.finding {
@@ -366,7 +377,8 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
         if found.odds.model_to_any_movement < super::STRONG {
             unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
         }
-    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt()) {
+    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt())
+    {
         // A root mean square of n independent ones is known to its 1 / sqrt(2 n).
         let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
         unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
@@ -421,11 +433,11 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
 mod tests {
     use super::*;
     use crate::experiment::estimate::{Scale, Turn, material};
-    use crate::experiment::prior::{PriorSettings, law_priors};
-    use crate::material::meta_model::MetaModel;
     use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
     use crate::fem::simulate;
+    use crate::material::meta_model::MetaModel;
 
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {

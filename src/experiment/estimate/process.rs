@@ -1,8 +1,8 @@
 //! Errors that neighbours share: Gaussian processes over space, and residuals seen through their covariance.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::{Mat, Par};
 use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,8 @@
 //! Rigid registration of whole heads takes up a part of the brain's shift (.06 to .13 mm of a shift of 2 to 5 mm on patients
 //! made by another program), and no later step takes that out.
 
-use super::{Forward, Linearisation, LogPrior, Scale};
 use super::process::Factor;
+use super::{Forward, Linearisation, LogPrior, Scale};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// The six rigid movements of some places about their middle.
@@ -123,7 +123,8 @@ mod tests {
         };
         assert!((between(3, 57, 1.0) - between(3, 57, 0.0)).abs() < 1e-3);
         let sd: Vec<f64> = rigid.priors().filter_map(|p| p.sd).collect();
-        let mean_square = rigid.columns_mm.column_iter().zip(&sd).map(|(c, sd)| c.norm_squared() * sd * sd).sum::<f64>();
+        let mean_square =
+            rigid.columns_mm.column_iter().zip(&sd).map(|(c, sd)| c.norm_squared() * sd * sd).sum::<f64>();
         assert!((mean_square / places.len() as f64 - 0.04).abs() < 1e-12);
     }
 }

@@ -298,8 +298,7 @@ fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Work
         let material = materials.get(&t.name).cloned().unwrap_or_else(neo_hookean);
         (t.name.clone(), TissueSample { sd_level: level, shear_modulus_pa: mode, material })
     };
-    let sample =
-        Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().map(tissue).collect(), task: None };
+    let sample = Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().map(tissue).collect(), task: None };
     let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
     let file = ESTIMATE_STATE.to_owned();
     let record = SampleOutcome {

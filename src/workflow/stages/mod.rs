@@ -24,7 +24,9 @@ pub(crate) use compare::compare;
 pub(crate) use estimate::{EstimateInput, estimate};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
-pub(crate) use reference::{error_at_rest, known_state, observed_surfaces, phantom_reference, reference, reference_stage};
+pub(crate) use reference::{
+    error_at_rest, known_state, observed_surfaces, phantom_reference, reference, reference_stage,
+};
 pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage};
 pub(crate) use samples::{SampleMode, Sweep, sample_stage, samples};
 
