@@ -577,6 +577,77 @@ mod tests {
         assert_eq!(exact.displacement_sd_mm, rough.displacement_sd_mm);
     }
 
+    /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.
+    fn seen_by_a_model_of_a_push_from_above(
+        force_n: Option<[f64; 3]>,
+        add: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> EstimateOutcome {
+        let (mesh, settings) = (block(5), settings());
+        let u = match force_n {
+            Some(two_tissue_force_n) => {
+                let pushed = PhantomSettings { two_tissue_force_n, ..settings.clone() };
+                let (scenario, tissues) = (pushed.scenario(), pushed.tissue_list());
+                let truth = scenario_of(&scenario, &tissues, &pushed.reference_sample()).unwrap();
+                simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm
+            }
+            None => vec![[0.0; 3]; mesh.nodes_mm().len()],
+        };
+        let moved = |(x, u): (&[f64; 3], &[f64; 3])| {
+            let more = add(*x);
+            [0, 1, 2].map(|a| u[a] + more[a])
+        };
+        let observed: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&u).map(moved).collect();
+        let known = |unknown: Unknown| {
+            let prior = unknown.prior(1100f64.ln(), 0.4);
+            (unknown, prior)
+        };
+        let noise = Process::of_cube(0.02, 20.0);
+        let scenario = settings.scenario();
+        let problem = Problem {
+            unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
+            errors: Errors::Correlated(CorrelatedErrors { noise, rigid_mm: 0.1, places: 150 }),
+            start: Vec::new(),
+            body_known: false,
+            ..problem(&mesh, &scenario, every_node(&observed))
+        };
+        solve_problem(problem, &EstimateSettings::default()).unwrap().outcome
+    }
+
+    #[test]
+    fn a_shift_of_everything_is_taken_for_the_registrations_and_not_for_the_moduli() {
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.06, -0.04, 0.05]);
+        for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {
+            let [low, high] = found.posterior.interval_95[n];
+            assert!(low < truth && truth < high, "{:?}", found.posterior);
+        }
+        assert!(found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
+        assert!(found.shift.unwrap().explained_share > 0.95, "{:?}", found.shift);
+        let remainder = found.rigid_remainder_mm.unwrap();
+        assert!((remainder - 0.0877).abs() < 0.03, "{remainder}");
+    }
+
+    #[test]
+    fn without_a_shift_there_is_a_bound_and_no_stiffness() {
+        let wave = |x: [f64; 3]| [0.01 * (0.2 * x[1]).sin(), 0.01 * (0.15 * x[2]).cos(), 0.01 * (0.25 * x[0]).sin()];
+        let found = seen_by_a_model_of_a_push_from_above(None, wave);
+        assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
+        let bounds = found.verdict.moduli.iter().map(|(_, answer)| match answer {
+            Answer::Above { bound_pa } => *bound_pa,
+            other => panic!("{other:?}"),
+        });
+        // The body of the prior's mean would have moved by half a millimetre: noise of .02 mm leaves a tenth of it at most.
+        assert!(bounds.into_iter().all(|bound| bound > 4000.0), "{:?}", found.verdict);
+        let said = &found.posterior.identifiability.verdicts;
+        assert!(said.iter().all(|v| *v != crate::experiment::estimate::Knowledge::Identified), "{said:?}");
+    }
+
+    #[test]
+    fn a_push_from_the_side_is_not_explained_by_one_from_above() {
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]);
+        assert!(!found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
+        assert!(found.shift.unwrap().seen, "{:?}", found.odds);
+    }
+
     /// The block, pushed hard enough that a law's shape shows, with the truth's law and the prior of that law.
     fn of_law(truth: &Material, law: MetaModel) -> (EstimateOutcome, BTreeMap<String, Material>) {
         let mesh = block(4);
