@@ -6,6 +6,7 @@
 pub use super::law_outcome::LawOutcome;
 
 use super::estimate::EstimateOutcome;
+use super::verdict::Verdict;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,6 +70,9 @@ pub struct ExperimentOutcome {
     /// Warnings in the order they were raised.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// What it comes down to; found once all else is there ([`ExperimentOutcome::with_verdict`]).
+    #[serde(default)]
+    pub verdict: Verdict,
 }
 
 /// One simulation of a sweep.
@@ -124,11 +128,18 @@ pub struct NoiseFloor {
     /// Expected error of the segmented surfaces.
     #[serde(default)]
     pub segmentation_mm: Option<f64>,
+    /// What the pair itself shows where nothing can have moved, on the mesh and surfaces in use: all the others in one,
+    /// measured instead of expected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_rest_mm: Option<f64>,
 }
 
 impl NoiseFloor {
-    /// The parts together as independent errors, mm; `None` when no part is known.
+    /// What was measured at rest, else the expected parts together as independent errors, mm; `None` when none is known.
     pub fn combined_mm(&self) -> Option<f64> {
+        if self.at_rest_mm.is_some() {
+            return self.at_rest_mm;
+        }
         let parts = [self.registration_mm, self.voxel_mm, self.segmentation_mm];
         let squares: Vec<f64> = parts.iter().flatten().map(|mm| mm * mm).collect();
         (!squares.is_empty()).then(|| squares.iter().sum::<f64>().sqrt())
@@ -278,6 +289,13 @@ impl ExperimentOutcome {
         serde_json::from_str(text).map_err(|e| OutcomeError { name: name.to_owned(), reason: e.to_string() })
     }
 
+    /// With its verdict: the estimate's, else the samples'.
+    #[must_use]
+    pub fn with_verdict(mut self) -> Self {
+        self.verdict = self.estimate.as_ref().map_or_else(|| Verdict::of_samples(&self), |e| e.verdict.clone());
+        self
+    }
+
     /// The sample with the smallest RMSE, as named by `best_sample`.
     pub fn best(&self) -> Option<&SampleOutcome> {
         let id = self.best_sample.as_ref()?;
@@ -344,8 +362,13 @@ mod tests {
 
     #[test]
     fn independent_errors_add_in_squares() {
-        let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), segmentation_mm: None };
+        let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), ..NoiseFloor::default() };
         assert!((floor.combined_mm().unwrap() - 0.5).abs() < 1e-12);
+        assert_eq!(
+            NoiseFloor { at_rest_mm: Some(0.8), ..floor }.combined_mm(),
+            Some(0.8),
+            "measured wins over expected"
+        );
         assert!(NoiseFloor::default().combined_mm().is_none());
     }
 }

@@ -6,6 +6,7 @@ use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
 use super::skull::{SkullSettings, level_when_drained};
+use super::verdict::compared;
 use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
 use crate::geometry::Frame;
 use crate::image::LabelMap;
@@ -176,20 +177,14 @@ impl ResectionSettings {
             registration_mm: Some(self.registration_error_mm),
             voxel_mm: Some(coarsest_voxel_mm / 12f64.sqrt()),
             segmentation_mm: Some(0.5 * coarsest_voxel_mm),
+            at_rest_mm: None,
         }
     }
 }
 
-/// Whether `deformed` is better than `rest` by more than the measurement is worth.
+/// Whether `deformed` is better than `rest` by more than the measurement is worth, in words.
 pub fn improvement(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> &'static str {
-    let floor_mm = floor.combined_mm().unwrap_or(0.0);
-    if rest_mm - deformed_mm > floor_mm {
-        "better than rest"
-    } else if deformed_mm - rest_mm > floor_mm {
-        "worse than rest"
-    } else {
-        "not distinguishable from rest"
-    }
+    compared(rest_mm, deformed_mm, floor).short()
 }
 
 #[cfg(test)]

@@ -6,11 +6,13 @@ use crate::experiment::resection::improvement;
 
 /// Best sample, errors and verdicts.
 pub fn summary(outcome: &ExperimentOutcome) -> String {
-    let mut text = String::new();
+    let mut text = format!("{}\n", outcome.verdict.sentence);
     let floor = outcome.noise_floor.unwrap_or_default();
-    if let Some(best) = outcome.best() {
+    if let Some(best) = outcome.best().filter(|_| outcome.verdict.finding.has_stiffness()) {
         let moduli: Vec<String> = best.shear_modulus_pa.iter().map(|(t, m)| format!("{t} {m:.0} Pa")).collect();
         text += &format!("best sample {} ({})\n", best.id, moduli.join(", "));
+    }
+    if let Some(best) = outcome.best() {
         for (set, deformed) in &best.rmse_mm {
             let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
             let verdict = improvement(rest, *deformed, &floor);
@@ -27,8 +29,12 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
 pub fn estimate_table(estimate: &EstimateOutcome) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         estimate;
-    let mut text = String::from("parameter                            mode   95 % interval\n");
-    for (n, name) in posterior.names.iter().enumerate() {
+    let mut text = format!("{}\n", estimate.verdict.sentence);
+    let shown = estimate.verdict.finding.has_stiffness();
+    if shown {
+        text += "parameter                            mode   95 % interval\n";
+    }
+    for (n, name) in posterior.names.iter().enumerate().filter(|_| shown) {
         let [low, high] = posterior.interval_95[n];
         text += &format!("{name:<32} {:>8.1}   {low:.1} to {high:.1}\n", posterior.mode[n]);
     }

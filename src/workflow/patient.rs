@@ -10,6 +10,7 @@ use super::stages::{
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
+use crate::experiment::compare::Comparison;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
 use crate::experiment::sample::{Tissue, shard};
@@ -174,6 +175,8 @@ pub(crate) struct Patient<'w, 'a> {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
+    /// What mesh and scans are off without any movement, mm.
+    at_rest_mm: Option<f64>,
 }
 
 impl<'w, 'a> Patient<'w, 'a> {
@@ -188,11 +191,14 @@ impl<'w, 'a> Patient<'w, 'a> {
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
+        let at_rest_mm = stages::error_at_rest(&work.case, &anatomy, &mesh)?;
+        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference, at_rest_mm })
     }
 
+    /// What the pair shows at rest, with what is expected of its parts beside it.
     fn floor(&self) -> NoiseFloor {
-        self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm)
+        let expected = self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm);
+        NoiseFloor { at_rest_mm: self.at_rest_mm, ..expected }
     }
 
     /// Simulates the samples of one part, or all of them, and nothing else.
@@ -213,11 +219,25 @@ impl<'w, 'a> Patient<'w, 'a> {
 
     /// Estimates the moduli against what the post-operative scan shows.
     pub fn estimate(&self) -> Result<(), WorkflowError> {
+        self.with_images(|made, input| stages::estimate(self.work, made, input)).map(|_| ())
+    }
+
+    /// Models of this patient beside each other.
+    pub fn compare(&self) -> Result<Comparison, WorkflowError> {
+        self.with_images(|made, input| stages::compare(self.work, made, input))
+    }
+
+    /// What an estimate needs with what the images show, handed on.
+    fn with_images<T>(
+        &self,
+        then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
+    ) -> Result<T, WorkflowError> {
         let Self { work, prepared, .. } = self;
+        let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let input = EstimateInput { shift: Some(&shift), ..self.asked(&tissues) };
-        stages::estimate(work, &mut prepared.made.clone(), &input).map(|_| ())
+        let input = EstimateInput { shift: Some(&shift), coarser: Some(&coarser), ..self.asked(&tissues) };
+        then(&mut prepared.made.clone(), &input)
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -228,8 +248,10 @@ impl<'w, 'a> Patient<'w, 'a> {
             tissues,
             poisson_ratio: settings.resection.poisson_ratio,
             reference: &self.reference,
+            coarser: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
+            rigid_error_mm: settings.resection.registration_error_mm,
         }
     }
 

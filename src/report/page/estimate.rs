@@ -2,7 +2,7 @@
 
 use super::super::html::number;
 use super::results::{Row, table, words};
-use crate::experiment::estimate::{EstimateOutcome, Verdict};
+use crate::experiment::estimate::{EstimateOutcome, Knowledge};
 use maud::{Markup, html};
 
 /// The section's body.
@@ -17,9 +17,12 @@ pub fn section(estimate: &EstimateOutcome) -> Markup {
             format!("{} to {}", at(-1.96), at(1.96))
         });
         let verdict = match posterior.identifiability.verdicts[n] {
-            Verdict::Identified => "identified",
-            Verdict::PriorDominated => "little: the interval is the prior's",
-            Verdict::NotIdentifiable => "not identifiable",
+            Knowledge::Identified => "identified",
+            Knowledge::PriorDominated => "little: the interval is the prior's",
+            Knowledge::NotIdentifiable => "not identifiable",
+            Knowledge::Widened => "narrowed, less than the measurement would: the model leaves something unexplained",
+            Knowledge::Averaged => "averaged over models that cannot be told apart",
+            Knowledge::Withheld => "withheld: the model does not stand",
         };
         let cells = [
             posterior.names[n].replace('_', " "),

@@ -3,18 +3,17 @@
 use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::estimate::{
-    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
-    Turn, Unknown, moved_by, solve_problem,
+    DisplacementSettings, Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation,
+    Problem, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
-use crate::experiment::phantom::neo_hookean;
-use crate::experiment::prior::log_prior;
-use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::prior::{PriorSettings, law_priors};
+use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::sweep::Reference;
 use crate::fem::{ElementKind, Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
-use crate::material::meta_model::MetaModel;
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
@@ -23,7 +22,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Estimate;
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
@@ -58,6 +57,9 @@ pub struct EstimateOptions {
     /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
     /// 60,000 lay within 7 % of the finer one.
     pub model_log_sd: f64,
+    /// Solve for a patient in a mesh of a quarter of the tetrahedra as well: what the mesh adds to the moduli is found from
+    /// the difference instead of taken from `model_log_sd`.
+    pub two_meshes: bool,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -83,6 +85,7 @@ impl Default for EstimateOptions {
             correlation_mm: 5.0,
             element: ElementKind::TET4_NODAL,
             model_log_sd: 0.15,
+            two_meshes: true,
             density: false,
             density_log_sd: 0.56,
             gravity_direction: false,
@@ -171,10 +174,14 @@ pub(crate) struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
+    /// The same body in a coarser mesh, made when it is asked for.
+    pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
+    /// Expected error of the rigid registration, mm.
+    pub rigid_error_mm: f64,
 }
 
 /// The estimate's numbers, and its state as one more sample.
@@ -190,9 +197,6 @@ pub struct EstimateFacts {
 pub(crate) fn estimate_stage(work: &Work<'_>, made: &Made, input: &EstimateInput<'_>) -> Result<Stage, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
-    if prior.law != MetaModel::NEO_HOOKEAN {
-        return Err(WorkflowError::EstimateLaw { law: prior.law.name().to_owned() });
-    }
     let posed = serde_json::json!({
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
         "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
@@ -222,80 +226,100 @@ pub(crate) fn estimate(
     made: &mut Made,
     input: &EstimateInput<'_>,
 ) -> Result<EstimateFacts, WorkflowError> {
-    let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     let stage = estimate_stage(work, made, input)?;
     work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("estimate", 1));
-        let mesh = input.mesh.0;
-        let mut unknowns = Vec::new();
-        for tissue in input.tissues {
-            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, prior)?));
-        }
-        unknowns.extend(options.unknown_loads(&input.scenario.loads));
-        let patient = matches!(input.reference, Reference::Surfaces(_));
-        let mut scenario = input.scenario.clone();
-        if patient {
-            scenario.solver.element = options.element;
-        }
-        let (observation, independent_share, noise_mm) = observation(input, options);
-        let believed = &options.displacement;
-        let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
-            move |known: &[[f64; 3]]| {
-                work.tell(|p| p.doing("registering the estimate"));
-                let shown = shift.registration().sees(mesh, known, &shift.seen)?;
-                Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
-            }
-        });
-        let problem = Problem {
-            mesh,
-            template: &scenario,
-            unknowns,
-            poisson_ratio: input.poisson_ratio,
-            observation,
-            independent_share,
-            model_log_sd: if patient { options.model_log_sd } else { 0.0 },
-            start: Vec::new(),
-            instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
-        };
-        let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let found = solve_problem(problem, &settings)?;
+        let found = solved(work, input, &work.settings.prior)?;
         work.tell(|p| p.end());
         produced(input, found)
     })
 }
 
-/// What is observed, the share of it that is independent, and the standard deviation of one observation in mm.
-fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, f64, f64) {
+/// The estimate of an input under a prior.
+pub(super) fn solved(
+    work: &Work<'_>,
+    input: &EstimateInput<'_>,
+    prior: &PriorSettings,
+) -> Result<Estimate, WorkflowError> {
+    let options = &work.settings.estimate;
+    let mesh = input.mesh.0;
+    let mut unknowns = Vec::new();
+    for tissue in input.tissues {
+        unknowns.extend(law_priors(tissue, prior)?);
+    }
+    unknowns.extend(options.unknown_loads(&input.scenario.loads));
+    let patient = matches!(input.reference, Reference::Surfaces(_));
+    let mut scenario = input.scenario.clone();
+    if patient {
+        scenario.solver.element = options.element;
+    }
+    let (observation, errors, noise_mm) = observation(input, options);
+    let believed = &options.displacement;
+    let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
+        move |known: &[[f64; 3]]| {
+            work.tell(|p| p.doing("registering the estimate"));
+            let shown = shift.registration().sees(mesh, known, &shift.seen)?;
+            Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
+        }
+    });
+    let coarser = match input.coarser {
+        Some(make) if options.two_meshes && options.observed == Observed::Displacement => Some(make()?),
+        _ => None,
+    };
+    let problem = Problem {
+        mesh,
+        template: &scenario,
+        unknowns,
+        poisson_ratio: input.poisson_ratio,
+        observation,
+        errors,
+        model_log_sd: if patient { options.model_log_sd } else { 0.0 },
+        coarser: coarser.as_ref(),
+        body_known: !patient,
+        start: Vec::new(),
+        instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
+    };
+    let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
+    Ok(solve_problem(problem, &settings)?)
+}
+
+/// What is observed, how far it is believed, and the standard deviation of one observation in mm.
+fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, Errors, f64) {
     let mesh = input.mesh.0;
     match (input.reference, input.shift) {
         (Reference::Nodes(u), _) => {
-            (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0, input.noise_mm)
+            let nodes = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+            (Observation::Nodes(nodes), Errors::Independent { share: 1.0 }, input.noise_mm)
         }
         (Reference::Surfaces(_), Some(shift)) if options.observed == Observed::Displacement => {
             let believed = &options.displacement;
             let nodes = believed.observed(mesh, |x| moved_by(&shift.seen, x));
-            (Observation::Nodes(nodes), believed.independent_share(mesh), believed.noise_mm)
+            (Observation::Nodes(nodes), Errors::Correlated(believed.errors(input.rigid_error_mm)), believed.noise_mm)
         }
         (Reference::Surfaces(surfaces), _) => {
             // A node of a surface mesh of edge h stands for sqrt(3)/2 h^2 of it.
             let area_mm2 = 0.75f64.sqrt() * mesh.median_edge_mm().powi(2);
             let share = (area_mm2 / options.correlation_mm.powi(2)).min(1.0);
-            (Observation::Surfaces(surfaces.clone()), share, input.noise_mm)
+            (Observation::Surfaces(surfaces.clone()), Errors::Independent { share }, input.noise_mm)
         }
     }
 }
 
 fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, WorkflowError> {
     let mesh = input.mesh.0;
-    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm } = found;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials } = found;
     let errors = input.reference.errors(mesh, &state.displacement_mm);
-    let tissue = |(n, t): (usize, &Tissue)| {
+    let tissue = |t: &Tissue| {
+        // The parameters are named after the tissue.
+        let name = Unknown::ShearModulus(t.clone()).name();
+        let n = outcome.posterior.names.iter().position(|of| *of == name).unwrap_or(0);
         let (mode, prior) = (outcome.posterior.mode[n], &outcome.prior[n]);
         let level = prior.sd.map_or(0.0, |sd| (mode.ln() - prior.mean) / sd);
-        (t.name.clone(), neo_hookean(level, mode, input.poisson_ratio))
+        let neo_hookean = || Material::neo_hookean(mode, input.poisson_ratio);
+        let material = materials.get(&t.name).cloned().unwrap_or_else(neo_hookean);
+        (t.name.clone(), TissueSample { sd_level: level, shear_modulus_pa: mode, material })
     };
-    let sample =
-        Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().enumerate().map(tissue).collect(), task: None };
+    let sample = Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().map(tissue).collect(), task: None };
     let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
     let file = ESTIMATE_STATE.to_owned();
     let record = SampleOutcome {
