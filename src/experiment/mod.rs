@@ -18,3 +18,4 @@ pub mod supports;
 pub mod sweep;
 pub mod synth;
 pub mod verdict;
+pub mod verdict_of_samples;

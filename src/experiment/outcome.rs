@@ -5,6 +5,7 @@
 
 pub use super::law_outcome::LawOutcome;
 
+use super::compare::Comparison;
 use super::estimate::EstimateOutcome;
 use super::verdict::Verdict;
 use schemars::JsonSchema;
@@ -73,6 +74,9 @@ pub struct ExperimentOutcome {
     /// What it comes down to; found once all else is there ([`ExperimentOutcome::with_verdict`]).
     #[serde(default)]
     pub verdict: Verdict,
+    /// The models that an estimate has tried, where there were several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
 }
 
 /// One simulation of a sweep.
@@ -287,13 +291,6 @@ impl ExperimentOutcome {
     /// [`OutcomeError`] naming file and place.
     pub fn from_json(text: &str, name: &str) -> Result<Self, OutcomeError> {
         serde_json::from_str(text).map_err(|e| OutcomeError { name: name.to_owned(), reason: e.to_string() })
-    }
-
-    /// With its verdict: the estimate's, else the samples'.
-    #[must_use]
-    pub fn with_verdict(mut self) -> Self {
-        self.verdict = self.estimate.as_ref().map_or_else(|| Verdict::of_samples(&self), |e| e.verdict.clone());
-        self
     }
 
     /// The sample with the smallest RMSE, as named by `best_sample`.

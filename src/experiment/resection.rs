@@ -6,7 +6,7 @@ use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
 use super::skull::{SkullSettings, level_when_drained};
-use super::verdict::compared;
+use super::verdict_of_samples::compared;
 use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
 use crate::geometry::Frame;
 use crate::image::LabelMap;
@@ -63,6 +63,35 @@ impl CsfSettings {
     }
 }
 
+/// How the skull holds a patient's brain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Supports {
+    /// Not known: an estimate tries the others and weighs them by their evidence; samples are simulated as `fixed`.
+    #[default]
+    Evidence,
+    /// At its base, which does not move, as in the paper.
+    Fixed,
+    /// Only the cut brainstem is held, and the skull pushes back without friction.
+    Sliding,
+}
+
+impl Supports {
+    /// What an estimate tries, in this order.
+    pub fn family(self) -> Vec<Self> {
+        if self == Self::Evidence { vec![Self::Fixed, Self::Sliding] } else { vec![self] }
+    }
+
+    /// The word of files and texts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Evidence => "evidence",
+            Self::Fixed => "fixed",
+            Self::Sliding => "sliding",
+        }
+    }
+}
+
 /// Loads, supports and samples of a patient's sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -86,9 +115,8 @@ pub struct ResectionSettings {
     pub sd_levels: Vec<f64>,
     /// Node sets held still.
     pub fixed: Vec<String>,
-    /// How the skull holds the brain: `fixed` at its base, as in the paper, or `sliding`: only the cut brainstem is held
-    /// there, and the skull pushes back without friction.
-    pub supports: Support,
+    /// How the skull holds the brain.
+    pub supports: Supports,
     /// How the falx holds it where `supports` slide: `fixed` to it, or `sliding` along either side.
     pub falx: Support,
     /// The skull of `supports = "sliding"`.
@@ -114,7 +142,7 @@ impl Default for ResectionSettings {
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
             fixed: vec!["base".to_owned(), "falx".to_owned()],
-            supports: Support::Fixed,
+            supports: Supports::Evidence,
             falx: Support::Fixed,
             skull: SkullSettings::default(),
             csf: None,

@@ -3,7 +3,8 @@
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::rmse::median_and_mad;
-use crate::experiment::verdict::{Finding, compared};
+use crate::experiment::verdict::Finding;
+use crate::experiment::verdict_of_samples::compared;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;

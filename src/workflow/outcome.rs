@@ -99,4 +99,5 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
     outcome.warnings.retain(|w| !w.starts_with("estimate: "));
     outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
     outcome.estimate = Some(facts.estimate.clone());
+    outcome.comparison.clone_from(&facts.comparison);
 }

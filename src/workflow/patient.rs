@@ -6,13 +6,14 @@ use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
 use super::plan::{self, StageName};
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, HeldBody, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
 use crate::experiment::compare::Comparison;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
+use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
@@ -233,11 +234,29 @@ impl<'w, 'a> Patient<'w, 'a> {
         then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
     ) -> Result<T, WorkflowError> {
         let Self { work, prepared, .. } = self;
+        let settings = &work.settings.resection;
         let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
+        let held = || -> Result<Vec<HeldBody>, WorkflowError> {
+            settings.supports.family().into_iter().map(|supports| self.held(supports)).collect()
+        };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let input = EstimateInput { shift: Some(&shift), coarser: Some(&coarser), ..self.asked(&tissues) };
+        let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
+        let input = EstimateInput { shift, coarser, held, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
+    }
+
+    /// The body as these supports hold it.
+    fn held(&self, supports: Supports) -> Result<HeldBody, WorkflowError> {
+        let work = self.work;
+        let settings = ResectionSettings { supports, ..work.settings.resection.clone() };
+        let anatomy = Anatomy::read(&work.case)?;
+        let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
+        let scenario = settings.supported(&template, &anatomy.labels)?;
+        let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
+        let mesh = settings.supported_mesh(rest, &scenario)?;
+        let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -249,6 +268,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             poisson_ratio: settings.resection.poisson_ratio,
             reference: &self.reference,
             coarser: None,
+            held: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
             rigid_error_mm: settings.resection.registration_error_mm,

@@ -21,7 +21,7 @@ pub use registration::RegistrationFacts;
 pub(crate) use anat::{Anatomy, anat, anat_stage};
 pub(crate) use brain_shift::SeenShift;
 pub(crate) use compare::compare;
-pub(crate) use estimate::{EstimateInput, estimate, present_estimate};
+pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
 pub(crate) use reference::{
