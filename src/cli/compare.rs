@@ -2,11 +2,11 @@
 
 use super::flags::Flags;
 use super::{Failure, Session};
-use crate::experiment::compare::Comparison;
+use crate::report::in_words::models_table;
 use crate::workflow;
 use std::path::PathBuf;
 
-/// Models of a prepared case beside each other (one or two tissues, each law): which of them what was seen speaks for
+/// Models of a prepared case by their evidence: supports fixed or sliding, one or two tissues, each law
 ///
 /// Example: hgm compare case
 #[derive(Debug, clap::Args)]
@@ -18,19 +18,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = session.settings_of(&args.case, Flags::default())?;
     let (case, comparison) = workflow::compare(&session.place(&args.case), &settings, &mut session.listener())?;
-    session.emit(&comparison, &table(&comparison))?;
+    let words = format!("{}\n{}", comparison.verdict.sentence, models_table(&comparison));
+    session.emit(&comparison, &words)?;
     Ok(case.quality_gate()?)
-}
-
-/// The comparison for a terminal.
-fn table(comparison: &Comparison) -> String {
-    let best = comparison.candidates.first().map_or(0.0, |c| c.log_evidence);
-    let mut text = format!("{}\n", comparison.verdict.sentence);
-    text += "model                                       log odds  weight  explained  finding\n";
-    for c in &comparison.candidates {
-        let (odds, share) = (c.log_evidence - best, 100.0 * c.explained_share);
-        let finding = c.finding.short();
-        text += &format!("{:<42} {odds:>9.1} {:>7.3} {share:>8.0} %  {finding}\n", c.name, c.weight);
-    }
-    text
 }

@@ -8,6 +8,10 @@ impl ExperimentOutcome {
     #[must_use]
     pub fn with_verdict(mut self) -> Self {
         self.verdict = self.estimate.as_ref().map_or_else(|| of_samples(&self), |e| e.verdict.clone());
+        if self.verdict.finding == Finding::NoShift {
+            // Every sample fits noise as well as any other.
+            self.best_sample = None;
+        }
         self
     }
 }
