@@ -86,13 +86,6 @@ pub enum Reason {
         /// Logarithm of the odds of the model against it.
         log_odds: f64,
     },
-    /// Parts of the brain ask for different figures.
-    PartsDisagree {
-        /// Which parts: `left and right`.
-        parts: String,
-        /// How many standard deviations apart.
-        sd: f64,
-    },
     /// A parameter far from what is known of it.
     FarFromPrior {
         /// The parameter.
@@ -162,9 +155,6 @@ impl Reason {
             ),
             Self::NoBetterThanAnyMovement { log_odds } => {
                 format!("any smooth movement explains what is seen as well as this load does (log odds {log_odds:.1})")
-            }
-            Self::PartsDisagree { parts, sd } => {
-                format!("{parts} parts of the brain ask for moduli {sd:.1} standard deviations apart")
             }
             Self::FarFromPrior { name, sd } => {
                 format!("{name} comes out {sd:.1} standard deviations from what is known of it")

@@ -31,7 +31,8 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
 /// The models that were tried, the most probable first.
 pub fn models_table(comparison: &Comparison) -> String {
     let best = comparison.candidates.first().map_or(0.0, |c| c.log_evidence);
-    let mut text = String::from("model                                              log odds  weight  explained  finding\n");
+    let mut text =
+        String::from("model                                              log odds  weight  explained  finding\n");
     for c in &comparison.candidates {
         let (odds, share, finding) = (c.log_evidence - best, 100.0 * c.explained_share, c.finding.short());
         text += &format!("{:<49} {odds:>9.1} {:>7.3} {share:>8.0} %  {finding}\n", c.name, c.weight);

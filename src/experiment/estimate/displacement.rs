@@ -12,9 +12,8 @@ use serde::{Deserialize, Serialize};
 
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
-/// Depth and noise were measured on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is
-/// known, with the registration's own error taken out; what they lead to stands in docs/evidence/patients.md. The
-/// distance is that at which the fit's smoothing (Gaussians of 8 mm) no longer ties two nodes together.
+/// Depth was chosen on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is known. Noise and
+/// length are what the registration shows of a pair that has not moved (docs/evidence/estimate.md).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplacementSettings {
@@ -22,7 +21,7 @@ pub struct DisplacementSettings {
     pub depth_mm: f64,
     /// Standard deviation of one component, mm.
     pub noise_mm: f64,
-    /// Nodes nearer to each other than this share their error, mm: they count as one.
+    /// Length over which errors are alike, mm: that of Matern's covariance of order 3/2.
     pub correlation_mm: f64,
     /// Most nodes that are looked at; those between them say the same.
     pub places: usize,
@@ -32,7 +31,7 @@ pub struct DisplacementSettings {
 
 impl Default for DisplacementSettings {
     fn default() -> Self {
-        Self { depth_mm: 10.0, noise_mm: 0.1, correlation_mm: 20.0, places: 400, re_registrations: 1 }
+        Self { depth_mm: 10.0, noise_mm: 0.2, correlation_mm: 20.0, places: 400, re_registrations: 1 }
     }
 }
 
@@ -76,7 +75,7 @@ impl DisplacementSettings {
 
     /// How far the displacements are believed, when the rigid registration is expected to be off by `rigid_mm`.
     pub fn errors(&self, rigid_mm: f64) -> CorrelatedErrors {
-        let noise = Process::of_cube(self.noise_mm, self.correlation_mm);
+        let noise = Process { sd_mm: self.noise_mm, length_mm: self.correlation_mm };
         CorrelatedErrors { noise, rigid_mm: rigid_mm.max(1e-6), places: self.places }
     }
 }

@@ -20,16 +20,7 @@ pub struct Process {
     pub length_mm: f64,
 }
 
-/// Volume that one independent error stands for, over the cube of the length: the integral of the correlation over space,
-/// 32 pi / 3^1.5.
-const VOLUME_PER_LENGTH_CUBED: f64 = 32.0 * std::f64::consts::PI / 5.196_152_422_706_632;
-
 impl Process {
-    /// A process whose errors count as one within a cube of edge `cube_mm`.
-    pub fn of_cube(sd_mm: f64, cube_mm: f64) -> Self {
-        Self { sd_mm, length_mm: cube_mm / VOLUME_PER_LENGTH_CUBED.cbrt() }
-    }
-
     /// Covariance of one component at two places this far apart, mm2.
     pub fn covariance_mm2(&self, distance_mm: f64) -> f64 {
         let r = 3f64.sqrt() * distance_mm / self.length_mm;
@@ -139,17 +130,6 @@ mod tests {
         let c = process.covariance_mm2(5.0);
         let own = 4.0 * (1.0 + OWN);
         assert!((factor.log_determinant - (own * own - c * c).ln()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_process_of_a_cube_has_the_cubes_volume_as_its_integral() {
-        let process = Process::of_cube(1.0, 20.0);
-        let shell = |n: usize| {
-            let r = (n as f64 + 0.5) * 0.05;
-            4.0 * std::f64::consts::PI * r * r * process.covariance_mm2(r) * 0.05
-        };
-        let volume: f64 = (0..8000).map(shell).sum();
-        assert!((volume / 8000.0 - 1.0).abs() < 1e-3, "{volume}");
     }
 
     #[test]
