@@ -1,6 +1,6 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
-use super::{StudyOptions, VERSION, facts};
+use super::options::{StudyOptions, VERSION, facts};
 use crate::artefact::{Produced, Stage};
 use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};

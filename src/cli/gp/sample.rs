@@ -1,6 +1,6 @@
 //! `hgm gp sample`: materials from the generative model.
 
-use super::{HyperparameterOptions, StudyOptions, VERSION, facts};
+use super::options::{HyperparameterOptions, StudyOptions, VERSION, facts};
 use crate::artefact::{Produced, Stage};
 use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};

@@ -1,6 +1,6 @@
 //! `hgm gp show`: the paper's figures, table and tests.
 
-use super::{HyperparameterOptions, Studies, StudyOptions, VERSION, facts};
+use super::options::{HyperparameterOptions, Studies, StudyOptions, VERSION, facts};
 use crate::artefact::{Produced, Stage};
 use crate::cli::{Failure, Session};
 use crate::material::Task;

@@ -10,7 +10,7 @@ use crate::layout::SAMPLE_STATE;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::{StageName, Subject};
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.

@@ -1,10 +1,16 @@
 //! Why a job did not end well.
 
-use super::case::CaseError;
-use super::inputs::InputError;
-use super::meshing::MeshFileError;
+mod case;
+mod input;
+mod mesh_file;
+mod simulation;
+
+pub use case::CaseError;
+pub use input::{InputError, MaskRole};
+pub use mesh_file::MeshFileError;
+pub use simulation::SimulationError;
+
 use super::settings::SettingsError;
-use super::simulation::SimulationError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
