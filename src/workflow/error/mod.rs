@@ -20,6 +20,9 @@ use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
+use crate::material::gp::{FitRefusal, HyperparametersError};
+use crate::material::literature::StudyError;
+use crate::material::meta_model::FitError;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
 use crate::register::RegisterError;
@@ -73,6 +76,16 @@ pub enum WorkflowError {
     Observed(#[from] ObservedError),
     #[error(transparent)]
     Prior(#[from] PriorError),
+    #[error("{file}: {source}")]
+    Studies { file: String, source: StudyError },
+    #[error("{file}: {source}")]
+    Hyperparameters { file: String, source: HyperparametersError },
+    #[error("there is no literature model {id}; ids go from 0 to {last}")]
+    NoSuchModel { id: u32, last: u32 },
+    #[error(transparent)]
+    Gp(#[from] FitRefusal),
+    #[error(transparent)]
+    Law(#[from] FitError),
     #[error("samples of every task compare materials of the whole brain: they do not go with two tissues")]
     EveryTaskOfTwo,
     #[error("the table [{table}] asks for a simulation that cannot be done: {source}")]
