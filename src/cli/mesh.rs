@@ -5,14 +5,14 @@ use super::{Failure, Reject, Session};
 use crate::artefact::{Produced, Stage, StageError, write_whole};
 use crate::geometry::Native;
 use crate::image::LabelMap;
-use crate::image::nifti;
+use crate::image::nifti::{self, encode_u8};
 use crate::mesh::engine::{EnginePrograms, MeshSettings, mesh_labels};
 use crate::mesh::format::{WriteError, feb, gifti, inp, msh, ply, stl, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::report::mesh_figure::preview;
 use crate::segment::label;
 use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
-use crate::workflow::{WorkflowError, mesh_outcome, read_input};
+use crate::workflow::{WorkflowError, any_labels, mesh_outcome, read_input};
 use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,22 +20,26 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
 
 /// Mesh a label map: conforming tetrahedra of every nonzero label, with boundary sets where the map is in MNI space
 ///
-/// Labels: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle, 5 resected tissue; other numbers are meshed as well. The mesh
-/// keeps each label's number.
+/// Labels: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle, 5 resected tissue, 6 tumour, 7 oedema. A map of FreeSurfer,
+/// SynthSeg, SimNIBS, GIF or MUSE is known by its numbers and carried to these. Numbers of no tool are meshed as they are.
 ///
 /// Example: hgm mesh pre_dseg.nii.gz -o brain.vtu --cells 60000 --preview brain.png
+/// Example: hgm mesh aseg.mgz --labels freesurfer -o brain.vtu
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Label map (NIfTI)
+    /// Label map (NIfTI, .mgz or .mgh)
     #[arg(value_name = "DSEG")]
-    pub labels: PathBuf,
+    pub dseg: PathBuf,
+    /// Whose numbers the map holds [default: found out from the numbers]
+    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv")]
+    pub labels: Option<String>,
     /// Where to write: .vtu, .msh (gmsh 4.1), .inp (Abaqus) or .feb (FEBio)
     #[arg(short, long, value_name = "MESH")]
     pub output: PathBuf,
@@ -78,8 +82,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let name = args.output.display();
         return Err(Failure::Rejected(anyhow!("-o {name}: the name must end in .vtu, .msh, .inp or .feb")));
     }
-    let name = args.labels.display().to_string();
-    let bytes = read_input(&args.labels)?;
+    let name = args.dseg.display().to_string();
+    let bytes = read_input(&args.dseg)?;
     let mut flags = Flags::default();
     args.mesh.over(&mut flags);
     flags.list("mesh.without", &args.without);
@@ -88,10 +92,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (mut settings, tags) = (whole.mesh, whole.tag);
     let programs = session.programs.engines();
     programs.check(settings.engine).reject()?;
-    let (labels, odd) = nifti::decode_labels(&bytes, &name, &whole.image).reject()?;
-    for warning in &odd {
-        tracing::warn!("{name}: {warning}");
-    }
+    let told = |text: &str| tracing::info!("{text}");
+    let labels = any_labels(&bytes, &name, args.labels.as_deref(), &whole.image, &told)?;
 
     let in_mni = match args.sets.as_str() {
         "auto" => name.contains("space-MNI") || nifti::says_mni(&bytes),
@@ -105,7 +107,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = args.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let frame = if in_mni { "MNI" } else { "native" };
     let stage = Stage::new(&format!("mesh-{file}"), VERSION, &folder, &(&settings, in_mni.then_some(&tags)));
-    let stage = stage.input("labels", &bytes).frame(frame);
+    let mut stage = stage.input("labels", &bytes).frame(frame);
+    if args.labels.is_some() {
+        // What a table of the user's own makes of the file.
+        stage = stage.input("label numbers", &encode_u8(&labels));
+    }
     // Pictures and surfaces are made from the mesh at hand, so asking for them is asking for the mesh.
     let force = session.options.force || args.preview.is_some() || args.surfaces.is_some();
     let outcome = stage.run(force, || {

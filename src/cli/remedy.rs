@@ -76,5 +76,6 @@ fn option(role: MaskRole) -> &'static str {
         MaskRole::Ventricle => "--ventricle-mask",
         MaskRole::Cavity => "--cavity-mask",
         MaskRole::Resected => "--resected-mask",
+        MaskRole::Labels => "--dseg",
     }
 }

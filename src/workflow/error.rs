@@ -2,6 +2,7 @@
 
 use super::case::CaseError;
 use super::inputs::InputError;
+use super::labels::LabelMapError;
 use super::settings::SettingsError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
@@ -17,7 +18,7 @@ use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
 use crate::report::derivatives::DerivativesError;
-use crate::resect::PairError;
+use crate::resect::{PairError, ResectError};
 use crate::tag::{MARGIN, TagError};
 use thiserror::Error;
 
@@ -40,6 +41,8 @@ pub enum WorkflowError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Labels(#[from] LabelMapError),
     #[error(transparent)]
     Case(#[from] CaseError),
     #[error(transparent)]
@@ -110,6 +113,10 @@ impl WorkflowError {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
+            // Answers, not faults of a file: the scans were compared.
+            Self::Pair(PairError::NotOnePerson { .. } | PairError::Resect(ResectError::NoOperation { .. })) => {
+                ErrorKind::QualityGate
+            }
             Self::Write(_)
             | Self::Format(_)
             | Self::Outcome(OutcomeError { .. })

@@ -23,6 +23,7 @@
 mod case;
 mod error;
 mod inputs;
+mod labels;
 mod outcome;
 mod patient;
 mod phantom;
@@ -39,6 +40,7 @@ pub mod cohort;
 pub use case::{Case, CaseError};
 pub use error::{ErrorKind, WorkflowError};
 pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
+pub use labels::{LabelMapError, any_labels, labels_of_tool};
 pub use patient::Shard;
 pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
 pub use programs::{KNOWN, Known, Programs};

@@ -8,6 +8,7 @@ mod damaged_files;
 mod doubtful_inputs;
 mod fem;
 mod job;
+mod label_maps;
 mod material;
 mod mesh_engines;
 mod mesh_files;
