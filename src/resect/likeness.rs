@@ -30,8 +30,9 @@ pub struct Likeness {
 impl Likeness {
     /// Below this the scans do not show one head, or one does not lie on the other.
     ///
-    /// On 60 pairs of free scans (adults, a child, 0.8 to 4.8 mm, with and without the scanner's normalisation, other
-    /// protocols, other postures) one head had .90 and more, two heads .70 and less; `./run bench heads` measures it again.
+    /// On 27 pairs of free scans (adults, a child, 0.8 to 4.8 mm, with and without the scanner's normalisation, other
+    /// postures, cavities of 40 to 60 cc) one head had .95 and more, two heads .71 and less; `./run bench pairs` looks at it
+    /// again.
     pub const ONE_HEAD: f64 = 0.8;
 
     /// Whether this is one head.

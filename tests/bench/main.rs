@@ -12,6 +12,7 @@ mod job;
 mod kills;
 mod material;
 mod mesh;
+mod pairs;
 mod patients;
 #[path = "../it/python.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
@@ -28,6 +29,7 @@ fn main() {
         ("material", material::bars),
         ("fem", fem::bars),
         ("experiment", experiment::bars),
+        ("pairs", pairs::bars),
         ("patients", patients::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),
