@@ -2,6 +2,7 @@
 
 use super::remedy::remedy;
 use super::session::has_emitted;
+use crate::resect::{PairError, ResectError};
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
@@ -48,8 +49,28 @@ impl Failure {
         let message = in_one_line(error);
         eprintln!("hgm: {kind}: {message}");
         if json && !has_emitted() {
-            println!("{}", serde_json::json!({"error": {"kind": kind, "message": message, "exit_code": self.code()}}));
+            let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
+            if let Some(answer) = error.downcast_ref::<Answered>() {
+                told["answer"] = answer.name.into();
+            }
+            println!("{}", serde_json::json!({ "error": told }));
         }
+    }
+}
+
+/// The scans were compared and gave an answer that ends the job: `no-operation` or `not-one-person`.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+struct Answered {
+    name: &'static str,
+    message: String,
+}
+
+fn answer(error: &anyhow::Error) -> Option<&'static str> {
+    match error.downcast_ref()? {
+        WorkflowError::Pair(PairError::NotOnePerson { .. }) => Some("not-one-person"),
+        WorkflowError::Pair(PairError::Resect(ResectError::NoOperation { .. })) => Some("no-operation"),
+        _ => None,
     }
 }
 
@@ -72,6 +93,9 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
     fn from(error: E) -> Self {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
+        if let Some(name) = answer(&error) {
+            return Self::QualityGate(Answered { name, message: in_one_line(&with_remedy(error)) }.into());
+        }
         let error = match (with_remedy(error), kind) {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
             (error, _) => error,
@@ -120,6 +144,18 @@ impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
 mod tests {
     use super::*;
     use anyhow::{Context, anyhow};
+
+    #[test]
+    fn no_operation_and_two_people_are_answers_with_a_name_and_exit_code_4() {
+        let pair = |error: PairError| Failure::from(WorkflowError::Pair(error));
+        let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
+        for (failure, name) in
+            [(pair(PairError::NotOnePerson { folds: 0.4 }), "not-one-person"), (pair(none.into()), "no-operation")]
+        {
+            assert_eq!(failure.code(), 4);
+            assert_eq!(failure.parts().1.downcast_ref::<Answered>().map(|a| a.name), Some(name));
+        }
+    }
 
     #[test]
     fn a_cause_is_said_once() {

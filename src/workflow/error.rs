@@ -2,6 +2,7 @@
 
 use super::case::CaseError;
 use super::inputs::InputError;
+use super::labels::LabelMapError;
 use super::meshing::MeshFileError;
 use super::settings::SettingsError;
 use super::simulation::SimulationError;
@@ -20,7 +21,7 @@ use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
 use crate::report::derivatives::DerivativesError;
-use crate::resect::PairError;
+use crate::resect::{PairError, ResectError};
 use crate::tag::{MARGIN, TagError};
 use thiserror::Error;
 
@@ -43,6 +44,8 @@ pub enum WorkflowError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Labels(#[from] LabelMapError),
     #[error(transparent)]
     Case(#[from] CaseError),
     #[error(transparent)]
@@ -119,6 +122,10 @@ impl WorkflowError {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
+            // Answers, not faults of a file: the scans were compared.
+            Self::Pair(PairError::NotOnePerson { .. } | PairError::Resect(ResectError::NoOperation { .. })) => {
+                ErrorKind::QualityGate
+            }
             Self::Write(_)
             | Self::Format(_)
             | Self::Outcome(OutcomeError { .. })

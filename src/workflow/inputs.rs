@@ -1,11 +1,12 @@
 //! The files a user gives: two scans and masks of their own.
 
 use super::error::WorkflowError;
+use super::labels::{LabelMapError, labels_of_tool};
 use super::work::Work;
 use crate::artefact::sha256_hex;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
-use crate::image::nifti::{self, ReadOptions};
-use crate::image::{Grid, Mask, Volume};
+use crate::image::nifti::{self, ReadOptions, encode_u8};
+use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::segment::native::mask_on;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,10 @@ pub struct Inputs {
     pub pre: PathBuf,
     /// The post-operative T1.
     pub post: PathBuf,
+    /// A label map of the pre-operative scan, as another tool wrote it: wins over the computed labels.
+    pub dseg: Option<PathBuf>,
+    /// Whose numbers it holds: a built-in table or a .tsv file; `None` finds out.
+    pub labels: Option<String>,
     /// The brain, in the pre-operative scan's grid.
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles before the operation, in the grid of either scan.
@@ -46,6 +51,8 @@ pub enum MaskRole {
     Cavity,
     /// The resected tissue.
     Resected,
+    /// Labels of the pre-operative scan.
+    Labels,
 }
 
 impl fmt::Display for MaskRole {
@@ -55,6 +62,7 @@ impl fmt::Display for MaskRole {
             Self::Ventricle => "ventricle mask",
             Self::Cavity => "cavity mask",
             Self::Resected => "resected mask",
+            Self::Labels => "label map",
         })
     }
 }
@@ -162,6 +170,7 @@ impl Scans {
 /// The user's own masks with the bytes of their files.
 #[derive(Debug)]
 pub(crate) struct OwnMasks {
+    pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: Option<(GivenMask, Vec<u8>)>,
     pub ventricle: Option<(GivenMask, Vec<u8>)>,
     pub cavity: Option<(GivenMask, Vec<u8>)>,
@@ -174,7 +183,9 @@ impl OwnMasks {
         let read = |role: MaskRole, path: &Option<PathBuf>| {
             path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
         };
+        let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), scans, work));
         Ok(Self {
+            labels: labels.transpose()?,
             brain: read(MaskRole::Brain, &inputs.brain_mask)?,
             ventricle: read(MaskRole::Ventricle, &inputs.ventricle_mask)?,
             cavity: read(MaskRole::Cavity, &inputs.cavity_mask)?,
@@ -190,8 +201,37 @@ impl OwnMasks {
             (MaskRole::Cavity, &self.cavity),
             (MaskRole::Resected, &self.resected),
         ];
-        masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())))
+        let masks =
+            masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())));
+        masks.chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
+}
+
+/// Reads a label map of the pre-operative scan. Another grid in the scanner's coordinates will do: FreeSurfer and SynthSeg
+/// write their own.
+fn given_labels(
+    path: &Path,
+    whose: Option<&str>,
+    scans: &Scans,
+    work: &Work<'_>,
+) -> Result<(LabelMap<Pre>, Vec<u8>), WorkflowError> {
+    /// A map of this scan lies in its field of view, but for a rim.
+    const LEAST_PERCENT: f64 = 90.0;
+    let labels = work.tell(|p| labels_of_tool(path, whose, &work.settings.image, p))?;
+    let labels: LabelMap<Pre> = labels.relabelled();
+    let labelled = (0..labels.data.len()).filter(|&n| labels.data[n] > 0).step_by(7);
+    let (mut seen, mut all) = (0.0, 0.0);
+    for n in labelled {
+        let p = labels.grid.position(labels.grid.voxel(n).map(|v| v as f64).into());
+        all += 1.0;
+        seen += f64::from(u8::from(scans.pre.nearest(p).is_some()));
+    }
+    let percent = 100.0 * seen / f64::max(all, 1.0);
+    if percent < LEAST_PERCENT {
+        return Err(LabelMapError::Elsewhere { name: shown(path), percent }.into());
+    }
+    let bytes = encode_u8(&labels);
+    Ok((labels, bytes))
 }
 
 /// A mask in the frame of the scan whose grid it has.
