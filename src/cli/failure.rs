@@ -2,7 +2,7 @@
 
 use super::remedy::remedy;
 use super::session::has_emitted;
-use crate::resect::{PairError, ResectError};
+use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
@@ -51,27 +51,19 @@ impl Failure {
         if json && !has_emitted() {
             let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
             if let Some(answer) = error.downcast_ref::<Answered>() {
-                told["answer"] = answer.name.into();
+                told["answer"] = answer.answer.name().into();
             }
             println!("{}", serde_json::json!({ "error": told }));
         }
     }
 }
 
-/// The scans were compared and gave an answer that ends the job: `no-operation` or `not-one-person`.
+/// The scans were compared and gave an answer that ends the job.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
-struct Answered {
-    name: &'static str,
+pub struct Answered {
+    pub answer: Answer,
     message: String,
-}
-
-fn answer(error: &anyhow::Error) -> Option<&'static str> {
-    match error.downcast_ref()? {
-        WorkflowError::Pair(PairError::NotOnePerson { .. }) => Some("not-one-person"),
-        WorkflowError::Pair(PairError::Resect(ResectError::NoOperation { .. })) => Some("no-operation"),
-        _ => None,
-    }
 }
 
 /// An error and its causes, each said once: some texts hold their cause already.
@@ -93,8 +85,8 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
     fn from(error: E) -> Self {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
-        if let Some(name) = answer(&error) {
-            return Self::QualityGate(Answered { name, message: in_one_line(&with_remedy(error)) }.into());
+        if let Some(answer) = error.downcast_ref().and_then(WorkflowError::answer) {
+            return Self::QualityGate(Answered { answer, message: in_one_line(&with_remedy(error)) }.into());
         }
         let error = match (with_remedy(error), kind) {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
@@ -143,17 +135,19 @@ impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::resect::{PairError, ResectError};
     use anyhow::{Context, anyhow};
 
     #[test]
     fn no_operation_and_two_people_are_answers_with_a_name_and_exit_code_4() {
         let pair = |error: PairError| Failure::from(WorkflowError::Pair(error));
         let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
-        for (failure, name) in
-            [(pair(PairError::NotOnePerson { folds: 0.4 }), "not-one-person"), (pair(none.into()), "no-operation")]
-        {
+        for (failure, name) in [
+            (pair(PairError::NotOnePerson { folds: 0.4 }), Answer::NotOnePerson),
+            (pair(none.into()), Answer::NoOperation),
+        ] {
             assert_eq!(failure.code(), 4);
-            assert_eq!(failure.parts().1.downcast_ref::<Answered>().map(|a| a.name), Some(name));
+            assert_eq!(failure.parts().1.downcast_ref::<Answered>().map(|a| a.answer), Some(name));
         }
     }
 

@@ -65,8 +65,13 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Labels(LabelMapError::Import {
             source: ImportError::Numbers(LabelError::Mask { .. }), ..
         }) => "see --brain-mask",
+        WorkflowError::Registration { .. } => {
+            "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
+        }
         WorkflowError::Labels(_) => "see --labels",
-        WorkflowError::Pair(_) => "--cavity-mask, --resected-mask and --brain-mask take masks of your own",
+        WorkflowError::Pair(_) => {
+            "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
+        }
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
@@ -140,5 +145,6 @@ fn option(role: MaskRole) -> &'static str {
         MaskRole::Cavity => "see --cavity-mask",
         MaskRole::Resected => "see --resected-mask",
         MaskRole::Labels => "see --dseg",
+        MaskRole::Pose => "see --pose",
     }
 }

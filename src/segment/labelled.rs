@@ -3,13 +3,13 @@
 use super::native::labels_on;
 use super::{Segmentation, TissueVolumes, atlas};
 use crate::anatomy::label;
-use crate::geometry::{AffineTransform, Frame, Mni, RigidTransform};
+use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::components::fill_holes;
 use crate::image::morphology::close;
-use crate::image::resample::{Interpolation, resample};
+use crate::image::resample::{Interpolation, resample, resample_nearest};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
-use nalgebra::{Matrix3, Vector3};
+use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
 
 /// Sulci narrower than twice this are part of the brain, as in a computed mask, mm.
 const CLOSING_MM: f64 = 5.0;
@@ -99,6 +99,16 @@ fn whole_brain(labels: &LabelMap<Mni>) -> Mask<Mni> {
     fill_holes(&close(&tissue, CLOSING_MM))
 }
 
+/// The pose of a scan in the template's frame, found from its label map alone: tissues drawn with the template's intensities
+/// against the template's own, drawn alike in natural size.
+///
+/// # Errors
+/// [`RegisterError`].
+pub fn pose_of_labels<F: Frame>(labels: &LabelMap<F>) -> Result<RigidFit<F, Mni>, RegisterError> {
+    let head = drawn_head();
+    register_to_mean_head(&drawn(labels), &MeanHead { t1: &head, brain: &atlas::mean_head().brain })
+}
+
 /// The template fitted to a label map: its tissues drawn with the template's own intensities, so that the scan's contrast
 /// does not matter.
 ///
@@ -108,6 +118,21 @@ pub fn fit_template_to_labels(
     labels_mni: &LabelMap<Mni>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<Mni>, DeformableError> {
+    let (subject, head) = (drawn(labels_mni), drawn_head());
+    let mean = MeanHead { t1: &head, brain: &atlas::mean_head().brain };
+    let start = atlas::head_from_template().then(&subject_from_mean_head(&subject, &mean, None));
+    fit_atlas(&subject, &atlas::template().t1_f32(), &start, None, settings)
+}
+
+/// The template's labels drawn in natural size on the mean head's grid.
+fn drawn_head() -> Volume<f32, Mni> {
+    let template_from_head = atlas::head_from_template().inverse().expect("a stretch can be inverted");
+    let labels = resample_nearest(&atlas::template().labels, &atlas::mean_head().t1.grid, &template_from_head, 0);
+    drawn(&labels)
+}
+
+/// Labels with the intensities that the template has in its own.
+fn drawn<F: Frame>(labels: &LabelMap<F>) -> Volume<f32, F> {
     let template = atlas::template();
     let mean = |l: u8| {
         let values = template.labels.data.iter().zip(&template.t1.data).filter(|(own, _)| **own == l);
@@ -115,40 +140,39 @@ pub fn fit_template_to_labels(
         (sum / f64::max(count, 1.0)) as f32
     };
     let means = [label::CSF, label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE].map(mean);
-    let drawn = labels_mni.map(|l| match l {
+    labels.map(|l| match l {
         label::BACKGROUND => 0.0,
         label::CSF => means[0],
         label::WHITE_MATTER | label::OEDEMA => means[2],
         label::VENTRICLE => means[3],
         _ => means[1],
-    });
-    fit_atlas(&drawn, &template.t1_f32(), &extent_from(&template.brain(), &drawn.map(|x| x > 0.0)), None, settings)
-}
-
-/// Shift and stretch along the axes that bring the extent of one brain to that of another: a label map has no skull whose
-/// size would say it, and needs none.
-fn extent_from(template: &Mask<Mni>, subject: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
-    let moments = |mask: &Mask<Mni>| {
-        let (mut count, mut sum, mut squares) = (0.0, Vector3::zeros(), Vector3::zeros());
-        for n in (0..mask.data.len()).filter(|&n| mask.data[n]) {
-            let p = mask.grid.position(mask.grid.voxel(n).map(|v| v as f64).into()).mm.coords;
-            count += 1.0;
-            sum += p;
-            squares += p.component_mul(&p);
-        }
-        let mean: Vector3<f64> = sum / f64::max(count, 1.0);
-        let variance: Vector3<f64> = squares / f64::max(count, 1.0) - mean.component_mul(&mean);
-        (mean, variance.map(|v| v.max(1.0).sqrt()))
-    };
-    let ((from, wide_from), (to, wide_to)) = (moments(template), moments(subject));
-    let stretch = wide_to.component_div(&wide_from);
-    AffineTransform::from_parts(Matrix3::from_diagonal(&stretch), to - stretch.component_mul(&from))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pre;
+    use crate::geometry::{Position, Pre};
+    use crate::image::Grid;
+
+    #[test]
+    fn slow_a_turned_label_map_finds_its_own_pose() {
+        let truth = RigidTransform::<Pre, Mni>::about(
+            [0.0, -20.0, 10.0].into(),
+            nalgebra::Vector3::new(0.25, -0.2, 0.15),
+            nalgebra::Vector3::new(10.0, -15.0, 20.0),
+        );
+        let grid = Grid::<Pre>::axis_aligned([96, 112, 96], [2.0; 3], [-105.0, -120.0, -100.0]);
+        let head_from_pre = truth.to_affine();
+        let template_from_head = atlas::head_from_template().inverse().unwrap();
+        let turned = resample_nearest(&atlas::template().labels, &grid, &head_from_pre.then(&template_from_head), 0);
+        let found = pose_of_labels(&turned).unwrap().fixed_from_moving;
+        for corner in [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -20.0, 70.0]] {
+            let p = truth.inverse().apply(Position::new(corner[0], corner[1], corner[2]));
+            let apart = found.apply(p).distance_mm(&truth.apply(p));
+            assert!(apart < 1.0, "{apart} mm at {corner:?}");
+        }
+    }
 
     #[test]
     fn slow_the_template_by_its_own_labels_has_its_own_tissues_whatever_the_contrast() {

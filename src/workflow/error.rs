@@ -9,7 +9,7 @@ use super::simulation::SimulationError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
-use crate::experiment::outcome::OutcomeError;
+use crate::experiment::outcome::{Answer, OutcomeError};
 use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
@@ -118,14 +118,23 @@ fn file_of(error: &ObservedError) -> &'static str {
 }
 
 impl WorkflowError {
+    /// What the two scans say, where that ends the job.
+    pub fn answer(&self) -> Option<Answer> {
+        match self {
+            Self::Pair(PairError::NotOnePerson { .. }) => Some(Answer::NotOnePerson),
+            Self::Pair(PairError::Resect(ResectError::NoOperation { .. })) => Some(Answer::NoOperation),
+            _ => None,
+        }
+    }
+
     /// Who is to do something about it.
     pub fn kind(&self) -> ErrorKind {
+        if self.answer().is_some() {
+            // The scans were compared: no fault of a file.
+            return ErrorKind::QualityGate;
+        }
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
-            // Answers, not faults of a file: the scans were compared.
-            Self::Pair(PairError::NotOnePerson { .. } | PairError::Resect(ResectError::NoOperation { .. })) => {
-                ErrorKind::QualityGate
-            }
             Self::Write(_)
             | Self::Format(_)
             | Self::Outcome(OutcomeError { .. })

@@ -7,6 +7,7 @@ use crate::artefact::sha256_hex;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions, encode_u8};
 use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::register::transform_text::rigid_from_text;
 use crate::segment::native::mask_on;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,9 @@ pub struct Inputs {
     pub dseg: Option<PathBuf>,
     /// Whose numbers it holds: a built-in table or a .tsv file; `None` finds out.
     pub labels: Option<String>,
+    /// The pose of the pre-operative scan in the MNI frame by hand: a rigid transform as 4x4 text (RAS, mm, maps a point of the
+    /// scan) or ITK's.
+    pub pose: Option<PathBuf>,
     /// The brain, in the pre-operative scan's grid.
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles before the operation, in the grid of either scan.
@@ -53,6 +57,8 @@ pub enum MaskRole {
     Resected,
     /// Labels of the pre-operative scan.
     Labels,
+    /// The pose of the pre-operative scan.
+    Pose,
 }
 
 impl fmt::Display for MaskRole {
@@ -63,6 +69,7 @@ impl fmt::Display for MaskRole {
             Self::Cavity => "cavity mask",
             Self::Resected => "resected mask",
             Self::Labels => "label map",
+            Self::Pose => "pose",
         })
     }
 }
@@ -170,6 +177,7 @@ impl Scans {
 /// The user's own masks with the bytes of their files.
 #[derive(Debug)]
 pub(crate) struct OwnMasks {
+    pub pose: Option<(RigidTransform<Pre, Mni>, Vec<u8>)>,
     pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: Option<(GivenMask, Vec<u8>)>,
     pub ventricle: Option<(GivenMask, Vec<u8>)>,
@@ -184,13 +192,24 @@ impl OwnMasks {
             path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
         };
         let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), scans, work));
+        let pose = inputs.pose.as_deref().map(|path| -> Result<_, WorkflowError> {
+            let text = read_text(path)?;
+            Ok((rigid_from_text(&text, &shown(path))?, text.into_bytes()))
+        });
         Ok(Self {
+            pose: pose.transpose()?,
             labels: labels.transpose()?,
             brain: read(MaskRole::Brain, &inputs.brain_mask)?,
             ventricle: read(MaskRole::Ventricle, &inputs.ventricle_mask)?,
             cavity: read(MaskRole::Cavity, &inputs.cavity_mask)?,
             resected: read(MaskRole::Resected, &inputs.resected_mask)?,
         })
+    }
+
+    /// What says where the pre-operative scan lies, by role.
+    pub fn posing(&self) -> impl Iterator<Item = (MaskRole, &[u8])> {
+        let pose = self.pose.as_ref().map(|(_, bytes)| (MaskRole::Pose, bytes.as_slice()));
+        pose.into_iter().chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
 
     /// Those that were given, by role.

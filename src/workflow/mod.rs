@@ -33,6 +33,7 @@ mod phantom;
 mod plan;
 mod programs;
 mod progress;
+mod refusal;
 mod settings;
 mod simulation;
 mod stages;

@@ -5,6 +5,7 @@ use super::error::WorkflowError;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
 use super::plan::{self, StageName};
+use super::refusal;
 use super::stages::{
     self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
@@ -56,9 +57,20 @@ impl Images {
         check_scans(work, &scans.sums)?;
         keep_settings(work)?;
         let mut made = Made::default();
-        let registration = stages::registration(work, &mut made, &scans)?;
-        let anat = stages::anat(work, &mut made, &scans, &own)?;
-        Ok(Self { made, registration, anat })
+        let registration = match stages::registration(work, &mut made, &scans, &own) {
+            Ok(registration) => registration,
+            Err(error) => {
+                refusal::keep(work, &scans, "registration", &[], &error)?;
+                return Err(error);
+            }
+        };
+        match stages::anat(work, &mut made, &scans, &own) {
+            Ok(anat) => Ok(Self { made, registration, anat }),
+            Err(error) => {
+                refusal::keep(work, &scans, "anat", &in_order(&made, &[StageName::Registration]), &error)?;
+                Err(error)
+            }
+        }
     }
 
     /// Their manifests.
@@ -125,7 +137,7 @@ impl Prepared {
         let (registered, registration): (Manifest, RegistrationFacts) = case.stage(&StageName::Registration)?;
         let sum = |role: &str| registered.inputs.get(role).cloned().unwrap_or_default();
         let sums = ScanSums { pre: sum("pre"), post: sum("post") };
-        is_present(work, &stages::registration_stage(work, &sums))?;
+        is_present(work, &stages::registration_stage(work, &sums).own_masks_of(&registered))?;
         made.add(StageName::Registration, registered);
         let (segmented, anat): (Manifest, AnatFacts) = case.stage(&StageName::Anat)?;
         is_present(work, &stages::anat_stage(work, &made, &sums).own_masks_of(&segmented))?;

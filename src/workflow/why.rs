@@ -88,7 +88,13 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     let samples = if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject)? } else { Vec::new() };
     let pose = |step: &plan::Step| -> Option<Stage> {
         match &step.stage {
-            StageName::Registration => Some(stages::registration_stage(work, &sums)),
+            StageName::Registration => {
+                let stage = stages::registration_stage(work, &sums);
+                Some(match made.get(&StageName::Registration) {
+                    Some(earlier) => stage.own_masks_of(earlier),
+                    None => stage,
+                })
+            }
             StageName::Anat => Some(stages::anat_stage(work, &made, &sums).own_masks_of(made.get(&StageName::Anat)?)),
             StageName::Mesh => Some(stages::mesh_stage(work, &made).0),
             StageName::Reference => Some(stages::reference_stage(work, &made)),

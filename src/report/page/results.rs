@@ -110,7 +110,11 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
         tiles.push(tile("Tetrahedra", &html! { (count(mesh.tets)) }, &note));
     }
     html! {
-        p class="lead" { (sentence(outcome)) } "\n"
+        @if let Some(answer) = outcome.answer {
+            p class="lead" { strong { (answer.sentence()) } } "\n"
+        } @else {
+            p class="lead" { (sentence(outcome)) } "\n"
+        }
         dl class="figures" { @for tile in tiles { (tile) } } "\n"
     }
 }
