@@ -79,6 +79,9 @@ pub struct ExperimentOutcome {
     /// The moduli behind the reference where they are known (a phantom's truth), Pa per tissue.
     #[serde(default)]
     pub reference_shear_modulus_pa: BTreeMap<String, f64>,
+    /// Tissues that were not varied but held at the mean of their prior (tumour, oedema): shear modulus, Pa.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub held_shear_modulus_pa: BTreeMap<String, f64>,
     /// Measurement errors below which differences mean nothing.
     #[serde(default)]
     pub noise_floor: Option<NoiseFloor>,

@@ -19,6 +19,7 @@ use crate::fem::Scenario;
 use crate::layout::REST_MESH;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// A part of a sweep's samples (see [`shard`]).
@@ -183,6 +184,8 @@ pub(crate) struct Patient<'w, 'a> {
     prepared: Prepared,
     /// Loads and supports; the materials are the samples'.
     scenario: Scenario,
+    /// Shear moduli of tissues that are not varied, Pa.
+    held: BTreeMap<String, f64>,
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
@@ -197,10 +200,11 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let (scenario, held) = stages::with_held_tissues(work, &prepared.mesh.mesh, scenario)?;
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
+        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference })
     }
 
     fn floor(&self) -> NoiseFloor {
@@ -287,6 +291,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             rest_surface_distance_mm: rest.surface_distance_mm,
             noise_floor: Some(self.floor()),
             loads: vec![loads],
+            held_shear_modulus_pa: self.held.clone(),
             ..self.prepared.outcome()
         }
     }

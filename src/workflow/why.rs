@@ -5,7 +5,7 @@ use super::error::WorkflowError;
 use super::inputs::{ScanSums, read_input};
 use super::plan::{self, Goal, StageName, Subject, plan};
 use super::progress::Silent;
-use super::stages;
+use super::stages::{self, MeshFacts};
 use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, Reason, Stage, sha256_hex};
 use crate::workflow::settings::Settings;
@@ -83,6 +83,9 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     let mut scenario = resection.scenario(&stages::mni_from_gravity_frame(&work.case, resection.gravity_frame)?);
     if resection.needs_labels() {
         scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.labels)?;
+    }
+    if let Ok((_, mesh)) = work.case.stage::<MeshFacts>(&StageName::Mesh) {
+        (scenario, _) = stages::with_held_tissues(work, &mesh.mesh, scenario)?;
     }
     let tissues = plan::tissues(work.settings, work.subject);
     let samples = if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject)? } else { Vec::new() };

@@ -92,6 +92,14 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
             tiles.push(tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note));
         }
     }
+    for (tissue, modulus) in &outcome.held_shear_modulus_pa {
+        let name = format!("Shear modulus, {}", tissue_name(tissue));
+        tiles.push(tile(
+            &name,
+            &quantity(Some(*modulus), 4, "Pa"),
+            "held at the prior of abnormal tissue, not estimated",
+        ));
+    }
     tiles.extend(outcome.volumes.iter().flat_map(volume_tiles));
     if let Some(floor) = outcome.noise_floor {
         let part = |name: &str, mm: Option<f64>| mm.map(|mm| format!("{name} {} mm", number(mm, 2)));
