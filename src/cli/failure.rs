@@ -1,7 +1,6 @@
 //! How a subcommand ends when it does not end well.
 
 use super::remedy::remedy;
-use super::session::has_emitted;
 use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
@@ -43,12 +42,12 @@ impl Failure {
         }
     }
 
-    /// One message on stderr; with `--json` also an object on stdout, unless the result is there already.
-    pub fn report(&self, json: bool) {
+    /// One message on stderr; `on_stdout` also as an object there, which is for `--json` without a result.
+    pub fn report(&self, on_stdout: bool) {
         let (kind, error) = self.parts();
         let message = in_one_line(error);
         eprintln!("hgm: {kind}: {message}");
-        if json && !has_emitted() {
+        if on_stdout {
             let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
             if let Some(answer) = error.downcast_ref::<Answered>() {
                 told["answer"] = answer.answer.name().into();

@@ -1,7 +1,7 @@
 //! A label map in a file to a mesh in a file, with its boundary sets where it is in MNI space.
 
-use super::error::WorkflowError;
-use super::inputs::{InputError, read_input};
+use super::error::{MeshFileError, WorkflowError};
+use super::inputs::read_input;
 use super::labels::any_labels;
 use super::programs::Programs;
 use super::progress::Progress;
@@ -21,7 +21,6 @@ use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Raised when the code changes the mesh of the same labels and settings.
 const VERSION: u32 = 5;
@@ -61,20 +60,6 @@ pub struct MeshedFile {
     pub sets: Vec<SetReport>,
     /// Why the quality gate refuses the mesh.
     pub refused: Vec<String>,
-}
-
-/// Why a label map in a file cannot be meshed.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum MeshFileError {
-    #[error("{}: the name of a mesh ends in .vtu, .msh, .inp or .feb", output.display())]
-    Output { output: PathBuf },
-    #[error("{file}: {source}")]
-    Format { file: String, source: WriteError },
-    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
-    Noted { file: String },
-    #[error(transparent)]
-    Input(#[from] InputError),
 }
 
 /// Meshes a label map, or skips what is there. A mesh whose sets are not to be believed is written all the same

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::error::WorkflowError;
+use super::facts::EstimateFacts;
 use super::fresh::{GATHERED, Provenance, StageRecord};
-use super::stages::EstimateFacts;
 use super::work::Work;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;

@@ -1,14 +1,13 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
-use super::plan::{self, StageName};
+use super::plan;
 use super::refusal;
-use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
-};
+use super::stage_name::StageName;
+use super::stages::{self, AnatFacts, Anatomy, EstimateInput, RegistrationFacts, SampleMode, SeenShift, Sweep};
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
 use crate::experiment::observed::ObservedSurfaces;

@@ -1,6 +1,6 @@
 //! How a job tells whoever started it what it is doing.
 
-use super::plan::StageName;
+use super::stage_name::StageName;
 use crate::artefact::Reason;
 
 /// Listens to a job. Every method may be left out.

@@ -2,10 +2,12 @@
 
 use super::case::Case;
 use super::error::WorkflowError;
+use super::facts::MeshFacts;
 use super::inputs::{ScanSums, read_input};
-use super::plan::{self, Goal, StageName, Subject, plan};
+use super::plan::{self, Goal, plan};
 use super::progress::Silent;
-use super::stages::{self, MeshFacts};
+use super::stage_name::{StageName, Subject};
+use super::stages;
 use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, Reason, Stage, sha256_hex};
 use crate::workflow::settings::Settings;

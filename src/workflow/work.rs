@@ -1,12 +1,12 @@
 //! What the stages of one job share: the folder, the settings, the machine's programs, whoever listens.
 
-use super::case::{Case, CaseError};
-use super::error::WorkflowError;
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
 use super::lock::Lock;
-use super::plan::{StageName, Subject};
 use super::programs::Programs;
 use super::progress::{Progress, StageEnded};
 use super::settings::Settings;
+use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Produced, Stage, StageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;

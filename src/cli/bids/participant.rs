@@ -1,6 +1,6 @@
 //! The participant level: each subject through the same code as `hgm run`, then its files under BIDS names.
 
-use super::Args;
+use super::options::Args;
 use crate::artefact::write_whole;
 use crate::cli::failure::{Answered, in_one_line};
 use crate::cli::{Failure, Session, run};

@@ -1,6 +1,6 @@
 //! Stage `anat`: both scans in MNI space, brain masks, labels, cavity, resected tissue.
 
-use super::WithReading;
+use super::reading::WithReading;
 use super::registration::transforms;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
@@ -16,10 +16,10 @@ use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
-use crate::workflow::case::{Case, CaseError};
-use crate::workflow::error::WorkflowError;
+use crate::workflow::case::Case;
+use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
-use crate::workflow::plan::StageName;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 

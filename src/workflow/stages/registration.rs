@@ -1,6 +1,6 @@
 //! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
 
-use super::WithReading;
+use super::reading::WithReading;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::RegistrationOutcome;
 use crate::experiment::resection::GravityFrame;
@@ -13,7 +13,7 @@ use crate::segment::{pose_of_head, pose_of_labels};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::inputs::{OwnMasks, ScanSums, Scans};
-use crate::workflow::plan::StageName;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};

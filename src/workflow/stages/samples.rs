@@ -12,7 +12,7 @@ use crate::layout::SAMPLE_STATE;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::{StageName, Subject};
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 

@@ -1,11 +1,18 @@
 //! Why a job did not end well.
 
-use super::case::CaseError;
-use super::inputs::InputError;
-use super::labels::LabelMapError;
-use super::meshing::MeshFileError;
+mod case;
+mod input;
+mod label_map;
+mod mesh_file;
+mod simulation;
+
+pub use case::CaseError;
+pub use input::{InputError, MaskRole};
+pub use label_map::LabelMapError;
+pub use mesh_file::MeshFileError;
+pub use simulation::SimulationError;
+
 use super::settings::SettingsError;
-use super::simulation::SimulationError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
@@ -15,6 +22,9 @@ use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
+use crate::material::gp::{FitRefusal, HyperparametersError};
+use crate::material::literature::StudyError;
+use crate::material::meta_model::FitError;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
 use crate::register::RegisterError;
@@ -70,6 +80,16 @@ pub enum WorkflowError {
     Observed(#[from] ObservedError),
     #[error(transparent)]
     Prior(#[from] PriorError),
+    #[error("{file}: {source}")]
+    Studies { file: String, source: StudyError },
+    #[error("{file}: {source}")]
+    Hyperparameters { file: String, source: HyperparametersError },
+    #[error("there is no literature model {id}; ids go from 0 to {last}")]
+    NoSuchModel { id: u32, last: u32 },
+    #[error(transparent)]
+    Gp(#[from] FitRefusal),
+    #[error(transparent)]
+    Law(#[from] FitError),
     #[error("samples of every task compare materials of the whole brain: they do not go with two tissues")]
     EveryTaskOfTwo,
     #[error("the table [{table}] asks for a simulation that cannot be done: {source}")]
