@@ -29,9 +29,6 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     {
         return Some("--brain-mask takes one");
     }
-    if let Some(SynthError::LobeTooSmall { .. }) = cause.downcast_ref() {
-        return Some("see --resection-cc");
-    }
     let CohortError::Log { .. } = cause.downcast_ref()? else { return None };
     Some("`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject")
 }
@@ -68,6 +65,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Registration { .. } => {
             "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
         }
+        WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
         WorkflowError::Labels(_) => "see --labels",
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"

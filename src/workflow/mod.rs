@@ -41,6 +41,7 @@ mod settings;
 mod simulation;
 mod stage_name;
 mod stages;
+mod synthetic;
 mod why;
 mod work;
 
@@ -64,6 +65,7 @@ pub use settings::{Settings, SettingsError, in_words};
 pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
+pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 

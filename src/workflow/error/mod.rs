@@ -20,6 +20,7 @@ use crate::experiment::outcome::{Answer, OutcomeError};
 use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
+use crate::experiment::synth::SynthError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
@@ -113,6 +114,8 @@ pub enum WorkflowError {
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]
+    Synth(#[from] SynthError),
+    #[error(transparent)]
     Mesh(#[from] MeshFileError),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
@@ -160,6 +163,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Synth(SynthError::Sag(_))
             | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })
             | Self::Report(ReportError::Write(_))
