@@ -27,6 +27,7 @@ mod facts;
 mod fresh;
 mod generative;
 mod inputs;
+mod labels;
 mod lock;
 mod meshing;
 mod outcome;
@@ -35,21 +36,26 @@ mod phantom;
 mod plan;
 mod programs;
 mod progress;
+mod refusal;
 mod settings;
 mod simulation;
 mod stage_name;
 mod stages;
+mod synthetic;
 mod why;
 mod work;
 
 pub mod cohort;
 
 pub use case::Case;
-pub use error::{CaseError, ErrorKind, InputError, MaskRole, MeshFileError, SimulationError, WorkflowError};
+pub use error::{
+    CaseError, ErrorKind, InputError, LabelMapError, MaskRole, MeshFileError, SimulationError, WorkflowError,
+};
 pub use estimate_options::{EstimateOptions, Observed};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
 pub use inputs::{Inputs, ScanSums, read_input, read_text, shown};
+pub use labels::{any_labels, labels_of_tool};
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
@@ -59,6 +65,7 @@ pub use settings::{Settings, SettingsError, in_words};
 pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
+pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 

@@ -18,6 +18,8 @@ pub trait Progress {
     fn stage(&mut self, ended: &StageEnded<'_>) {}
     /// Something odd about a file that was given.
     fn odd(&mut self, file: &str, what: &str) {}
+    /// What a file that was given was taken for.
+    fn noted(&mut self, what: &str) {}
     /// What only somebody looking for a fault wants to know.
     fn detail(&mut self, of: &str, what: &str) {}
 }

@@ -97,8 +97,8 @@ impl<'a> Work<'a> {
     }
 
     /// Tells whoever listens.
-    pub fn tell(&self, what: impl FnOnce(&mut dyn Progress)) {
-        what(&mut **self.progress.borrow_mut());
+    pub fn tell<T>(&self, what: impl FnOnce(&mut dyn Progress) -> T) -> T {
+        what(&mut **self.progress.borrow_mut())
     }
 
     /// Runs a stage, or skips it, and adds its manifest to those that are there; returns its figures.

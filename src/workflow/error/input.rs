@@ -15,6 +15,10 @@ pub enum MaskRole {
     Cavity,
     /// The resected tissue.
     Resected,
+    /// Labels of the pre-operative scan.
+    Labels,
+    /// The pose of the pre-operative scan.
+    Pose,
 }
 
 impl fmt::Display for MaskRole {
@@ -24,6 +28,8 @@ impl fmt::Display for MaskRole {
             Self::Ventricle => "ventricle mask",
             Self::Cavity => "cavity mask",
             Self::Resected => "resected mask",
+            Self::Labels => "label map",
+            Self::Pose => "pose",
         })
     }
 }

@@ -2,11 +2,13 @@
 
 mod case;
 mod input;
+mod label_map;
 mod mesh_file;
 mod simulation;
 
 pub use case::CaseError;
 pub use input::{InputError, MaskRole};
+pub use label_map::LabelMapError;
 pub use mesh_file::MeshFileError;
 pub use simulation::SimulationError;
 
@@ -14,10 +16,11 @@ use super::settings::SettingsError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
-use crate::experiment::outcome::OutcomeError;
+use crate::experiment::outcome::{Answer, OutcomeError};
 use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
+use crate::experiment::synth::SynthError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
@@ -29,7 +32,7 @@ use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
 use crate::report::derivatives::DerivativesError;
-use crate::resect::PairError;
+use crate::resect::{PairError, ResectError};
 use crate::tag::{MARGIN, TagError};
 use thiserror::Error;
 
@@ -52,6 +55,8 @@ pub enum WorkflowError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Labels(#[from] LabelMapError),
     #[error(transparent)]
     Case(#[from] CaseError),
     #[error(transparent)]
@@ -109,6 +114,8 @@ pub enum WorkflowError {
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]
+    Synth(#[from] SynthError),
+    #[error(transparent)]
     Mesh(#[from] MeshFileError),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
@@ -134,8 +141,21 @@ fn file_of(error: &ObservedError) -> &'static str {
 }
 
 impl WorkflowError {
+    /// What the two scans say, where that ends the job.
+    pub fn answer(&self) -> Option<Answer> {
+        match self {
+            Self::Pair(PairError::NotOnePerson { .. }) => Some(Answer::NotOnePerson),
+            Self::Pair(PairError::Resect(ResectError::NoOperation { .. })) => Some(Answer::NoOperation),
+            _ => None,
+        }
+    }
+
     /// Who is to do something about it.
     pub fn kind(&self) -> ErrorKind {
+        if self.answer().is_some() {
+            // The scans were compared: no fault of a file.
+            return ErrorKind::QualityGate;
+        }
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
             Self::Write(_)
@@ -143,6 +163,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Synth(SynthError::Sag(_))
             | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })
             | Self::Report(ReportError::Write(_))

@@ -118,6 +118,7 @@ pub(crate) fn anat(
             GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
         };
         let given = GivenMasks {
+            labels: own.labels.as_ref().map(|(labels, _)| labels.clone()),
             brain: own.brain.as_ref().map(on_pre),
             ventricle: own.ventricle.as_ref().map(on_pre),
             cavity: own.cavity.as_ref().map(on_mni),
@@ -129,8 +130,9 @@ pub(crate) fn anat(
                 p.doing(what);
             });
         };
-        let OperatedBrain { pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain } =
-            take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
+        let OperatedBrain {
+            pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain, ..
+        } = take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
 
         work.tell(|p| p.doing("writing"));
         let mut produced = Produced::default();

@@ -57,8 +57,7 @@ pub(crate) fn mesh(
             None => p,
         };
         let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
-        let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
-        let tissue_of = whole.restricted(tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
+        let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
         let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));

@@ -25,5 +25,5 @@ pub(crate) use mesh::{mesh, mesh_stage};
 pub(crate) use reference::{
     known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference, reference_stage,
 };
-pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage};
-pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples};
+pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
+pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
