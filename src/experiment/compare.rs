@@ -4,7 +4,7 @@
 //! Volinsky, Statistical Science 14, 1999.
 
 use super::estimate::{EstimateOutcome, Knowledge, STRONG, weights};
-use super::verdict::{Answer, Finding, Reason, Verdict};
+use super::verdict::{Claim, Finding, Reason, Verdict};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -71,7 +71,7 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
         average(&mut best, &models, &weight);
         let answer = |(tissue, n): (String, usize)| {
             let p = &best.posterior;
-            (tissue, Answer::Interval { mode_pa: p.mode[n], interval_95_pa: p.interval_95[n] })
+            (tissue, Claim::Interval { mode_pa: p.mode[n], interval_95_pa: p.interval_95[n] })
         };
         let moduli = tissues(&best).map(answer).collect();
         let reasons = std::iter::once(reason).chain(best.verdict.reasons.clone()).collect();

@@ -181,7 +181,7 @@ impl Reason {
 /// What is said of a tissue's shear modulus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Answer {
+pub enum Claim {
     /// Most probable value with its 95 % interval, Pa.
     Interval {
         /// Most probable.
@@ -216,7 +216,7 @@ pub struct Verdict {
     pub explained_share: Option<f64>,
     /// What is said of each tissue's shear modulus.
     #[serde(default)]
-    pub moduli: Vec<(String, Answer)>,
+    pub moduli: Vec<(String, Claim)>,
     /// What speaks for it.
     #[serde(default)]
     pub reasons: Vec<Reason>,
@@ -227,7 +227,7 @@ impl Verdict {
     pub fn new(
         finding: Finding,
         explained_share: Option<f64>,
-        moduli: Vec<(String, Answer)>,
+        moduli: Vec<(String, Claim)>,
         reasons: Vec<Reason>,
     ) -> Self {
         let sentence = sentence(finding, explained_share, &moduli, &reasons);
@@ -245,23 +245,23 @@ fn words(tissue: &str) -> String {
     tissue.replace('_', " ")
 }
 
-fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Answer)], reasons: &[Reason]) -> String {
-    let each = |of: &dyn Fn(&Answer) -> Option<String>| {
+fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], reasons: &[Reason]) -> String {
+    let each = |of: &dyn Fn(&Claim) -> Option<String>| {
         let parts = moduli.iter().filter_map(|(t, a)| of(a).map(|text| format!("{} {text}", words(t))));
         parts.collect::<Vec<_>>().join(", ")
     };
     let intervals = each(&|a| match a {
-        Answer::Interval { mode_pa, interval_95_pa: [low, high] } => {
+        Claim::Interval { mode_pa, interval_95_pa: [low, high] } => {
             Some(format!("{} Pa ({} to {})", pa(*mode_pa), pa(*low), pa(*high)))
         }
         _ => None,
     });
     let bounds = each(&|a| match a {
-        Answer::Above { bound_pa } => Some(format!("is stiffer than {} Pa", pa(*bound_pa))),
+        Claim::Above { bound_pa } => Some(format!("is stiffer than {} Pa", pa(*bound_pa))),
         _ => None,
     });
     let ranges = each(&|a| match a {
-        Answer::Range { range_pa: [low, high] } => Some(format!("{} to {} Pa", pa(*low), pa(*high))),
+        Claim::Range { range_pa: [low, high] } => Some(format!("{} to {} Pa", pa(*low), pa(*high))),
         _ => None,
     });
     let percent = share.map(|s| format!(" ({:.0} % of it)", 100.0 * s)).unwrap_or_default();
@@ -302,8 +302,8 @@ fn capitalised(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn interval(tissue: &str, mode_pa: f64) -> (String, Answer) {
-        (tissue.to_owned(), Answer::Interval { mode_pa, interval_95_pa: [0.8 * mode_pa, 1.25 * mode_pa] })
+    fn interval(tissue: &str, mode_pa: f64) -> (String, Claim) {
+        (tissue.to_owned(), Claim::Interval { mode_pa, interval_95_pa: [0.8 * mode_pa, 1.25 * mode_pa] })
     }
 
     #[test]
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn no_shift_gives_a_bound_and_names_what_would_have_been_seen() {
         let reason = Reason::StillAsProbable { log_odds: -2.0, would_be_seen_mm: 0.64 };
-        let bound = ("grey_matter".to_owned(), Answer::Above { bound_pa: 2140.0 });
+        let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
         let text = Verdict::new(Finding::NoShift, None, vec![bound], vec![reason]).sentence;
         assert!(text.contains("0.6 mm") && text.contains("grey matter is stiffer than 2,140 Pa"), "{text}");
     }

@@ -1,7 +1,7 @@
 //! The verdict of an outcome: its estimate's, else that of its samples against rest.
 
 use super::outcome::{ExperimentOutcome, NoiseFloor, SampleOutcome};
-use super::verdict::{Answer, Finding, Reason, Verdict};
+use super::verdict::{Claim, Finding, Reason, Verdict};
 
 impl ExperimentOutcome {
     /// With its verdict, once all else is there.
@@ -33,7 +33,7 @@ fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
     let mut reasons = vec![Reason::Surface { set: set.to_owned(), rest_mm, deformed_mm, floor_mm }];
     let moduli = as_good(outcome, set, deformed_mm + floor_mm);
     for (tissue, answer) in &moduli {
-        if let Answer::Range { range_pa } = answer {
+        if let Claim::Range { range_pa } = answer {
             reasons.push(Reason::AsGood { tissue: tissue.clone(), pa: *range_pa });
         }
     }
@@ -53,13 +53,13 @@ pub fn compared(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> Finding {
 }
 
 /// The range of moduli of the samples whose error at `set` is not above `limit_mm`, tissue by tissue.
-fn as_good(outcome: &ExperimentOutcome, set: &str, limit_mm: f64) -> Vec<(String, Answer)> {
+fn as_good(outcome: &ExperimentOutcome, set: &str, limit_mm: f64) -> Vec<(String, Claim)> {
     let near = |s: &&SampleOutcome| s.rmse_mm.get(set).is_some_and(|rmse| *rmse <= limit_mm);
     let near: Vec<&SampleOutcome> = outcome.samples.iter().filter(near).collect();
     let range = |tissue: &String| {
         let moduli = near.iter().filter_map(|s| s.shear_modulus_pa.get(tissue).copied());
         let (low, high) = moduli.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
-        (low <= high).then(|| (tissue.clone(), Answer::Range { range_pa: [low, high] }))
+        (low <= high).then(|| (tissue.clone(), Claim::Range { range_pa: [low, high] }))
     };
     outcome.tissues.iter().filter_map(range).collect()
 }
@@ -91,7 +91,7 @@ mod tests {
     fn samples_that_cannot_be_told_apart_give_their_range_and_not_the_best_one() {
         let verdict = of_samples(&swept(3.0, &[(300.0, 1.2), (500.0, 1.0), (900.0, 1.25), (2000.0, 2.0)]));
         assert_eq!(verdict.finding, Finding::Better);
-        assert_eq!(verdict.moduli, [("brain".to_owned(), Answer::Range { range_pa: [300.0, 900.0] })]);
+        assert_eq!(verdict.moduli, [("brain".to_owned(), Claim::Range { range_pa: [300.0, 900.0] })]);
         assert!(verdict.sentence.contains("300 to 900 Pa"), "{}", verdict.sentence);
         let still = of_samples(&swept(1.1, &[(300.0, 1.2), (500.0, 1.0)]));
         assert_eq!(still.finding, Finding::NotDistinguishable);

@@ -1,7 +1,7 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
 use super::median_samples::{MedianSample, median_samples};
-use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
 use crate::experiment::verdict::Finding;
 use crate::experiment::verdict_of_samples::compared;
@@ -18,6 +18,10 @@ pub enum Status {
     Done,
     /// Computed, but a boundary set is not to be believed.
     QualityGate,
+    /// One head twice, and nothing was taken out.
+    NoOperation,
+    /// The two scans show two heads.
+    NotOnePerson,
     /// It ended with an error.
     Failed,
     /// It has not been run.
@@ -156,11 +160,22 @@ impl Cohort {
 }
 
 impl Status {
+    /// How a subject ended that a quality gate stopped, with the scans' answer where they gave one.
+    pub fn of(answer: Option<Answer>) -> Self {
+        match answer {
+            None => Self::QualityGate,
+            Some(Answer::NoOperation) => Self::NoOperation,
+            Some(Answer::NotOnePerson) => Self::NotOnePerson,
+        }
+    }
+
     /// The word of tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Done => "done",
             Self::QualityGate => "quality-gate",
+            Self::NoOperation => Answer::NoOperation.name(),
+            Self::NotOnePerson => Answer::NotOnePerson.name(),
             Self::Failed => "failed",
             Self::Missing => "missing",
         }

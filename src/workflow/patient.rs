@@ -1,12 +1,14 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
-use super::plan::{self, StageName};
+use super::plan;
+use super::refusal;
+use super::stage_name::StageName;
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, HeldBody, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
@@ -20,6 +22,7 @@ use crate::fem::Scenario;
 use crate::layout::REST_MESH;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// A part of a sweep's samples (see [`shard`]).
@@ -58,9 +61,20 @@ impl Images {
         check_scans(work, &scans.sums)?;
         keep_settings(work)?;
         let mut made = Made::default();
-        let registration = stages::registration(work, &mut made, &scans)?;
-        let anat = stages::anat(work, &mut made, &scans, &own)?;
-        Ok(Self { made, registration, anat })
+        let registration = match stages::registration(work, &mut made, &scans, &own) {
+            Ok(registration) => registration,
+            Err(error) => {
+                refusal::keep(work, &scans, "registration", &[], &error)?;
+                return Err(error);
+            }
+        };
+        match stages::anat(work, &mut made, &scans, &own) {
+            Ok(anat) => Ok(Self { made, registration, anat }),
+            Err(error) => {
+                refusal::keep(work, &scans, "anat", &in_order(&made, &[StageName::Registration]), &error)?;
+                Err(error)
+            }
+        }
     }
 
     /// Their manifests.
@@ -127,7 +141,7 @@ impl Prepared {
         let (registered, registration): (Manifest, RegistrationFacts) = case.stage(&StageName::Registration)?;
         let sum = |role: &str| registered.inputs.get(role).cloned().unwrap_or_default();
         let sums = ScanSums { pre: sum("pre"), post: sum("post") };
-        is_present(work, &stages::registration_stage(work, &sums))?;
+        is_present(work, &stages::registration_stage(work, &sums).own_masks_of(&registered))?;
         made.add(StageName::Registration, registered);
         let (segmented, anat): (Manifest, AnatFacts) = case.stage(&StageName::Anat)?;
         is_present(work, &stages::anat_stage(work, &made, &sums).own_masks_of(&segmented))?;
@@ -173,6 +187,8 @@ pub(crate) struct Patient<'w, 'a> {
     prepared: Prepared,
     /// Loads and supports; the materials are the samples'.
     scenario: Scenario,
+    /// Shear moduli of tissues that are not varied, Pa.
+    held: BTreeMap<String, f64>,
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
@@ -189,11 +205,12 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let (scenario, held) = stages::with_held_tissues(work, &prepared.mesh.mesh, scenario)?;
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
         let at_rest_mm = stages::error_at_rest(&work.case, &anatomy, &mesh)?;
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference, at_rest_mm })
+        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference, at_rest_mm })
     }
 
     /// What the pair shows at rest, with what is expected of its parts beside it.
@@ -253,6 +270,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&template, &anatomy.labels)?;
+        let (scenario, _) = stages::with_held_tissues(work, &self.prepared.mesh.mesh, scenario)?;
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
@@ -317,6 +335,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             rest_surface_distance_mm: rest.surface_distance_mm,
             noise_floor: Some(self.floor()),
             loads: vec![loads],
+            held_shear_modulus_pa: self.held.clone(),
             ..self.prepared.outcome()
         }
     }

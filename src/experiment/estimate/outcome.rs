@@ -10,7 +10,7 @@ use super::{
 };
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::sample::Tissue;
-use crate::experiment::verdict::{Answer, CONTRADICTION_SD, Finding, Reason, Verdict};
+use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
 use crate::fem::{Outcome, Scenario};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
@@ -407,13 +407,13 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
     let answer = |n: usize| match (&fitted.correlated, finding) {
         (Some(found), Finding::NoShift) => match found.shift.largest_share {
             // A body of linear stiffness moves as 1 / modulus.
-            Some(share) if share > 0.0 => Answer::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
-            _ => Answer::Withheld,
+            Some(share) if share > 0.0 => Claim::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
+            _ => Claim::Withheld,
         },
         _ if finding.has_stiffness() => {
-            Answer::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
+            Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
         }
-        _ => Answer::Withheld,
+        _ => Claim::Withheld,
     };
     let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
     let mut reasons: Vec<Reason> = still.into_iter().chain(unexplained).chain(conflict).chain(wider).collect();
@@ -633,7 +633,7 @@ mod tests {
         let found = seen_by_a_model_of_a_push_from_above(None, wave);
         assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
         let bounds = found.verdict.moduli.iter().map(|(_, answer)| match answer {
-            Answer::Above { bound_pa } => *bound_pa,
+            Claim::Above { bound_pa } => *bound_pa,
             other => panic!("{other:?}"),
         });
         // The body of the prior's mean would have moved by half a millimetre: noise of .02 mm leaves a tenth of it at most.

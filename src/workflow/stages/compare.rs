@@ -9,7 +9,7 @@ use crate::geometry::{Frame, Mni};
 use crate::layout::COMPARISON;
 use crate::material::meta_model::MetaModel;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.

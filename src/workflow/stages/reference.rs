@@ -14,9 +14,9 @@ use crate::mesh::format::{Field, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::label;
 use crate::tag::BASE;
-use crate::workflow::case::{Case, CaseError};
-use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::case::Case;
+use crate::workflow::error::{CaseError, WorkflowError};
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
