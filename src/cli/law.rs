@@ -7,7 +7,7 @@ use crate::material::law::Material;
 use crate::material::literature::citation;
 use crate::material::meta_model::{Fit, MetaModel, Search};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry, read_rheometry};
-use crate::report::in_words::law_fit;
+use crate::report::in_words::fit_in_words;
 use crate::workflow::read_input;
 use anyhow::{Context, anyhow};
 use clap::Subcommand;
@@ -90,7 +90,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let mut text = format!("{name}: {} points of {measured}\n", test.stretches.len());
     for one in &fitted {
-        text += &law_fit(&one.fit, one.parameter_names, &one.parameter_sd);
+        text += &fit_in_words(&one.fit, one.parameter_names, &one.parameter_sd);
     }
     session
         .emit(&json!({ "source": name, "settings": settings, "points": test.stretches.len(), "fits": fitted }), &text)
@@ -104,12 +104,7 @@ fn points(args: &FitArgs) -> Result<(String, Rheometry), Failure> {
     }
     let id = args.literature.unwrap_or_default();
     let studies = args.studies.read()?;
-    let model = studies.models.iter().find(|model| model.id == id).ok_or_else(|| {
-        let last = studies.models.iter().map(|model| model.id).max().unwrap_or(0);
-        Failure::Rejected(anyhow!(
-            "--literature {id}: there is no such model; ids go from 0 to {last}; `hgm gp studies` lists them"
-        ))
-    })?;
+    let model = studies.model(id)?;
     let curve = model.curve(studies.curves);
     let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();
     let words = [model.study.clone(), citation(model)].into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>();

@@ -5,6 +5,7 @@
 //! 4 computed but the quality gate refused it (outputs kept).
 
 mod bids;
+mod compare;
 mod completions;
 mod demo;
 mod doctor;
@@ -37,7 +38,7 @@ mod why;
 pub use failure::{Failure, Reject};
 pub use session::{GlobalOptions, Session};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// From a pre- and post-operative T1 pair to a biomechanical answer. Research software, not a medical device.
@@ -61,6 +62,7 @@ enum Command {
     Estimate(estimate::Args),
     Warp(warp::Args),
     Evaluate(evaluate::Args),
+    Compare(compare::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
     Gp(gp::Args),
@@ -92,13 +94,14 @@ pub fn main() -> ExitCode {
         Command::Estimate(args) => estimate::run(&args, &session),
         Command::Warp(args) => warp::run(&args, &session),
         Command::Evaluate(args) => evaluate::run(&args, &session),
+        Command::Compare(args) => compare::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Gp(args) => gp::run(&args, &session),
         Command::Law(args) => law::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
-        Command::Completions(args) => completions::run(&args, &session),
-        Command::Man(args) => man::run(&args, &session),
+        Command::Completions(args) => completions::run(&args, Hgm::command(), &session),
+        Command::Man(args) => man::run(&args, Hgm::command(), &session),
         Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
         Command::Segment(args) => segment::run(&args, &session),
@@ -111,7 +114,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.report(json);
+            failure.report(json && !session::has_emitted());
             failure.exit_code()
         }
     }

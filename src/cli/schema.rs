@@ -1,6 +1,7 @@
 //! `hgm schema`: what `--json` prints, as a JSON Schema.
 
 use super::{Failure, Session};
+use crate::experiment::compare::Comparison;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::material::meta_model::MetaModel;
@@ -28,6 +29,7 @@ fn schema() -> serde_json::Result<Value> {
     generator.subschema_for::<ExperimentOutcome>();
     generator.subschema_for::<Cohort>();
     generator.subschema_for::<Evaluation>();
+    generator.subschema_for::<Comparison>();
     let mut schema: Value = serde_json::from_str(&with_names(COMMANDS))?;
     for (name, mut definition) in generator.take_definitions(true) {
         if name == "MeshOutcome" {

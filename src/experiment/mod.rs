@@ -1,5 +1,6 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
+pub mod compare;
 pub mod estimate;
 pub mod field;
 pub mod landmarks;
@@ -18,3 +19,5 @@ pub mod smooth_noise;
 pub mod supports;
 pub mod sweep;
 pub mod synth;
+pub mod verdict;
+pub mod verdict_of_samples;

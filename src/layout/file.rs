@@ -53,6 +53,8 @@ pub enum Maker {
     Estimate,
     /// Displacement fields, and what they carry.
     Fields,
+    /// Models beside each other.
+    Compare,
     /// The numbers gathered, with the settings and the provenance.
     Outcome,
     /// The page and the files for other viewers.

@@ -65,6 +65,8 @@ pub const SAMPLE_STATE: Family = Family("sim/{sample}.vtu");
 pub const ESTIMATE_STATE: &str = "sim/estimate.vtu";
 /// The estimate's numbers.
 pub const ESTIMATE_JSON: &str = "sim/estimate.json";
+/// Models beside each other, by their evidence.
+pub const COMPARISON: &str = "sim/compare.json";
 /// The experiment's numbers.
 pub const OUTCOME: &str = "sim/outcome.json";
 /// A line per sample.
@@ -107,6 +109,8 @@ pub const SETTINGS: &str = "settings.toml";
 pub const PROVENANCE: &str = "provenance.json";
 /// The page.
 pub const PAGE: &str = "report.html";
+/// What a step saw when it gave up; absent where none did.
+pub const REFUSED_PICTURE: &str = "refused.png";
 /// Held by the program that works on the folder.
 pub const LOCK: &str = ".lock";
 
@@ -269,11 +273,13 @@ pub const TABLE: &[Entry] = &[
         (Scan::Pre, "desc-warped_dseg.nii.gz", "Tissue labels carried by the brain shift"),
         None,
     ),
+    file(COMPARISON, "models beside each other, by their evidence", Space::None, Maker::Compare),
     file(OUTCOME, "the experiment's numbers", Space::None, Maker::Outcome),
     file(SAMPLES_TABLE, "a line per sample", Space::None, Maker::Outcome),
     file(SETTINGS, "every setting that was used, by room", Space::None, Maker::Outcome),
     file(PROVENANCE, "program, stages, checksums of inputs and outputs", Space::None, Maker::Outcome),
     file(PAGE, "the page", Space::None, Maker::Report),
+    file(REFUSED_PICTURE, "both scans when a step gave up; absent where none did", Space::None, Maker::Outcome),
     file(LABELS_FOR_SLICER, "labels for 3D Slicer", Space::Mni, Maker::Report),
     file(CAVITY_FOR_SLICER, "cavity for 3D Slicer", Space::Mni, Maker::Report),
     file(BEST_SURFACE.0, "deformed surface of the best sample, for Workbench", Space::Mni, Maker::Report),

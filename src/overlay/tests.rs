@@ -62,11 +62,11 @@ fn lines_keep_their_lengths_and_their_numbers() {
     for length in [3, 2] {
         for _ in 0..length {
             at += 1;
-            [at as f32, 0.5, -1.0].iter().for_each(|x: &f32| bytes.extend(x.to_le_bytes()));
+            bytes.extend([at as f32, 0.5, -1.0].iter().flat_map(|x: &f32| x.to_le_bytes()));
         }
-        [f32::NAN; 3].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend([f32::NAN; 3].iter().flat_map(|x| x.to_le_bytes()));
     }
-    [f32::INFINITY; 3].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    bytes.extend([f32::INFINITY; 3].iter().flat_map(|x| x.to_le_bytes()));
     let drawing = Drawing::decode(&bytes, "a.tck").unwrap();
     assert_eq!((drawing.points_mm.len(), drawing.streamlines()), (5, Some(2)));
     let carried = drawing.encode(&moved(&drawing, [0.0, 0.0, 4.0]));

@@ -1,9 +1,10 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
 use super::median_samples::{MedianSample, median_samples};
-use crate::experiment::outcome::ExperimentOutcome;
-use crate::experiment::resection::improvement;
+use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
+use crate::experiment::verdict::Finding;
+use crate::experiment::verdict_of_samples::compared;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
@@ -17,6 +18,10 @@ pub enum Status {
     Done,
     /// Computed, but a boundary set is not to be believed.
     QualityGate,
+    /// One head twice, and nothing was taken out.
+    NoOperation,
+    /// The two scans show two heads.
+    NotOnePerson,
     /// It ended with an error.
     Failed,
     /// It has not been run.
@@ -155,11 +160,22 @@ impl Cohort {
 }
 
 impl Status {
+    /// How a subject ended that a quality gate stopped, with the scans' answer where they gave one.
+    pub fn of(answer: Option<Answer>) -> Self {
+        match answer {
+            None => Self::QualityGate,
+            Some(Answer::NoOperation) => Self::NoOperation,
+            Some(Answer::NotOnePerson) => Self::NotOnePerson,
+        }
+    }
+
     /// The word of tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Done => "done",
             Self::QualityGate => "quality-gate",
+            Self::NoOperation => Answer::NoOperation.name(),
+            Self::NotOnePerson => Answer::NotOnePerson.name(),
             Self::Failed => "failed",
             Self::Missing => "missing",
         }
@@ -179,12 +195,15 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
     let mut verdict = None;
     if let Some(outcome) = &member.outcome {
         let best = outcome.best();
+        let found = outcome.verdict.finding;
+        // A stiffness that is not claimed takes no part in a cohort's.
+        let claimed = found == Finding::Nothing || found.has_stiffness();
         for tissue in &outcome.tissues {
             add(format!("{tissue}_sd_level"), best.and_then(|sample| sample.sd_levels.get(tissue).copied()));
             let modulus = best.and_then(|sample| sample.shear_modulus_pa.get(tissue).copied());
-            add(format!("{tissue}_shear_modulus_pa"), modulus);
+            add(format!("{tissue}_shear_modulus_pa"), modulus.filter(|_| claimed));
         }
-        for posterior in outcome.estimate.iter().map(|e| &e.posterior) {
+        for posterior in outcome.estimate.iter().map(|e| &e.posterior).filter(|_| claimed) {
             for (name, [low, high]) in posterior.names.iter().zip(&posterior.interval_95) {
                 let name = name.replace(' ', "_");
                 add(format!("{name}_95_low"), Some(*low));
@@ -213,7 +232,7 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
         let margin = (outcome.rest_rmse_mm.get("margin"), best.and_then(|sample| sample.rmse_mm.get("margin")));
         if let (Some(rest), Some(deformed)) = margin {
-            verdict = Some(improvement(*rest, *deformed, &floor));
+            verdict = Some(if found == Finding::Nothing { compared(*rest, *deformed, &floor) } else { found }.short());
         }
     }
     Row {

@@ -1,12 +1,11 @@
 //! Landmarks against a case: how far each lies from where the rigid motion, the images and the model carry it.
 
 use super::case::Case;
-use super::error::WorkflowError;
+use super::error::{LandmarkError, WorkflowError};
 use super::inputs::{read_input, shown};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
-use super::shift::{ESTIMATE, FUSED, OBSERVED, brain_shift};
-use super::stages::transforms;
+use super::stages::{ESTIMATE, FUSED, OBSERVED, brain_shift, transforms};
 use crate::artefact::write_whole;
 use crate::experiment::landmarks::{CarriedLandmarks, Evaluation, evaluate};
 use crate::geometry::Position;
@@ -14,7 +13,6 @@ use crate::layout::{ESTIMATE_STATE, LANDMARKS_JSON};
 use crate::overlay::{Carried, Drawing, PointState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Landmarks on both scans, each in its scanner's frame.
 #[derive(Clone, Debug)]
@@ -23,20 +21,6 @@ pub struct Landmarks {
     pub pre: PathBuf,
     /// Those of the post-operative one, where the first file holds no pairs.
     pub post: Option<PathBuf>,
-}
-
-/// Why landmarks cannot be compared.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum LandmarkError {
-    #[error("{file}: holds the landmarks of one scan alone; give those of the post-operative scan too")]
-    NoPairs { file: String },
-    #[error(
-        "{pre} and {post}: not one landmark of the first has a name of the second, and they hold {of_pre} and {of_post}"
-    )]
-    NoMatch { pre: String, post: String, of_pre: usize, of_post: usize },
-    #[error("{file}: holds no landmark")]
-    Empty { file: String },
 }
 
 fn read(path: &Path) -> Result<Drawing, WorkflowError> {

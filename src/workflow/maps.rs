@@ -1,10 +1,10 @@
 //! The maps of points that a case, or a field of the user's own, stands for.
 
-use super::case::{Case, CaseError};
-use super::error::WorkflowError;
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
 use super::settings::Settings;
-use super::shift::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
-use super::stages::transforms;
+use super::stage_name::Subject;
+use super::stages::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, transforms};
 use crate::experiment::field::{ShiftField, carried, inverse};
 use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
 use crate::image::nifti::{self, ReadOptions, decode_displacement};
@@ -207,7 +207,7 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     let settings = Settings::resolve([&case.settings()?])?;
     let own = !matches!(state, FUSED | OBSERVED);
     let model = if own { Some(state.to_owned()) } else { brain_shift(case)?.and_then(|shift| shift.model) };
-    let samples = super::plan::samples(&settings, super::plan::Subject::Patient)?;
+    let samples = super::plan::samples(&settings, Subject::Patient)?;
     let samples =
         samples.into_iter().map(|s| s.id).filter(|id| case.path(&crate::layout::SAMPLE_STATE.of(id)).exists());
     let believed_mm = settings.estimate.displacement.depth_mm;

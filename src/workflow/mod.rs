@@ -22,9 +22,13 @@
 
 mod case;
 mod error;
+mod estimate_options;
 mod evaluate;
+mod facts;
 mod fresh;
+mod generative;
 mod inputs;
+mod labels;
 mod lock;
 mod maps;
 mod meshing;
@@ -34,34 +38,45 @@ mod phantom;
 mod plan;
 mod programs;
 mod progress;
+mod refusal;
 mod settings;
-mod shift;
 mod simulation;
+mod stage_name;
 mod stages;
+mod synthetic;
 mod warp;
 mod why;
 mod work;
 
 pub mod cohort;
 
-pub use case::{Case, CaseError};
-pub use error::{ErrorKind, WorkflowError};
-pub use evaluate::{LandmarkError, Landmarks, evaluate_landmarks};
-pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_mask_of, read_text, shown};
+pub use case::Case;
+pub use error::{
+    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, SimulationError,
+    WarpError, WorkflowError,
+};
+pub use estimate_options::{EstimateOptions, Observed};
+pub use evaluate::{Landmarks, evaluate_landmarks};
+pub use facts::{EstimateFacts, MeshFacts};
+pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
+pub use inputs::{Inputs, ScanSums, read_input, read_mask_of, read_text, shown};
+pub use labels::{any_labels, labels_of_tool};
 pub use maps::WarpTo;
-pub use meshing::{MeshFileError, MeshFiles, MeshedFile, mesh_file};
+pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
-pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
+pub use plan::{Goal, Step, plan, samples, tissues};
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
-pub use simulation::{Simulation, SimulationError, SimulationFiles, simulate};
-pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed, RegistrationFacts, mesh_outcome};
-pub use warp::{PointCounts, Through, Warp, WarpError, Warped, warp};
+pub use simulation::{Simulation, SimulationFiles, simulate};
+pub use stage_name::{StageName, Subject};
+pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
+pub use synthetic::{SyntheticFiles, synthetic_patient};
+pub use warp::{PointCounts, Through, Warp, Warped, warp};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
-use crate::material::meta_model::MetaModel;
+use crate::experiment::compare::Comparison;
 use lock::Lock;
 use patient::{Images, Patient, Prepared};
 use phantom::Phantom;
@@ -126,10 +141,6 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     let engine = work.settings.mesh.engine;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(engine).map_err(refused)?;
-    let law = work.settings.prior.law;
-    if goal == Goal::Estimate && law != MetaModel::NEO_HOOKEAN {
-        return Err(WorkflowError::EstimateLaw { law: law.name().to_owned() });
-    }
     plan(work.settings, work.subject, goal).map(|_| ())
 }
 
@@ -193,6 +204,21 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
         phantom.gather()?;
     }
     Ok(work.case.clone())
+}
+
+/// Models of a prepared case beside each other: which of them what was seen speaks for.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn compare(
+    place: &Place,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<(Case, Comparison), WorkflowError> {
+    let work = Work::new(place, Subject::Patient, settings, progress);
+    prepared_case(&work, true)?;
+    let comparison = Patient::new(&work, Prepared::read(&work)?)?.compare()?;
+    Ok((work.case.clone(), comparison))
 }
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples.

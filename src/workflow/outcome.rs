@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::error::WorkflowError;
+use super::facts::EstimateFacts;
 use super::fresh::{GATHERED, Provenance, StageRecord};
-use super::stages::EstimateFacts;
 use super::work::Work;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
@@ -16,9 +16,14 @@ pub(crate) fn finish(
     outcome: &ExperimentOutcome,
     manifests: &[&Manifest],
 ) -> Result<(), WorkflowError> {
+    let outcome = &outcome.clone().with_verdict();
     write_whole(&work.case.path(layout::OUTCOME), outcome.to_json(layout::OUTCOME)?.as_bytes())?;
     write_whole(&work.case.path(layout::SAMPLES_TABLE), samples_table(outcome).as_bytes())?;
     keep_settings(work)?;
+    if outcome.answer.is_none() {
+        // Of an earlier state of the folder.
+        std::fs::remove_file(work.case.path(layout::REFUSED_PICTURE)).ok();
+    }
     write_whole(&work.case.path(layout::PROVENANCE), provenance(&work.case, manifests)?.as_bytes())?;
     write_page(&work.case)
 }
@@ -98,4 +103,5 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
     outcome.warnings.retain(|w| !w.starts_with("estimate: "));
     outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
     outcome.estimate = Some(facts.estimate.clone());
+    outcome.comparison.clone_from(&facts.comparison);
 }

@@ -1,23 +1,28 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
-use super::plan::{self, StageName};
+use super::plan;
+use super::refusal;
+use super::stage_name::StageName;
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, FieldsInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, FieldsInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
+use crate::experiment::compare::Comparison;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
+use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
 use crate::layout::REST_MESH;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// A part of a sweep's samples (see [`shard`]).
@@ -56,9 +61,20 @@ impl Images {
         check_scans(work, &scans.sums)?;
         keep_settings(work)?;
         let mut made = Made::default();
-        let registration = stages::registration(work, &mut made, &scans)?;
-        let anat = stages::anat(work, &mut made, &scans, &own)?;
-        Ok(Self { made, registration, anat })
+        let registration = match stages::registration(work, &mut made, &scans, &own) {
+            Ok(registration) => registration,
+            Err(error) => {
+                refusal::keep(work, &scans, "registration", &[], &error)?;
+                return Err(error);
+            }
+        };
+        match stages::anat(work, &mut made, &scans, &own) {
+            Ok(anat) => Ok(Self { made, registration, anat }),
+            Err(error) => {
+                refusal::keep(work, &scans, "anat", &in_order(&made, &[StageName::Registration]), &error)?;
+                Err(error)
+            }
+        }
     }
 
     /// Their manifests.
@@ -125,7 +141,7 @@ impl Prepared {
         let (registered, registration): (Manifest, RegistrationFacts) = case.stage(&StageName::Registration)?;
         let sum = |role: &str| registered.inputs.get(role).cloned().unwrap_or_default();
         let sums = ScanSums { pre: sum("pre"), post: sum("post") };
-        is_present(work, &stages::registration_stage(work, &sums))?;
+        is_present(work, &stages::registration_stage(work, &sums).own_masks_of(&registered))?;
         made.add(StageName::Registration, registered);
         let (segmented, anat): (Manifest, AnatFacts) = case.stage(&StageName::Anat)?;
         is_present(work, &stages::anat_stage(work, &made, &sums).own_masks_of(&segmented))?;
@@ -171,9 +187,13 @@ pub(crate) struct Patient<'w, 'a> {
     prepared: Prepared,
     /// Loads and supports; the materials are the samples'.
     scenario: Scenario,
+    /// Shear moduli of tissues that are not varied, Pa.
+    held: BTreeMap<String, f64>,
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
+    /// What mesh and scans are off without any movement, mm.
+    at_rest_mm: Option<f64>,
 }
 
 impl<'w, 'a> Patient<'w, 'a> {
@@ -185,14 +205,18 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let (scenario, held) = stages::with_held_tissues(work, &prepared.mesh.mesh, scenario)?;
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
+        let at_rest_mm = stages::error_at_rest(&work.case, &anatomy, &mesh)?;
+        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference, at_rest_mm })
     }
 
+    /// What the pair shows at rest, with what is expected of its parts beside it.
     fn floor(&self) -> NoiseFloor {
-        self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm)
+        let expected = self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm);
+        NoiseFloor { at_rest_mm: self.at_rest_mm, ..expected }
     }
 
     /// Simulates the samples of one part, or all of them, and nothing else.
@@ -213,11 +237,44 @@ impl<'w, 'a> Patient<'w, 'a> {
 
     /// Estimates the moduli against what the post-operative scan shows.
     pub fn estimate(&self) -> Result<(), WorkflowError> {
+        self.with_images(|made, input| stages::estimate(self.work, made, input)).map(|_| ())
+    }
+
+    /// Models of this patient beside each other.
+    pub fn compare(&self) -> Result<Comparison, WorkflowError> {
+        self.with_images(|made, input| stages::compare(self.work, made, input))
+    }
+
+    /// What an estimate needs with what the images show, handed on.
+    fn with_images<T>(
+        &self,
+        then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
+    ) -> Result<T, WorkflowError> {
         let Self { work, prepared, .. } = self;
+        let settings = &work.settings.resection;
+        let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
+        let held = || -> Result<Vec<HeldBody>, WorkflowError> {
+            settings.supports.family().into_iter().map(|supports| self.held(supports)).collect()
+        };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let input = EstimateInput { shift: Some(&shift), ..self.asked(&tissues) };
-        stages::estimate(work, &mut prepared.made.clone(), &input).map(|_| ())
+        let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
+        let input = EstimateInput { shift, coarser, held, ..self.asked(&tissues) };
+        then(&mut prepared.made.clone(), &input)
+    }
+
+    /// The body as these supports hold it.
+    fn held(&self, supports: Supports) -> Result<HeldBody, WorkflowError> {
+        let work = self.work;
+        let settings = ResectionSettings { supports, ..work.settings.resection.clone() };
+        let anatomy = Anatomy::read(&work.case)?;
+        let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
+        let scenario = settings.supported(&template, &anatomy.labels)?;
+        let (scenario, _) = stages::with_held_tissues(work, &self.prepared.mesh.mesh, scenario)?;
+        let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
+        let mesh = settings.supported_mesh(rest, &scenario)?;
+        let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -228,8 +285,11 @@ impl<'w, 'a> Patient<'w, 'a> {
             tissues,
             poisson_ratio: settings.resection.poisson_ratio,
             reference: &self.reference,
+            coarser: None,
+            held: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
+            rigid_error_mm: settings.resection.registration_error_mm,
         }
     }
 
@@ -282,6 +342,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             rest_surface_distance_mm: rest.surface_distance_mm,
             noise_floor: Some(self.floor()),
             loads: vec![loads],
+            held_shear_modulus_pa: self.held.clone(),
             ..self.prepared.outcome()
         }
     }

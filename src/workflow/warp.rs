@@ -1,7 +1,7 @@
 //! What a user has in one of a patient's frames carried to another: images, label maps, points, streamlines, surfaces.
 
 use super::case::Case;
-use super::error::WorkflowError;
+use super::error::{WarpError, WorkflowError};
 use super::inputs::{read_input, shown};
 use super::maps::{Map, Part, WarpTo};
 use crate::artefact::write_whole;
@@ -14,7 +14,6 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
-use thiserror::Error;
 
 /// What is carried, and how.
 #[derive(Clone, Debug)]
@@ -90,14 +89,6 @@ impl PointCounts {
             outside: count(PointState::Outside),
         }
     }
-}
-
-/// Why something cannot be carried.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum WarpError {
-    #[error("{output}: the result of {file} is written in the same format: end the name in {ending}")]
-    Ending { file: String, output: String, ending: &'static str },
 }
 
 /// Carries a file.

@@ -12,6 +12,7 @@ mod examples;
 mod fem;
 mod fields;
 mod job;
+mod label_maps;
 mod made;
 mod material;
 mod mesh_engines;

@@ -7,6 +7,7 @@ use std::path::Path;
 /// room -> rooms it may import, in the order the data flows.
 fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
     let all = [
+        "anatomy",
         "geometry",
         "artefact",
         "image",
@@ -24,11 +25,12 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "workflow",
     ];
     BTreeMap::from([
+        ("anatomy", vec![]),
         ("geometry", vec![]),
         ("artefact", vec![]),
         ("image", vec!["geometry", "artefact"]),
         ("register", vec!["geometry", "image"]),
-        ("segment", vec!["geometry", "image", "register"]),
+        ("segment", vec!["anatomy", "geometry", "image", "register"]),
         ("resect", vec!["geometry", "image", "register", "segment"]),
         ("mesh", vec!["geometry", "image", "segment", "artefact"]),
         ("tag", vec!["geometry", "segment", "mesh"]),

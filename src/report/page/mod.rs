@@ -69,6 +69,8 @@ pub struct CasePage {
     pub landmarks: Option<Evaluation>,
     /// Before and after registration.
     pub registration: Option<RegistrationFigure>,
+    /// Both scans when a step gave up.
+    pub refused: Option<CaptionedPicture>,
     /// Masks on slices.
     pub mosaics: Vec<Mosaic>,
     /// Pictures of the mesh.
@@ -201,11 +203,16 @@ impl CasePage {
         let (figure, landmarks) = (self.shift_figure.as_ref(), self.landmarks.as_ref());
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("summary", "Summary", outcome.map(results::summary));
+        add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());
         add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(results::samples));
-        add("estimate", "Estimate", outcome.and_then(|o| o.estimate.as_ref()).map(estimate::section));
+        add(
+            "estimate",
+            "Estimate",
+            outcome.and_then(|o| Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref()))),
+        );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
         add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));

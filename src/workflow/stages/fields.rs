@@ -1,5 +1,6 @@
 //! Stage `fields`: the brain shift as displacement fields of the scans, and the pre-operative images carried by it.
 
+use super::shift::{CaseShift, FUSED, OBSERVED};
 use crate::artefact::{Manifest, Produced};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
 use crate::geometry::{Frame, Position, Pre};
@@ -12,8 +13,7 @@ use crate::layout::{
     SHIFT_JSON, SHIFT_MASK, SHIFT_REACH, SHIFT_SD, WARPED_LABELS, WARPED_T1,
 };
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
-use crate::workflow::shift::{CaseShift, FUSED, OBSERVED};
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Point3;
 

@@ -1,8 +1,6 @@
 //! The brain shift of a case in any of its states, from what its folder holds.
 
-use super::case::{Case, CaseError};
-use super::error::WorkflowError;
-use super::stages::transforms;
+use super::registration::transforms;
 use crate::experiment::estimate::moved_by;
 use crate::experiment::field::{
     BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, SeenNode, ShiftField, Surroundings, depth_mm,
@@ -19,6 +17,8 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::register::deformable::DisplacementField;
 use crate::segment::native::mask_on;
+use crate::workflow::case::Case;
+use crate::workflow::error::{CaseError, WorkflowError};
 use std::cell::OnceCell;
 
 /// Name of the estimate's state.
