@@ -58,6 +58,7 @@
 //! The science follows Granados et al., "A generative model of hyperelastic strain energy density functions for
 //! multiple tissue brain deformation", IJCARS 2021.
 
+pub mod anatomy;
 pub mod artefact;
 pub mod cli;
 pub mod experiment;

@@ -94,10 +94,13 @@ impl Stage {
         self.input_sha256(&format!("stage {}", earlier.stage), &sum)
     }
 
-    /// The same masks that this stage was made with before: inputs whose role ends in `mask`.
+    /// The same files of the user's own that this stage was made with before: masks, a label map, a pose.
     #[must_use]
     pub fn own_masks_of(self, earlier: &Manifest) -> Self {
-        let masks = earlier.inputs.iter().filter(|(role, _)| role.ends_with(" mask"));
+        let masks = earlier
+            .inputs
+            .iter()
+            .filter(|(role, _)| role.ends_with(" mask") || *role == "label map" || *role == "pose");
         masks.fold(self, |stage, (role, sum)| stage.input_sha256(role, sum))
     }
 

@@ -1,7 +1,6 @@
 //! `hgm completions`: shell completions from the command line's own definition.
 
-use super::{Failure, Hgm, Session};
-use clap::CommandFactory;
+use super::{Failure, Session};
 
 /// Print shell completions
 ///
@@ -12,9 +11,9 @@ pub struct Args {
     shell: clap_complete::Shell,
 }
 
-pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub fn run(args: &Args, mut hgm: clap::Command, session: &Session) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Hgm::command(), "hgm", &mut script);
+    clap_complete::generate(args.shell, &mut hgm, "hgm", &mut script);
     let script = String::from_utf8(script)?;
     session.emit(&serde_json::json!({ "shell": args.shell.to_string(), "script": script }), &script)
 }

@@ -1,7 +1,7 @@
 //! How a subcommand ends when it does not end well.
 
 use super::remedy::remedy;
-use super::session::has_emitted;
+use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
@@ -42,15 +42,27 @@ impl Failure {
         }
     }
 
-    /// One message on stderr; with `--json` also an object on stdout, unless the result is there already.
-    pub fn report(&self, json: bool) {
+    /// One message on stderr; `on_stdout` also as an object there, which is for `--json` without a result.
+    pub fn report(&self, on_stdout: bool) {
         let (kind, error) = self.parts();
         let message = in_one_line(error);
         eprintln!("hgm: {kind}: {message}");
-        if json && !has_emitted() {
-            println!("{}", serde_json::json!({"error": {"kind": kind, "message": message, "exit_code": self.code()}}));
+        if on_stdout {
+            let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
+            if let Some(answer) = error.downcast_ref::<Answered>() {
+                told["answer"] = answer.answer.name().into();
+            }
+            println!("{}", serde_json::json!({ "error": told }));
         }
     }
+}
+
+/// The scans were compared and gave an answer that ends the job.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct Answered {
+    pub answer: Answer,
+    message: String,
 }
 
 /// An error and its causes, each said once: some texts hold their cause already.
@@ -72,6 +84,9 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
     fn from(error: E) -> Self {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
+        if let Some(answer) = error.downcast_ref().and_then(WorkflowError::answer) {
+            return Self::QualityGate(Answered { answer, message: in_one_line(&with_remedy(error)) }.into());
+        }
         let error = match (with_remedy(error), kind) {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
             (error, _) => error,
@@ -119,7 +134,21 @@ impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::resect::{PairError, ResectError};
     use anyhow::{Context, anyhow};
+
+    #[test]
+    fn no_operation_and_two_people_are_answers_with_a_name_and_exit_code_4() {
+        let pair = |error: PairError| Failure::from(WorkflowError::Pair(error));
+        let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
+        for (failure, name) in [
+            (pair(PairError::NotOnePerson { folds: 0.4 }), Answer::NotOnePerson),
+            (pair(none.into()), Answer::NoOperation),
+        ] {
+            assert_eq!(failure.code(), 4);
+            assert_eq!(failure.parts().1.downcast_ref::<Answered>().map(|a| a.answer), Some(name));
+        }
+    }
 
     #[test]
     fn a_cause_is_said_once() {

@@ -146,6 +146,16 @@ impl AnalysisOptions {
 #[derive(Clone, Debug, Default, clap::Args)]
 #[allow(clippy::struct_field_names, reason = "the options' names")]
 pub struct OwnMasks {
+    /// A label map of the pre-operative scan made by another tool (.nii.gz, .mgz): wins over the computed labels, and the
+    /// scans may then have another contrast than T1
+    #[arg(long, value_name = "FILE")]
+    dseg: Option<PathBuf>,
+    /// Whose numbers the label map holds [default: found out from the numbers]
+    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
+    labels: Option<String>,
+    /// The pose of the pre-operative scan by hand: a rigid transform to the MNI frame (4x4 text in RAS, or .tfm)
+    #[arg(long, value_name = "FILE")]
+    pose: Option<PathBuf>,
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
     #[arg(long, value_name = "FILE")]
     brain_mask: Option<PathBuf>,
@@ -181,9 +191,10 @@ pub struct PairOptions {
 impl PairOptions {
     /// The files.
     pub fn inputs(&self) -> Inputs {
-        let OwnMasks { brain_mask, ventricle_mask, cavity_mask, resected_mask } = self.masks.clone();
+        let OwnMasks { dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask } =
+            self.masks.clone();
         let (pre, post) = (self.pre.clone(), self.post.clone());
-        Inputs { pre, post, brain_mask, ventricle_mask, cavity_mask, resected_mask }
+        Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask }
     }
 }
 

@@ -104,12 +104,7 @@ fn points(args: &FitArgs) -> Result<(String, Rheometry), Failure> {
     }
     let id = args.literature.unwrap_or_default();
     let studies = args.studies.read()?;
-    let model = studies.models.iter().find(|model| model.id == id).ok_or_else(|| {
-        let last = studies.models.iter().map(|model| model.id).max().unwrap_or(0);
-        Failure::Rejected(anyhow!(
-            "--literature {id}: there is no such model; ids go from 0 to {last}; `hgm gp studies` lists them"
-        ))
-    })?;
+    let model = studies.model(id)?;
     let curve = model.curve(studies.curves);
     let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();
     let words = [model.study.clone(), citation(model)].into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>();

@@ -51,6 +51,10 @@ impl Progress for Listener {
         tracing::warn!("{file}: {what}");
     }
 
+    fn noted(&mut self, what: &str) {
+        tracing::info!("{what}");
+    }
+
     fn detail(&mut self, of: &str, what: &str) {
         tracing::debug!("{of}: {what}");
     }

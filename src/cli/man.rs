@@ -1,8 +1,7 @@
 //! `hgm man`: man pages from the command line's own definition.
 
-use super::{Failure, Hgm, Session};
+use super::{Failure, Session};
 use crate::artefact::write_whole;
-use clap::CommandFactory;
 use std::path::PathBuf;
 
 /// Write man pages, one per command
@@ -15,9 +14,9 @@ pub struct Args {
     output: PathBuf,
 }
 
-pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub fn run(args: &Args, hgm: clap::Command, session: &Session) -> Result<(), Failure> {
     let mut files = Vec::new();
-    for (name, page) in pages(Hgm::command(), "hgm")? {
+    for (name, page) in pages(hgm, "hgm")? {
         let file = args.output.join(format!("{name}.1"));
         write_whole(&file, &page)?;
         files.push(file.display().to_string());
@@ -41,6 +40,8 @@ fn pages(command: clap::Command, name: &str) -> std::io::Result<Vec<(String, Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::Hgm;
+    use clap::CommandFactory;
 
     #[test]
     fn every_command_and_subcommand_has_a_page_with_an_example() {

@@ -8,15 +8,19 @@ use std::path::{Path, PathBuf};
 
 /// Mesh a label map: conforming tetrahedra of every nonzero label, with boundary sets where the map is in MNI space
 ///
-/// Labels: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle, 5 resected tissue; other numbers are meshed as well. The mesh
-/// keeps each label's number.
+/// Labels: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle, 5 resected tissue, 6 tumour, 7 oedema. A map of FreeSurfer,
+/// SynthSeg, SimNIBS, GIF or MUSE is known by its numbers and carried to these. Numbers of no tool are meshed as they are.
 ///
 /// Example: hgm mesh pre_dseg.nii.gz -o brain.vtu --cells 60000 --preview brain.png
+/// Example: hgm mesh aseg.mgz --labels freesurfer -o brain.vtu
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Label map (NIfTI)
+    /// Label map (NIfTI, .mgz or .mgh)
     #[arg(value_name = "DSEG")]
-    pub labels: PathBuf,
+    pub dseg: PathBuf,
+    /// Whose numbers the map holds [default: found out from the numbers]
+    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv")]
+    pub labels: Option<String>,
     /// Where to write: .vtu, .msh (gmsh 4.1), .inp (Abaqus) or .feb (FEBio)
     #[arg(short, long, value_name = "MESH")]
     pub output: PathBuf,
@@ -45,7 +49,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.list("mesh.without", &args.without);
     flags.switch("tag.tentorium", args.tentorium);
     let files = MeshFiles {
-        labels: args.labels.clone(),
+        labels: args.dseg.clone(),
+        numbers: args.labels.clone(),
         output: args.output.clone(),
         in_mni: (args.sets != "auto").then_some(args.sets == "mni"),
         preview: args.preview.clone(),

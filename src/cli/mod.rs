@@ -35,7 +35,7 @@ mod why;
 pub use failure::{Failure, Reject};
 pub use session::{GlobalOptions, Session};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// From a pre- and post-operative T1 pair to a biomechanical answer. Research software, not a medical device.
@@ -91,8 +91,8 @@ pub fn main() -> ExitCode {
         Command::Gp(args) => gp::run(&args, &session),
         Command::Law(args) => law::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
-        Command::Completions(args) => completions::run(&args, &session),
-        Command::Man(args) => man::run(&args, &session),
+        Command::Completions(args) => completions::run(&args, Hgm::command(), &session),
+        Command::Man(args) => man::run(&args, Hgm::command(), &session),
         Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
         Command::Segment(args) => segment::run(&args, &session),
@@ -105,7 +105,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.report(json);
+            failure.report(json && !session::has_emitted());
             failure.exit_code()
         }
     }

@@ -1,13 +1,15 @@
 //! What to do about an error, in words of the command line: the library's messages name no options.
 
+use crate::anatomy::LabelError;
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::mesh::engine::EngineError;
-use crate::segment::HeadError;
+use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::{CohortError, DatasetError};
 use crate::workflow::{
-    CaseError, InputError, MaskRole, MeshFileError, SettingsError, SimulationError, Subject, WorkflowError,
+    CaseError, InputError, LabelMapError, MaskRole, MeshFileError, SettingsError, SimulationError, Subject,
+    WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -27,9 +29,6 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     {
         return Some("--brain-mask takes one");
     }
-    if let Some(SynthError::LobeTooSmall { .. }) = cause.downcast_ref() {
-        return Some("see --resection-cc");
-    }
     let CohortError::Log { .. } = cause.downcast_ref()? else { return None };
     Some("`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject")
 }
@@ -37,6 +36,7 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
 fn of_image(problem: &NiftiProblem) -> Option<&'static str> {
     match problem {
         NiftiProblem::SeveralVolumes { .. } | NiftiProblem::NoSuchVolume { .. } => Some("--volume N chooses"),
+        NiftiProblem::NotMask { .. } => Some("see --dseg"),
         NiftiProblem::NoSuchOrientation { .. } | NiftiProblem::OrientationsDisagree { .. } => {
             Some("--prefer sform or --prefer qform chooses")
         }
@@ -46,6 +46,7 @@ fn of_image(problem: &NiftiProblem) -> Option<&'static str> {
 
 fn of_engine(error: &EngineError) -> &'static str {
     match error {
+        EngineError::TooManyLabels { .. } => "see --labels and --without",
         EngineError::NoSuchLabel { .. } | EngineError::Factor { .. } => "see --edge-in and --edge-near",
         EngineError::Missing { .. } => "`hgm doctor` tells how to install it, --mesher lattice is always there",
         EngineError::Program { .. } | EngineError::Invalid { .. } => "--mesher lattice is always there",
@@ -58,9 +59,20 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Case(error) => return of_case(error),
         WorkflowError::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
         WorkflowError::Engine { source, .. } => of_engine(source),
-        WorkflowError::Pair(_) => "--cavity-mask, --resected-mask and --brain-mask take masks of your own",
+        WorkflowError::Labels(LabelMapError::Import {
+            source: ImportError::Numbers(LabelError::Mask { .. }), ..
+        }) => "see --brain-mask",
+        WorkflowError::Registration { .. } => {
+            "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
+        }
+        WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
+        WorkflowError::Labels(_) => "see --labels",
+        WorkflowError::Pair(_) => {
+            "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
+        }
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
+        WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
@@ -131,5 +143,7 @@ fn option(role: MaskRole) -> &'static str {
         MaskRole::Ventricle => "see --ventricle-mask",
         MaskRole::Cavity => "see --cavity-mask",
         MaskRole::Resected => "see --resected-mask",
+        MaskRole::Labels => "see --dseg",
+        MaskRole::Pose => "see --pose",
     }
 }

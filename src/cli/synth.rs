@@ -2,20 +2,36 @@
 
 use super::flags::Flags;
 use super::{Failure, Session};
-use crate::artefact::{Produced, Stage, StageError};
-use crate::experiment::synth::{Contrast, SagKind, SynthError, synthesize};
+use crate::experiment::synth::{Contrast, Lobe, SagKind};
 use crate::segment::atlas::Side;
+use crate::workflow::{SyntheticFiles, synthetic_patient};
 use std::path::PathBuf;
 
 /// Make a synthetic patient: pre- and post-operative T1 and the truth behind them
 ///
 /// Example: hgm synth --side left --seed 7 -o patient-07
+/// Example: hgm synth --head T1.nii.gz --dseg aseg.mgz --lobe frontal --resection-cc 20 -o patient-08
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Output folder: pre.nii.gz, post.nii.gz, truth/
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Operated temporal lobe [default: left]
+    /// A T1 whose head is operated [default: the template's]
+    #[arg(long, value_name = "T1")]
+    pub head: Option<PathBuf>,
+    /// A label map of that head, made by another tool
+    #[arg(long, value_name = "FILE", requires = "head")]
+    pub dseg: Option<PathBuf>,
+    /// Whose numbers the label map holds [default: found out from the numbers]
+    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
+    pub labels: Option<String>,
+    /// What is taken out, in the grid of that head [default: part of a lobe]
+    #[arg(long, value_name = "FILE", requires = "head", conflicts_with_all = ["lobe", "resection_cc"])]
+    pub resected_mask: Option<PathBuf>,
+    /// Operated lobe [default: temporal]
+    #[arg(long, value_parser = lobe, value_name = "temporal|frontal|parietal|occipital|insular")]
+    pub lobe: Option<Lobe>,
+    /// Operated side [default: left]
     #[arg(long, value_parser = side, value_name = "left|right")]
     pub side: Option<Side>,
     /// Volume to resect [default: 35]
@@ -52,6 +68,10 @@ fn side(text: &str) -> Result<Side, String> {
     }
 }
 
+fn lobe(text: &str) -> Result<Lobe, String> {
+    Lobe::of_name(text).ok_or_else(|| "say temporal, frontal, parietal, occipital or insular".to_owned())
+}
+
 fn sag(text: &str) -> Result<SagKind, String> {
     match text {
         "none" => Ok(SagKind::None),
@@ -74,6 +94,7 @@ fn contrast(text: &str) -> Result<Contrast, String> {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut flags = Flags::default();
     flags.set("synth.side", args.side);
+    flags.set("synth.lobe", args.lobe);
     flags.set("synth.resection_cc", args.resection_cc);
     flags.set("synth.post_oblique_deg", args.oblique_deg);
     flags.set("synth.sag", args.sag);
@@ -84,32 +105,25 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     // Slices are never thinner than the voxels asked for.
     let slices = session.settings(Flags::default())?.synth.post_slice_mm;
     flags.set("synth.post_slice_mm", args.slice_mm.or(args.spacing_mm.map(|spacing| slices.max(spacing))));
-    let settings = session.settings(flags)?.synth;
-
-    let stage = Stage::new("synth", 2, &args.output, &settings).frame("pre, post").seed(settings.seed);
-    let outcome = stage.run(session.options.force, || {
-        let patient = synthesize(&settings)?;
-        let facts = serde_json::to_value(&patient.truth).unwrap_or_default();
-        Ok::<_, SynthError>(Produced { files: patient.files(), facts, ..Produced::default() })
-    });
-    let outcome = outcome.map_err(|error| match error {
-        StageError::Compute(asked @ (SynthError::Setting { .. } | SynthError::LobeTooSmall { .. })) => {
-            Failure::Rejected(asked.into())
-        }
-        other => Failure::Failed(other.into()),
-    })?;
-    let figure = |name: &str| outcome.manifest.facts[name].as_f64().unwrap_or(f64::NAN);
+    let settings = session.settings(flags)?;
+    let files = SyntheticFiles {
+        output: args.output.clone(),
+        head: args.head.clone(),
+        dseg: args.dseg.clone(),
+        labels: args.labels.clone(),
+        resected_mask: args.resected_mask.clone(),
+    };
+    let truth = synthetic_patient(&files, &settings, session.options.force, &mut session.listener())?;
+    let figure = |name: &str| truth[name].as_f64().unwrap_or(f64::NAN);
     let text = format!(
-        "{}: {} lobe, resected {:.1} cc, cavity {:.1} cc, brain shift up to {:.1} mm, head turned by {:.1} degrees between the scans",
+        "{}: {} {}, resected {:.1} cc, cavity {:.1} cc, brain shift up to {:.1} mm, head turned by {:.1} degrees between the scans",
         args.output.display(),
-        settings.side,
+        settings.synth.side,
+        if args.resected_mask.is_some() { "mask" } else { settings.synth.lobe.name() },
         figure("resected_cc"),
         figure("cavity_cc"),
         figure("largest_displacement_mm"),
         figure("rotation_deg"),
     );
-    session.emit(
-        &serde_json::json!({ "folder": args.output.display().to_string(), "truth": outcome.manifest.facts }),
-        &text,
-    )
+    session.emit(&serde_json::json!({ "folder": args.output.display().to_string(), "truth": truth }), &text)
 }

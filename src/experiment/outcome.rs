@@ -22,12 +22,43 @@ pub enum ExperimentKind {
     Resection,
 }
 
+/// What two scans say where no operation can be followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// One head twice, and nothing was taken out.
+    NoOperation,
+    /// Two heads.
+    NotOnePerson,
+}
+
+impl Answer {
+    /// The word of tables and of JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoOperation => "no-operation",
+            Self::NotOnePerson => "not-one-person",
+        }
+    }
+
+    /// The sentence of pages.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::NoOperation => "No operation is seen: no stiffness is claimed.",
+            Self::NotOnePerson => "The two scans do not show one person: nothing was compared.",
+        }
+    }
+}
+
 /// One experiment: settings' worth of samples against one reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentOutcome {
     /// Which experiment.
     pub kind: ExperimentKind,
+    /// Why there is nothing more, where the scans themselves say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer: Option<Answer>,
     /// What the samples are compared with, one sentence.
     pub reference: String,
     /// Tissues whose material is varied (`grey_matter`, ...), in the order of the grid's axes.
@@ -48,6 +79,9 @@ pub struct ExperimentOutcome {
     /// The moduli behind the reference where they are known (a phantom's truth), Pa per tissue.
     #[serde(default)]
     pub reference_shear_modulus_pa: BTreeMap<String, f64>,
+    /// Tissues that were not varied but held at the mean of their prior (tumour, oedema): shear modulus, Pa.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub held_shear_modulus_pa: BTreeMap<String, f64>,
     /// Measurement errors below which differences mean nothing.
     #[serde(default)]
     pub noise_floor: Option<NoiseFloor>,

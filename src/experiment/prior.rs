@@ -31,7 +31,7 @@ impl Default for PriorSettings {
 #[derive(Debug, Error)]
 pub enum PriorError {
     /// The tissue has no task of its own.
-    #[error("there is no prior for the tissue `{0}`; use brain, grey_matter or white_matter")]
+    #[error("there is no prior for the tissue `{0}`; use brain, grey_matter, white_matter, tumour or oedema")]
     UnknownTissue(String),
     /// The meta-model could not be fitted.
     #[error("the prior of `{tissue}` gives no material: {source}")]
@@ -49,7 +49,7 @@ pub enum PriorError {
     NoLevels,
 }
 
-/// The task of a tissue among these studies: healthy brain, grey or white matter.
+/// The task of a tissue among these studies: healthy brain, grey or white matter, abnormal tissue.
 ///
 /// # Errors
 /// [`PriorError::UnknownTissue`].
@@ -58,6 +58,8 @@ pub fn task_of(tissue: &Tissue, study: StudyKind) -> Result<Task, PriorError> {
         "brain" => Region::Healthy,
         "grey_matter" => Region::Grey,
         "white_matter" => Region::White,
+        // Oedema is in the studies of abnormal tissue, and in no task of its own.
+        "tumour" | "oedema" => Region::Abnormal,
         other => return Err(PriorError::UnknownTissue(other.to_owned())),
     };
     Ok(Task { kind: study, region })
@@ -80,6 +82,17 @@ fn materials_of_task(
     let settings = SampleSettings { model: prior.law, ..settings };
     sample_shear_moduli(task, levels, &settings)
         .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
+}
+
+/// The material of a tissue that is not varied: the mean of its prior. A lesion is too small a part of what moves for two
+/// scans to say anything of it.
+///
+/// # Errors
+/// [`PriorError`].
+pub fn held_material(name: &str, poisson_ratio: f64, prior: &PriorSettings) -> Result<TissueSample, PriorError> {
+    let tissue = Tissue { name: name.to_owned(), labels: Vec::new() };
+    let mean = materials(&tissue, &[0.0], prior)?;
+    mean.first().map(|m| tissue_sample(m, poisson_ratio)).ok_or(PriorError::NoLevels)
 }
 
 /// Every combination of the tissues' levels as materials of the given Poisson's ratio.
@@ -183,11 +196,21 @@ mod tests {
     }
 
     #[test]
+    fn a_tumour_is_held_at_the_mean_of_abnormal_tissue() {
+        let prior = PriorSettings::default();
+        let held = held_material("tumour", 0.45, &prior).unwrap();
+        let task = Task { kind: prior.study, region: Region::Abnormal };
+        let mean = sample_shear_moduli(task, &[0.0], &SampleSettings::default()).unwrap();
+        assert_eq!((held.sd_level, held.shear_modulus_pa), (0.0, mean[0].shear_modulus_pa));
+        assert_eq!(held.shear_modulus_pa, held_material("oedema", 0.45, &prior).unwrap().shear_modulus_pa);
+    }
+
+    #[test]
     fn the_log_prior_lies_between_its_samples_and_an_unknown_tissue_is_refused() {
         let prior = log_prior(&Tissue::whole_brain()[0], &PriorSettings::default()).unwrap();
         assert!(prior.sd.unwrap() > 0.1 && prior.mean.exp() > 100.0);
-        let tumour = Tissue { name: "tumour".to_owned(), labels: vec![9] };
-        assert!(matches!(log_prior(&tumour, &PriorSettings::default()), Err(PriorError::UnknownTissue(_))));
+        let bone = Tissue { name: "bone".to_owned(), labels: vec![9] };
+        assert!(matches!(log_prior(&bone, &PriorSettings::default()), Err(PriorError::UnknownTissue(_))));
         let none = samples_of_prior(&Tissue::whole_brain(), &[], 0.45, &PriorSettings::default());
         assert!(matches!(none, Err(PriorError::NoLevels)));
     }

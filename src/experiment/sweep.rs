@@ -87,13 +87,12 @@ impl Reference {
     }
 }
 
-/// The scenario `template` with the sample's materials.
+/// The scenario `template` with the sample's materials; tissues that are not varied keep those of the template.
 ///
 /// # Errors
 /// [`SweepError::Law`] when a tissue has no material or a label no name.
 pub fn scenario_of(template: &Scenario, tissues: &[Tissue], sample: &Sample) -> Result<Scenario, SweepError> {
     let mut scenario = template.clone();
-    scenario.materials.clear();
     for tissue in tissues {
         let refuse = |reason: String| SweepError::Law { id: sample.id.clone(), tissue: tissue.name.clone(), reason };
         let material =

@@ -277,5 +277,12 @@ impl Scenario {
 }
 
 /// Labels of DSEG files.
-const LABEL_NAMES: [(u8, &str); 5] =
-    [(1, "csf"), (2, "grey_matter"), (3, "white_matter"), (4, "ventricle"), (5, "resected")];
+const LABEL_NAMES: [(u8, &str); 7] = [
+    (1, "csf"),
+    (2, "grey_matter"),
+    (3, "white_matter"),
+    (4, "ventricle"),
+    (5, "resected"),
+    (6, "tumour"),
+    (7, "oedema"),
+];

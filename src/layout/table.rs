@@ -82,6 +82,8 @@ pub const SETTINGS: &str = "settings.toml";
 pub const PROVENANCE: &str = "provenance.json";
 /// The page.
 pub const PAGE: &str = "report.html";
+/// What a step saw when it gave up; absent where none did.
+pub const REFUSED_PICTURE: &str = "refused.png";
 /// Held by the program that works on the folder.
 pub const LOCK: &str = ".lock";
 
@@ -192,6 +194,7 @@ pub const TABLE: &[Entry] = &[
     file(SETTINGS, "every setting that was used, by room", Space::None, Maker::Outcome),
     file(PROVENANCE, "program, stages, checksums of inputs and outputs", Space::None, Maker::Outcome),
     file(PAGE, "the page", Space::None, Maker::Report),
+    file(REFUSED_PICTURE, "both scans when a step gave up; absent where none did", Space::None, Maker::Outcome),
     file(LABELS_FOR_SLICER, "labels for 3D Slicer", Space::Mni, Maker::Report),
     file(CAVITY_FOR_SLICER, "cavity for 3D Slicer", Space::Mni, Maker::Report),
     file(BEST_SURFACE.0, "deformed surface of the best sample, for Workbench", Space::Mni, Maker::Report),

@@ -1,4 +1,7 @@
 //! Comma-separated tables with quoted cells (RFC 4180) that remember their line numbers.
+//!
+//! By hand: the csv crate takes a quote that is never closed for one long cell and says nothing, and a table of studies would
+//! lose its rows that way.
 
 use thiserror::Error;
 

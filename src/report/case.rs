@@ -4,7 +4,7 @@ use super::colour::ColourScale;
 use super::figure::CaseImages;
 use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
-use super::page::{CasePage, ErrorMap, title_of};
+use super::page::{CaptionedPicture, CasePage, ErrorMap, title_of};
 use super::viewer::{ViewedSurface, Viewer};
 use crate::artefact::{WriteError, write_whole};
 use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
@@ -133,6 +133,9 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         provenance_json,
         ..CasePage::default()
     };
+    if let Some(png) = case.bytes(layout::REFUSED_PICTURE)? {
+        page.refused = Some(refused(png));
+    }
     if let Some(images) = &images {
         page.registration = images.registration();
         page.mosaics = images.mosaics();
@@ -149,6 +152,18 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     }
     page.outcome = outcome;
     Ok(page)
+}
+
+/// The picture of a refusal on the page.
+fn refused(png: Vec<u8>) -> CaptionedPicture {
+    // Width and height stand at the same place in every PNG.
+    let pixels = |at: usize| png.get(at..at + 4).map_or(0, |b| b.iter().fold(0, |n, &byte| n << 8 | usize::from(byte)));
+    CaptionedPicture {
+        size: [pixels(16), pixels(20)],
+        caption: "Both scans in the template's frame: above before, below after surgery".to_owned(),
+        description: "Axial, coronal and sagittal slices of both scans at the same places".to_owned(),
+        png,
+    }
 }
 
 /// `report.html` and the files for other viewers (see [`hand_off`]), by their paths in the case directory.

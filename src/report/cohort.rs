@@ -1,7 +1,7 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
 use super::median_samples::{MedianSample, median_samples};
-use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::resection::improvement;
 use crate::experiment::rmse::median_and_mad;
 use schemars::JsonSchema;
@@ -17,6 +17,10 @@ pub enum Status {
     Done,
     /// Computed, but a boundary set is not to be believed.
     QualityGate,
+    /// One head twice, and nothing was taken out.
+    NoOperation,
+    /// The two scans show two heads.
+    NotOnePerson,
     /// It ended with an error.
     Failed,
     /// It has not been run.
@@ -155,11 +159,22 @@ impl Cohort {
 }
 
 impl Status {
+    /// How a subject ended that a quality gate stopped, with the scans' answer where they gave one.
+    pub fn of(answer: Option<Answer>) -> Self {
+        match answer {
+            None => Self::QualityGate,
+            Some(Answer::NoOperation) => Self::NoOperation,
+            Some(Answer::NotOnePerson) => Self::NotOnePerson,
+        }
+    }
+
     /// The word of tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Done => "done",
             Self::QualityGate => "quality-gate",
+            Self::NoOperation => Answer::NoOperation.name(),
+            Self::NotOnePerson => Answer::NotOnePerson.name(),
             Self::Failed => "failed",
             Self::Missing => "missing",
         }

@@ -14,6 +14,8 @@ pub enum Structure {
     WhiteMatter,
     /// The ventricles.
     Ventricle,
+    /// Tumour and oedema.
+    Tumour,
     /// The tissue that was taken out, on the pre-operative image.
     Resected,
     /// The cavity on the post-operative image.
@@ -27,6 +29,7 @@ impl Structure {
             Self::Brain => "brain",
             Self::WhiteMatter => "white matter",
             Self::Ventricle => "ventricles",
+            Self::Tumour => "tumour and oedema",
             Self::Resected => "resected tissue",
             Self::Cavity => "cavity",
         }
@@ -38,6 +41,7 @@ impl Structure {
             Self::Brain => "o-brain",
             Self::WhiteMatter => "o-white",
             Self::Ventricle => "o-ventricle",
+            Self::Tumour => "o-tumour",
             Self::Resected => "o-resected",
             Self::Cavity => "o-cavity",
         }
@@ -178,6 +182,8 @@ impl CaseImages {
         let mut masks: Outlined<'_> = vec![(Structure::Brain, &self.pre_brain)];
         masks.extend(white.as_ref().map(|m| (Structure::WhiteMatter, m)));
         masks.extend(ventricle.as_ref().map(|m| (Structure::Ventricle, m)));
+        let lesion = self.labels.as_ref().map(|l| l.map(|v| v == label::TUMOUR || v == label::OEDEMA));
+        masks.extend(lesion.as_ref().map(|m| (Structure::Tumour, m)));
         masks.extend(self.resected.as_ref().map(|m| (Structure::Resected, m)));
         let shown = either(&self.pre_brain, self.resected.as_ref());
         let caption = "The outlines are the masks that everything after uses; they should follow the anatomy.";

@@ -42,13 +42,15 @@ pub fn segmentations(images: &CaseImages) -> Vec<CaseFile> {
                 }
             }
         }
-        let segments = [
+        let mut segments = vec![
             segment(label::CSF, of_label(label::CSF)),
             segment(label::GREY_MATTER, of_label(label::GREY_MATTER)),
             segment(label::WHITE_MATTER, of_label(label::WHITE_MATTER)),
             segment(label::VENTRICLE, VENTRICLE),
             segment(label::RESECTED, RESECTED),
         ];
+        let lesions = [label::TUMOUR, label::OEDEMA].into_iter().filter(|l| labels.data.contains(l));
+        segments.extend(lesions.map(|l| segment(l, of_label(l))));
         files.push((layout::LABELS_FOR_SLICER.to_owned(), seg_nrrd::encode(&labels, &segments)));
     }
     if let Some(cavity) = &images.cavity {

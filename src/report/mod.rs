@@ -17,6 +17,7 @@ pub mod median_samples;
 pub mod mesh_figure;
 pub mod page;
 pub mod picture;
+pub mod refusal;
 pub mod render;
 pub mod slice;
 pub mod viewer;

@@ -1,5 +1,6 @@
 //! The cavity that surgery left, and the tissue that filled it.
 
+use super::belief::{Doubt, Evidence};
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, components, fill_holes, largest_component};
 use crate::image::distance::distance_mm;
@@ -25,6 +26,10 @@ pub struct CavityPair<'a> {
     pub post_known: &'a Mask<Mni>,
     /// Intensity between CSF and grey matter on the pre-operative scale.
     pub csf_grey_border: f64,
+    /// Mean intensity of grey matter on the pre-operative scale.
+    pub grey_mean: f64,
+    /// White matter's mean intensity less grey matter's.
+    pub grey_white_contrast: f64,
 }
 
 /// How the cavity is found.
@@ -86,6 +91,8 @@ pub struct CavityFinding {
     pub resected: Mask<Mni>,
     /// Hemisphere.
     pub side: Side,
+    /// What made it be believed; `None` for a mask given by hand.
+    pub evidence: Option<Evidence>,
 }
 
 /// There is no cavity to speak of.
@@ -93,14 +100,17 @@ pub struct CavityFinding {
 pub enum ResectError {
     /// Post looks like pre.
     #[error(
-        "no cavity of at least {smallest_cc} cc was found on the post-operative scan (largest loss of tissue: \
-         {largest_cc:.2} cc); check that the files are not swapped or the same, or give a cavity mask"
+        "no operation is seen: no cavity of at least {smallest_cc} cc was found on the post-operative scan (largest loss of \
+         tissue: {largest_cc:.2} cc{}); check that the files are not swapped or the same, or give a cavity mask",
+        doubt.map_or_else(String::new, |d| format!("; {d}"))
     )]
-    NoCavity {
+    NoOperation {
         /// The largest candidate.
         largest_cc: f64,
         /// What would have counted.
         smallest_cc: f64,
+        /// Why the largest candidate is not believed, where it is large enough.
+        doubt: Option<Doubt>,
     },
     /// What pre lacks, post has.
     #[error(
@@ -124,19 +134,26 @@ pub enum ResectError {
     },
 }
 
-/// Finds the cavity: dark on post and tissue on pre, away from the brain's rim, opened; of the parts the one largest
-/// by volume x depth x loss; grown through dark voxels, closed, smoothed, without the ventricles.
+/// Candidates that are looked at, the likeliest first.
+const MOST_CANDIDATES: usize = 6;
+
+/// Finds the cavity: dark on post and tissue on pre, away from the brain's rim, opened; of the parts that make sense as a
+/// cavity ([`Evidence`]) the one largest by volume x depth x loss; grown through dark voxels, closed, smoothed, without
+/// the ventricles.
 ///
 /// # Errors
-/// [`ResectError::Swapped`] when more has appeared than was lost, [`ResectError::NoCavity`] when no part is large enough.
+/// [`ResectError::Swapped`] when more has appeared than was lost, [`ResectError::NoOperation`] when no part is large
+/// enough and makes sense.
 pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<CavityFinding, ResectError> {
     let grid = pair.pre.grid;
-    let tissue = pair.pre_labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER);
     let post = pair.post;
     let border = pair.csf_grey_border as f32;
+    let tissue = pair.pre_labels.map(label::is_tissue);
+    // A lesion that was dark before is no loss, whatever its label.
+    let bright_before = gaussian(pair.pre, 0.8).map(|x| x >= border);
     let dark = Mask::from_fn(grid, |n| pair.post_known.data[n] && post.data[n] < border);
     let inner = erode(pair.pre_brain, settings.rim_mm);
-    let lost = open(&both(&both(&dark, &tissue), &inner), settings.opening_mm);
+    let lost = open(&both(&both(&both(&dark, &tissue), &bright_before), &inner), settings.opening_mm);
     let depth_mm = distance_mm(&pair.pre_brain.map(|inside| !inside));
     let loss = |n: usize| f64::from((pair.pre.data[n] - post.data[n]).max(0.0)) * f64::from(depth_mm.data[n]);
     let parts = components(&lost, Connectivity::Faces);
@@ -144,17 +161,36 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
     for (n, &part) in parts.labels.data.iter().enumerate().filter(|(_, part)| **part > 0) {
         scores[part as usize] += loss(n);
     }
-    let best = (1..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).unwrap_or(0) as u32;
-    let seed = parts.labels.map(|part| best > 0 && part == best);
+    let mut order: Vec<usize> = (1..scores.len()).collect();
+    order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+    let part_of = |best: usize| parts.labels.map(|part| best > 0 && part as usize == best);
+    let seed = part_of(order.first().copied().unwrap_or(0));
     let fluid = pair.pre_labels.map(|l| l == label::CSF);
     let appeared = Mask::from_fn(grid, |n| fluid.data[n] && inner.data[n] && pair.post_known.data[n] && !dark.data[n]);
     let before_cc = largest_component(&open(&appeared, settings.opening_mm), Connectivity::Faces).volume_cc();
     if before_cc >= settings.smallest_cc.max(seed.volume_cc()) {
         return Err(ResectError::Swapped { before_cc, after_cc: seed.volume_cc() });
     }
-    if seed.volume_cc() < settings.smallest_cc {
-        return Err(ResectError::NoCavity { largest_cc: seed.volume_cc(), smallest_cc: settings.smallest_cc });
+    let largest_cc = seed.volume_cc();
+    let mut doubt = None;
+    let mut believed = None;
+    for candidate in order.into_iter().take(MOST_CANDIDATES) {
+        let candidate = part_of(candidate);
+        if candidate.volume_cc() < settings.smallest_cc {
+            continue;
+        }
+        let evidence = Evidence::of(&candidate, pair);
+        match evidence.doubt() {
+            None => {
+                believed = Some((candidate, evidence));
+                break;
+            }
+            Some(why) => doubt = doubt.or(Some(why)),
+        }
     }
+    let Some((seed, evidence)) = believed else {
+        return Err(ResectError::NoOperation { largest_cc, smallest_cc: settings.smallest_cc, doubt });
+    };
 
     let grown = grow(&seed, &both(&dark, pair.pre_brain), settings.growth_mm);
     let cavity = settled(&grown, pair.pre_brain, settings.closing_mm);
@@ -163,7 +199,7 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
     let ventricle = pair.pre_labels.map(|l| l == label::VENTRICLE);
     let resected = without(&cavity, &ventricle);
     let side = side_of(&cavity);
-    Ok(CavityFinding { cavity, resected, side })
+    Ok(CavityFinding { cavity, resected, side, evidence: Some(evidence) })
 }
 
 /// Gaps closed, holes filled, stairs smoothed, within the brain.
@@ -207,7 +243,7 @@ pub fn subtract(
         return Err(ResectError::OutsideBrain { percent });
     }
     let side = side_of(&cavity);
-    Ok(Some(CavityFinding { cavity, resected, side }))
+    Ok(Some(CavityFinding { cavity, resected, side, evidence: None }))
 }
 
 /// Layers of one voxel (6-neighbours) from the seed through `allowed`, as many as fit into `limit_mm`.
@@ -305,6 +341,8 @@ mod tests {
             post: &h.post,
             post_known: known,
             csf_grey_border: 60.0,
+            grey_mean: 100.0,
+            grey_white_contrast: 30.0,
         }
     }
 
@@ -322,7 +360,49 @@ mod tests {
         let h = head(0.0);
         let known = h.brain.map(|_| true);
         let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
-        assert!(error.to_string().contains("give a cavity mask"));
+        assert!(error.to_string().contains("no operation is seen") && error.to_string().contains("give a cavity mask"));
+    }
+
+    #[test]
+    fn a_hole_that_was_there_before_is_no_operation() {
+        let h = head(12.0);
+        let known = h.brain.map(|_| true);
+        let old = CavityPair { pre: &h.post, ..pair(&h, &known) };
+        assert!(matches!(find_cavity(&old, &CavitySettings::default()), Err(ResectError::NoOperation { .. })));
+    }
+
+    #[test]
+    fn a_shadow_over_folds_that_are_still_there_is_no_cavity() {
+        let h = head(12.0);
+        let known = h.brain.map(|_| true);
+        let fold =
+            |n: usize| if (h.pre.grid.voxel(n)[0] / 2 + h.pre.grid.voxel(n)[2] / 3) % 2 == 0 { 30.0 } else { 0.0 };
+        let folded = |v: &Volume<f32, Mni>| Volume::from_fn(v.grid, |n| v.data[n] + fold(n));
+        let pre = folded(&h.pre);
+        let shadow = Volume::from_fn(pre.grid, |n| pre.data[n] * if h.hole.data[n] { 0.4 } else { 1.0 });
+        let shaded = CavityPair { pre: &pre, post: &shadow, ..pair(&h, &known) };
+        let error = find_cavity(&shaded, &CavitySettings::default()).unwrap_err();
+        let ResectError::NoOperation { doubt: Some(Doubt::FoldsKept { correlation }), .. } = error else {
+            panic!("{error}")
+        };
+        assert!(correlation > 0.9, "{correlation}");
+        let hole = Volume::from_fn(pre.grid, |n| if h.hole.data[n] { 25.0 } else { pre.data[n] });
+        let operated = CavityPair { pre: &pre, post: &hole, ..pair(&h, &known) };
+        assert!(find_cavity(&operated, &CavitySettings::default()).is_ok());
+    }
+
+    #[test]
+    fn ventricles_that_have_grown_are_no_cavity() {
+        let mut h = head(0.0);
+        let known = h.brain.map(|_| true);
+        let far = |n: usize| {
+            let p = h.pre.grid.position(h.pre.grid.voxel(n).map(|c| c as f64).into()).mm;
+            p.coords.norm()
+        };
+        let grown = Volume::from_fn(h.pre.grid, |n| if far(n) < 14.5 { 25.0 } else { h.pre.data[n] });
+        h.post = grown;
+        let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
+        assert!(matches!(error, ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. }), "{error}");
     }
 
     #[test]

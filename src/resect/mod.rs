@@ -1,14 +1,18 @@
 //! Cavity mask on post, resected-tissue mask on pre, subtraction.
 
+mod belief;
 mod blood;
 mod cavity;
 mod intensity;
+mod likeness;
 mod midline;
 mod pair;
 mod sag;
 
+pub use belief::{Doubt, Evidence};
 pub use cavity::{CavityFinding, CavityPair, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
 pub use intensity::on_the_scale_of;
+pub use likeness::{Likeness, likeness};
 pub use midline::midline_shift_mm;
 pub use pair::{GivenMasks, OperatedBrain, PairError, PairSettings, take_pair_apart};
 pub use sag::{SagScans, fit_sag, moved_scan};

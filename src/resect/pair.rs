@@ -4,15 +4,17 @@ use super::blood::{SaggedPair, with_blood};
 use super::cavity::both;
 use super::sag::{SagScans, fit_sag};
 use super::{
-    CavityFinding, CavityPair, CavitySettings, ResectError, apart_from, find_cavity, on_the_scale_of, subtract,
+    CavityFinding, CavityPair, CavitySettings, Likeness, ResectError, apart_from, find_cavity, likeness,
+    on_the_scale_of, subtract,
 };
 use crate::geometry::{Mni, Post, Pre, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings};
+use crate::segment::native::labels_on;
 use crate::segment::{
-    HeadError, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, label, segment_head,
-    segment_with_priors,
+    HeadError, Scale, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, fit_template_to_labels,
+    label, segment_by_labels, segment_head, segment_with_priors,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -64,6 +66,9 @@ impl Default for PairSettings {
 /// Masks the user brings, on the template's grid but for brain and ventricle; they win over the computed ones.
 #[derive(Clone, Debug, Default)]
 pub struct GivenMasks {
+    /// Labels of the pre-operative scan, on any grid of its frame: nothing is segmented then, and the scans may have
+    /// another contrast than T1.
+    pub labels: Option<LabelMap<Pre>>,
     /// The brain on the pre-operative scan.
     pub brain: Option<Mask<Pre>>,
     /// Lateral and third ventricles on the pre-operative scan.
@@ -77,6 +82,8 @@ pub struct GivenMasks {
 /// Both scans with their labels and what the operation took.
 #[derive(Clone, Debug)]
 pub struct OperatedBrain {
+    /// How alike the folds of the scans are; `None` where too little is seen in both.
+    pub likeness: Option<Likeness>,
     /// The pre-operative scan.
     pub pre: Segmentation<Pre>,
     /// The post-operative scan.
@@ -96,6 +103,16 @@ pub struct OperatedBrain {
 /// Why a pair could not be taken apart.
 #[derive(Debug, Error)]
 pub enum PairError {
+    /// Two heads, or one that does not lie on itself.
+    #[error(
+        "the two scans do not show one person: once one lies on the other their folds correlate by {folds:.2} (one head: .9 \
+         and more, two heads: .7 and less); check that both files are of this patient; if they are, the registration failed: \
+         look at both images together, or give a cavity mask to go on all the same"
+    )]
+    NotOnePerson {
+        /// See [`Likeness::folds`].
+        folds: f64,
+    },
     /// A scan cannot be taken apart, or the brain of one not be found in the other.
     #[error("{scan}: {source}")]
     Head {
@@ -139,22 +156,39 @@ pub fn take_pair_apart(
     let mni_from_post = pre_from_post.then(mni_from_pre);
     let grid = atlas::template().grid();
 
+    let likeness = likeness(pre, post, mni_from_pre, &mni_from_post);
+    let by_hand = given.cavity.is_some() || given.resected.is_some();
+    if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
+        return Err(PairError::NotOnePerson { folds: found.folds });
+    }
+
     step("pre-operative tissue");
     let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
-    let (before, pre_fit) = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment)
-        .map_err(|source| PairError::Head { scan: "the pre-operative scan", source })?;
+    let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
+    let (before, pre_fit, scale) = if let Some(labels) = &given.labels {
+        let (before, scale) = segment_by_labels(pre, mni_from_pre, labels);
+        let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
+        (before, fit, scale)
+    } else {
+        let head = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment);
+        let (before, fit) = head.map_err(in_pre)?;
+        (before, fit, Scale { turned_at: None })
+    };
 
     step("cavity");
     let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
     let by_hand = subtract(given.cavity.clone(), given.resected.clone(), &before.brain_mni, &before.labels_mni)?;
     let tissue = tissue_of(&before.labels_mni);
     let known_tissue = both(&tissue, &post_on_mni.inside);
+    // Ratios of gain are those of the scans as they are; turning back is turning again.
+    let as_scanned = before.t1_mni.map(|x| scale.of(x));
     let post_t1 = on_the_scale_of(
-        &before.t1_mni,
+        &as_scanned,
         &post_on_mni.volume.map(|x| x.max(0.0)),
         &known_tissue,
         settings.cavity.bias_sigma_mm,
     );
+    let post_t1 = if scale.turned_at.is_some() { post_t1.map(|x| scale.of(x)) } else { post_t1 };
     let computed = by_hand.is_none();
     let mut finding = if let Some(finding) = by_hand {
         finding
@@ -166,6 +200,8 @@ pub fn take_pair_apart(
             post: &post_t1,
             post_known: &post_on_mni.inside,
             csf_grey_border: before.csf_grey_border,
+            grey_mean: before.tissue_means[1],
+            grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
         };
         find_cavity(&pair, &settings.cavity)?
     };
@@ -205,15 +241,31 @@ pub fn take_pair_apart(
 
     step("post-operative tissue");
     let post_priors = carried_priors(|p| pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
-    let after =
+    let [fluid, grey, white] = before.tissue_means;
+    let as_in_t1 = scale.turned_at.is_none() && fluid < grey && grey < white;
+    let after = if given.labels.is_some() && !as_in_t1 {
+        // Without T1's contrast nothing is known of the tissue after the operation but where it went.
+        let moved = labels_through(&before.labels_mni, &sag);
+        segment_by_labels(post, &mni_from_post, &labels_on(&moved, &post.grid, &mni_from_post)).0
+    } else {
         segment_with_priors(post, &mni_from_post, &post_priors, &SegmentOverrides::default(), &settings.segment)
-            .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?;
+            .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
+    };
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);
     }
     let post_brain = apart_from(&after.brain_mni, &finding.cavity, 0.0);
-    Ok(OperatedBrain { pre: before, post: after, finding, template: pre_fit, sag, post_ventricle, post_brain })
+    Ok(OperatedBrain {
+        likeness,
+        pre: before,
+        post: after,
+        finding,
+        template: pre_fit,
+        sag,
+        post_ventricle,
+        post_brain,
+    })
 }
 
 /// What lies further from the cavity than this has no part in it, mm: more than any brain sags, and more than the windows
@@ -226,6 +278,15 @@ fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {
     mask.bounding_box().map_or(whole, |found| found.grown(&mask.grid, margin_mm))
 }
 
+/// The labels where the tissue is after the operation.
+fn labels_through(labels: &LabelMap<Mni>, sag: &AtlasFit<Mni>) -> LabelMap<Mni> {
+    let grid = labels.grid;
+    Volume::from_fn(grid, |n| {
+        let p = grid.position(grid.voxel(n).map(|v| v as f64).into());
+        labels.nearest(sag.atlas_from_subject.apply(p)).unwrap_or(label::BACKGROUND)
+    })
+}
+
 /// The tissue that filled the cavity: what lies there once the sag is undone.
 fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
     let near = around(cavity, NEAR_MM);
@@ -236,5 +297,5 @@ fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {
-    labels.map(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
+    labels.map(label::is_tissue)
 }

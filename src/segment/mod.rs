@@ -6,7 +6,8 @@ mod atlas_labels;
 mod bias;
 mod brain;
 mod carried;
-pub mod label;
+mod import;
+mod labelled;
 mod mixture;
 pub mod native;
 mod priors;
@@ -14,9 +15,12 @@ mod segmentation;
 mod sulci;
 mod ventricle;
 
+pub use crate::anatomy::label;
 pub use bias::LogBias;
 pub use brain::BrainSettings;
 pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};
+pub use import::{ImportError, ImportedLabels, import_labels};
+pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
 pub use priors::AtlasPriors;
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,

@@ -1,9 +1,9 @@
 //! No stale answer: what is in a folder is checked against the stages it was made from, and what an earlier state has left
 //! behind is taken away.
 
-use super::case::{Case, CaseError};
-use super::error::WorkflowError;
-use super::plan::{StageName, Subject};
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
+use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Reason, sha256_hex};
 use crate::layout;
 use serde::{Deserialize, Serialize};

@@ -1,15 +1,15 @@
 //! The files a user gives: two scans and masks of their own.
 
-use super::error::WorkflowError;
+use super::error::{InputError, LabelMapError, MaskRole, WorkflowError};
+use super::labels::labels_of_tool;
 use super::work::Work;
 use crate::artefact::sha256_hex;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
-use crate::image::nifti::{self, ReadOptions};
-use crate::image::{Grid, Mask, Volume};
+use crate::image::nifti::{self, ReadOptions, encode_u8};
+use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::register::transform_text::rigid_from_text;
 use crate::segment::native::mask_on;
-use std::fmt;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// A pair of scans, and masks that win over the computed ones.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +18,13 @@ pub struct Inputs {
     pub pre: PathBuf,
     /// The post-operative T1.
     pub post: PathBuf,
+    /// A label map of the pre-operative scan, as another tool wrote it: wins over the computed labels.
+    pub dseg: Option<PathBuf>,
+    /// Whose numbers it holds: a built-in table or a .tsv file; `None` finds out.
+    pub labels: Option<String>,
+    /// The pose of the pre-operative scan in the MNI frame by hand: a rigid transform as 4x4 text (RAS, mm, maps a point of the
+    /// scan) or ITK's.
+    pub pose: Option<PathBuf>,
     /// The brain, in the pre-operative scan's grid.
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles before the operation, in the grid of either scan.
@@ -33,63 +40,6 @@ impl Inputs {
     pub fn pair(pre: impl Into<PathBuf>, post: impl Into<PathBuf>) -> Self {
         Self { pre: pre.into(), post: post.into(), ..Self::default() }
     }
-}
-
-/// A mask of the user's own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MaskRole {
-    /// The brain.
-    Brain,
-    /// Lateral and third ventricles.
-    Ventricle,
-    /// The cavity.
-    Cavity,
-    /// The resected tissue.
-    Resected,
-}
-
-impl fmt::Display for MaskRole {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Brain => "brain mask",
-            Self::Ventricle => "ventricle mask",
-            Self::Cavity => "cavity mask",
-            Self::Resected => "resected mask",
-        })
-    }
-}
-
-/// Why a file that was given cannot be used.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum InputError {
-    #[error("{}: is a folder; name a file", path.display())]
-    Folder { path: PathBuf },
-    #[error("{}: cannot be read; check the path: {source}", path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
-    #[error("{}: not UTF-8 text; save the file as UTF-8", path.display())]
-    NotText { path: PathBuf },
-    #[error(
-        "{} and {}: the two files are the same; give the pre-operative scan first, the post-operative second",
-        pre.display(), post.display()
-    )]
-    SameFile { pre: PathBuf, post: PathBuf },
-    #[error(
-        "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery: give another file",
-        pre.display(), post.display()
-    )]
-    SameVoxels { pre: PathBuf, post: PathBuf },
-    #[error(
-        "{role} {name}: its grid ({} voxels) is that of neither scan (pre-operative {}, post-operative {}){}; resample \
-         the mask onto one of them",
-        size(*found), size(*pre), size(*post),
-        if [pre, post].contains(&found) { ": it lies elsewhere" } else { "" }
-    )]
-    MaskGrid { role: MaskRole, name: String, found: [usize; 3], pre: [usize; 3], post: [usize; 3] },
-}
-
-fn size([x, y, z]: [usize; 3]) -> String {
-    format!("{x} x {y} x {z}")
 }
 
 /// A file the user named, whole.
@@ -162,6 +112,8 @@ impl Scans {
 /// The user's own masks with the bytes of their files.
 #[derive(Debug)]
 pub(crate) struct OwnMasks {
+    pub pose: Option<(RigidTransform<Pre, Mni>, Vec<u8>)>,
+    pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: Option<(GivenMask, Vec<u8>)>,
     pub ventricle: Option<(GivenMask, Vec<u8>)>,
     pub cavity: Option<(GivenMask, Vec<u8>)>,
@@ -174,12 +126,25 @@ impl OwnMasks {
         let read = |role: MaskRole, path: &Option<PathBuf>| {
             path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
         };
+        let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), scans, work));
+        let pose = inputs.pose.as_deref().map(|path| -> Result<_, WorkflowError> {
+            let text = read_text(path)?;
+            Ok((rigid_from_text(&text, &shown(path))?, text.into_bytes()))
+        });
         Ok(Self {
+            pose: pose.transpose()?,
+            labels: labels.transpose()?,
             brain: read(MaskRole::Brain, &inputs.brain_mask)?,
             ventricle: read(MaskRole::Ventricle, &inputs.ventricle_mask)?,
             cavity: read(MaskRole::Cavity, &inputs.cavity_mask)?,
             resected: read(MaskRole::Resected, &inputs.resected_mask)?,
         })
+    }
+
+    /// What says where the pre-operative scan lies, by role.
+    pub fn posing(&self) -> impl Iterator<Item = (MaskRole, &[u8])> {
+        let pose = self.pose.as_ref().map(|(_, bytes)| (MaskRole::Pose, bytes.as_slice()));
+        pose.into_iter().chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
 
     /// Those that were given, by role.
@@ -190,8 +155,37 @@ impl OwnMasks {
             (MaskRole::Cavity, &self.cavity),
             (MaskRole::Resected, &self.resected),
         ];
-        masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())))
+        let masks =
+            masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())));
+        masks.chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
+}
+
+/// Reads a label map of the pre-operative scan. Another grid in the scanner's coordinates will do: FreeSurfer and SynthSeg
+/// write their own.
+fn given_labels(
+    path: &Path,
+    whose: Option<&str>,
+    scans: &Scans,
+    work: &Work<'_>,
+) -> Result<(LabelMap<Pre>, Vec<u8>), WorkflowError> {
+    /// A map of this scan lies in its field of view, but for a rim.
+    const LEAST_PERCENT: f64 = 90.0;
+    let labels = work.tell(|p| labels_of_tool(path, whose, &work.settings.image, p))?;
+    let labels: LabelMap<Pre> = labels.relabelled();
+    let labelled = (0..labels.data.len()).filter(|&n| labels.data[n] > 0).step_by(7);
+    let (mut seen, mut all) = (0.0, 0.0);
+    for n in labelled {
+        let p = labels.grid.position(labels.grid.voxel(n).map(|v| v as f64).into());
+        all += 1.0;
+        seen += f64::from(u8::from(scans.pre.nearest(p).is_some()));
+    }
+    let percent = 100.0 * seen / f64::max(all, 1.0);
+    if percent < LEAST_PERCENT {
+        return Err(LabelMapError::Elsewhere { name: shown(path), percent }.into());
+    }
+    let bytes = encode_u8(&labels);
+    Ok((labels, bytes))
 }
 
 /// A mask in the frame of the scan whose grid it has.

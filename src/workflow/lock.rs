@@ -1,7 +1,6 @@
 //! One job at a time in a folder; the parts of a sweep may work side by side.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
 use crate::artefact::WriteError;
 use crate::layout;
 use std::fs::{File, OpenOptions, TryLockError};

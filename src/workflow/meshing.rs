@@ -1,7 +1,8 @@
 //! A label map in a file to a mesh in a file, with its boundary sets where it is in MNI space.
 
-use super::error::WorkflowError;
-use super::inputs::{InputError, read_input};
+use super::error::{MeshFileError, WorkflowError};
+use super::inputs::read_input;
+use super::labels::any_labels;
 use super::programs::Programs;
 use super::progress::Progress;
 use super::settings::Settings;
@@ -20,10 +21,9 @@ use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
@@ -31,8 +31,10 @@ const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
 /// The files of a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct MeshFiles {
-    /// Label map (NIfTI).
+    /// Label map (NIfTI, .mgz or .mgh).
     pub labels: PathBuf,
+    /// Whose numbers it holds: a built-in table or a .tsv file; `None` finds out.
+    pub numbers: Option<String>,
     /// Where to write: .vtu, .msh (gmsh 4.1), .inp (Abaqus) or .feb (FEBio).
     pub output: PathBuf,
     /// Whether the labels are in MNI space, which boundary sets and the sheet of the falx need; what the file says where it
@@ -60,20 +62,6 @@ pub struct MeshedFile {
     pub refused: Vec<String>,
 }
 
-/// Why a label map in a file cannot be meshed.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum MeshFileError {
-    #[error("{}: the name of a mesh ends in .vtu, .msh, .inp or .feb", output.display())]
-    Output { output: PathBuf },
-    #[error("{file}: {source}")]
-    Format { file: String, source: WriteError },
-    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
-    Noted { file: String },
-    #[error(transparent)]
-    Input(#[from] InputError),
-}
-
 /// Meshes a label map, or skips what is there. A mesh whose sets are not to be believed is written all the same
 /// ([`MeshedFile::refused`]).
 ///
@@ -95,10 +83,7 @@ pub fn mesh_file(
     let (mut posed, tags, programs) = (settings.mesh.clone(), &settings.tag, programs.engines());
     let refused = |source| WorkflowError::Engine { labels: name.clone(), source };
     programs.check(posed.engine).map_err(refused)?;
-    let (labels, odd) = nifti::decode_labels(&bytes, &name, &settings.image)?;
-    for what in &odd {
-        progress.odd(&name, what);
-    }
+    let labels = any_labels(&bytes, &name, files.numbers.as_deref(), &settings.image, progress)?;
     let in_mni = files.in_mni.unwrap_or_else(|| name.contains("space-MNI") || nifti::says_mni(&bytes));
     if in_mni && tags.falx && posed.split.is_none() {
         posed.split = Some(falx_sheet());
@@ -108,7 +93,11 @@ pub fn mesh_file(
     let file = files.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let frame = if in_mni { "MNI" } else { "native" };
     let stage = Stage::new(&format!("mesh-{file}"), VERSION, &folder, &(&posed, in_mni.then_some(tags)));
-    let stage = stage.input("labels", &bytes).frame(frame);
+    let mut stage = stage.input("labels", &bytes).frame(frame);
+    if files.numbers.is_some() {
+        // What a table of the user's own makes of the file.
+        stage = stage.input("label numbers", &nifti::encode_u8(&labels));
+    }
     // Pictures and surfaces are made from the mesh at hand, so asking for them is asking for the mesh.
     let force = force || files.preview.is_some() || files.surfaces.is_some();
     let outcome = stage.run(force, || {

@@ -22,8 +22,12 @@
 
 mod case;
 mod error;
+mod estimate_options;
+mod facts;
 mod fresh;
+mod generative;
 mod inputs;
+mod labels;
 mod lock;
 mod meshing;
 mod outcome;
@@ -32,25 +36,36 @@ mod phantom;
 mod plan;
 mod programs;
 mod progress;
+mod refusal;
 mod settings;
 mod simulation;
+mod stage_name;
 mod stages;
+mod synthetic;
 mod why;
 mod work;
 
 pub mod cohort;
 
-pub use case::{Case, CaseError};
-pub use error::{ErrorKind, WorkflowError};
-pub use inputs::{InputError, Inputs, MaskRole, ScanSums, read_input, read_text, shown};
-pub use meshing::{MeshFileError, MeshFiles, MeshedFile, mesh_file};
+pub use case::Case;
+pub use error::{
+    CaseError, ErrorKind, InputError, LabelMapError, MaskRole, MeshFileError, SimulationError, WorkflowError,
+};
+pub use estimate_options::{EstimateOptions, Observed};
+pub use facts::{EstimateFacts, MeshFacts};
+pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
+pub use inputs::{Inputs, ScanSums, read_input, read_text, shown};
+pub use labels::{any_labels, labels_of_tool};
+pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
-pub use plan::{Goal, StageName, Step, Subject, plan, samples, tissues};
+pub use plan::{Goal, Step, plan, samples, tissues};
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
-pub use simulation::{Simulation, SimulationError, SimulationFiles, simulate};
-pub use stages::{AnatFacts, EstimateFacts, EstimateOptions, MeshFacts, Observed, RegistrationFacts, mesh_outcome};
+pub use simulation::{Simulation, SimulationFiles, simulate};
+pub use stage_name::{StageName, Subject};
+pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
+pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::error::WorkflowError;
+use super::facts::EstimateFacts;
 use super::fresh::{GATHERED, Provenance, StageRecord};
-use super::stages::EstimateFacts;
 use super::work::Work;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
@@ -19,6 +19,10 @@ pub(crate) fn finish(
     write_whole(&work.case.path(layout::OUTCOME), outcome.to_json(layout::OUTCOME)?.as_bytes())?;
     write_whole(&work.case.path(layout::SAMPLES_TABLE), samples_table(outcome).as_bytes())?;
     keep_settings(work)?;
+    if outcome.answer.is_none() {
+        // Of an earlier state of the folder.
+        std::fs::remove_file(work.case.path(layout::REFUSED_PICTURE)).ok();
+    }
     write_whole(&work.case.path(layout::PROVENANCE), provenance(&work.case, manifests)?.as_bytes())?;
     write_page(&work.case)
 }

@@ -1,13 +1,13 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
-use super::plan::{self, StageName};
-use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, MeshFacts, RegistrationFacts, SampleMode, SeenShift, Sweep,
-};
+use super::plan;
+use super::refusal;
+use super::stage_name::StageName;
+use super::stages::{self, AnatFacts, Anatomy, EstimateInput, RegistrationFacts, SampleMode, SeenShift, Sweep};
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
 use crate::experiment::observed::ObservedSurfaces;
@@ -18,6 +18,7 @@ use crate::fem::Scenario;
 use crate::layout::REST_MESH;
 use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// A part of a sweep's samples (see [`shard`]).
@@ -56,9 +57,20 @@ impl Images {
         check_scans(work, &scans.sums)?;
         keep_settings(work)?;
         let mut made = Made::default();
-        let registration = stages::registration(work, &mut made, &scans)?;
-        let anat = stages::anat(work, &mut made, &scans, &own)?;
-        Ok(Self { made, registration, anat })
+        let registration = match stages::registration(work, &mut made, &scans, &own) {
+            Ok(registration) => registration,
+            Err(error) => {
+                refusal::keep(work, &scans, "registration", &[], &error)?;
+                return Err(error);
+            }
+        };
+        match stages::anat(work, &mut made, &scans, &own) {
+            Ok(anat) => Ok(Self { made, registration, anat }),
+            Err(error) => {
+                refusal::keep(work, &scans, "anat", &in_order(&made, &[StageName::Registration]), &error)?;
+                Err(error)
+            }
+        }
     }
 
     /// Their manifests.
@@ -125,7 +137,7 @@ impl Prepared {
         let (registered, registration): (Manifest, RegistrationFacts) = case.stage(&StageName::Registration)?;
         let sum = |role: &str| registered.inputs.get(role).cloned().unwrap_or_default();
         let sums = ScanSums { pre: sum("pre"), post: sum("post") };
-        is_present(work, &stages::registration_stage(work, &sums))?;
+        is_present(work, &stages::registration_stage(work, &sums).own_masks_of(&registered))?;
         made.add(StageName::Registration, registered);
         let (segmented, anat): (Manifest, AnatFacts) = case.stage(&StageName::Anat)?;
         is_present(work, &stages::anat_stage(work, &made, &sums).own_masks_of(&segmented))?;
@@ -171,6 +183,8 @@ pub(crate) struct Patient<'w, 'a> {
     prepared: Prepared,
     /// Loads and supports; the materials are the samples'.
     scenario: Scenario,
+    /// Shear moduli of tissues that are not varied, Pa.
+    held: BTreeMap<String, f64>,
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
@@ -185,10 +199,11 @@ impl<'w, 'a> Patient<'w, 'a> {
         let anatomy = Anatomy::read(&work.case)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let (scenario, held) = stages::with_held_tissues(work, &prepared.mesh.mesh, scenario)?;
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        Ok(Self { work, prepared, scenario, mesh, mesh_bytes, reference })
+        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference })
     }
 
     fn floor(&self) -> NoiseFloor {
@@ -275,6 +290,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             rest_surface_distance_mm: rest.surface_distance_mm,
             noise_floor: Some(self.floor()),
             loads: vec![loads],
+            held_shear_modulus_pa: self.held.clone(),
             ..self.prepared.outcome()
         }
     }

@@ -1,11 +1,12 @@
 //! A phantom's case: known moduli go in and must come out.
 
-use super::case::CaseError;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::outcome::{finish, keep_settings, with_estimate};
 use super::patient::is_present;
-use super::plan::{self, StageName};
-use super::stages::{self, EstimateInput, MeshFacts, SampleMode, Sweep};
+use super::plan;
+use super::stage_name::StageName;
+use super::stages::{self, EstimateInput, SampleMode, Sweep};
 use super::work::{Made, Work};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};

@@ -1,6 +1,6 @@
 //! How a job tells whoever started it what it is doing.
 
-use super::plan::StageName;
+use super::stage_name::StageName;
 use crate::artefact::Reason;
 
 /// Listens to a job. Every method may be left out.
@@ -18,6 +18,8 @@ pub trait Progress {
     fn stage(&mut self, ended: &StageEnded<'_>) {}
     /// Something odd about a file that was given.
     fn odd(&mut self, file: &str, what: &str) {}
+    /// What a file that was given was taken for.
+    fn noted(&mut self, what: &str) {}
     /// What only somebody looking for a fault wants to know.
     fn detail(&mut self, of: &str, what: &str) {}
 }

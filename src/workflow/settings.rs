@@ -1,7 +1,7 @@
 //! Every setting of the program, a table for each room, resolved once: the defaults, over them the case's own, over those
 //! a settings file, over that the command line.
 
-use super::stages::EstimateOptions;
+use super::estimate_options::EstimateOptions;
 use crate::experiment::phantom::PhantomSettings;
 use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;

@@ -1,21 +1,20 @@
 //! One deformation, or one motion, of a mesh in a file by the scenario in another.
 
-use super::error::WorkflowError;
-use super::inputs::{InputError, read_input, read_text};
+use super::error::{SimulationError, WorkflowError};
+use super::inputs::{read_input, read_text};
 use super::progress::Progress;
 use super::settings::in_words;
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
-    self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
+    self, ContactOutcome, ConvergenceRecord, ElementKind, Method, Motion, Outcome, Scenario, simulate_from,
 };
 use crate::mesh::TetMesh;
-use crate::mesh::format::{Field, ReadError, WriteError, msh, pvd, vtu};
+use crate::mesh::format::{Field, msh, pvd, vtu};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Raised when the solver's code changes its results.
 const VERSION: u32 = 1;
@@ -33,36 +32,6 @@ pub struct SimulationFiles {
     pub start: Option<PathBuf>,
     /// A result to compare with.
     pub reference: Option<PathBuf>,
-}
-
-/// Why a mesh in a file cannot be simulated.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum SimulationError {
-    #[error("{}: the name of a deformed state ends in .vtu", output.display())]
-    Output { output: PathBuf },
-    #[error("{name}: the name of a mesh ends in .vtu or .msh; convert the file first, for example with meshio")]
-    MeshName { name: String },
-    #[error("{name}: {reason}")]
-    Scenario { name: String, reason: String },
-    #[error("a motion (`method = \"backward-euler\"`) starts at rest: it takes no state to start from")]
-    StartOfMotion,
-    #[error("{name}: no point array `displacement` of three components; give the result of a simulation")]
-    NoDisplacement { name: String },
-    #[error("{name}: has {found} nodes, the mesh {nodes}: give a result on the same mesh")]
-    OtherMesh { name: String, found: usize, nodes: usize },
-    #[error("{names}: {source}")]
-    Fem { names: String, source: FemError },
-    #[error("{name}: {source}")]
-    Format { name: String, source: WriteError },
-    #[error("`{field}` is not a finite number everywhere: the result is not written")]
-    NotFinite { field: String },
-    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
-    Noted { file: String },
-    #[error(transparent)]
-    Input(#[from] InputError),
-    #[error(transparent)]
-    Mesh(#[from] ReadError),
 }
 
 /// What a simulation has found, as its manifest keeps it.

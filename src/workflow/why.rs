@@ -2,9 +2,11 @@
 
 use super::case::Case;
 use super::error::WorkflowError;
+use super::facts::MeshFacts;
 use super::inputs::{ScanSums, read_input};
-use super::plan::{self, Goal, StageName, Subject, plan};
+use super::plan::{self, Goal, plan};
 use super::progress::Silent;
+use super::stage_name::{StageName, Subject};
 use super::stages;
 use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, Reason, Stage, sha256_hex};
@@ -84,11 +86,20 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     if resection.needs_labels() {
         scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.labels)?;
     }
+    if let Ok((_, mesh)) = work.case.stage::<MeshFacts>(&StageName::Mesh) {
+        (scenario, _) = stages::with_held_tissues(work, &mesh.mesh, scenario)?;
+    }
     let tissues = plan::tissues(work.settings, work.subject);
     let samples = if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject)? } else { Vec::new() };
     let pose = |step: &plan::Step| -> Option<Stage> {
         match &step.stage {
-            StageName::Registration => Some(stages::registration_stage(work, &sums)),
+            StageName::Registration => {
+                let stage = stages::registration_stage(work, &sums);
+                Some(match made.get(&StageName::Registration) {
+                    Some(earlier) => stage.own_masks_of(earlier),
+                    None => stage,
+                })
+            }
             StageName::Anat => Some(stages::anat_stage(work, &made, &sums).own_masks_of(made.get(&StageName::Anat)?)),
             StageName::Mesh => Some(stages::mesh_stage(work, &made).0),
             StageName::Reference => Some(stages::reference_stage(work, &made)),

@@ -1,12 +1,12 @@
 //! What the stages of one job share: the folder, the settings, the machine's programs, whoever listens.
 
-use super::case::{Case, CaseError};
-use super::error::WorkflowError;
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
 use super::lock::Lock;
-use super::plan::{StageName, Subject};
 use super::programs::Programs;
 use super::progress::{Progress, StageEnded};
 use super::settings::Settings;
+use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Produced, Stage, StageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -97,8 +97,8 @@ impl<'a> Work<'a> {
     }
 
     /// Tells whoever listens.
-    pub fn tell(&self, what: impl FnOnce(&mut dyn Progress)) {
-        what(&mut **self.progress.borrow_mut());
+    pub fn tell<T>(&self, what: impl FnOnce(&mut dyn Progress) -> T) -> T {
+        what(&mut **self.progress.borrow_mut())
     }
 
     /// Runs a stage, or skips it, and adds its manifest to those that are there; returns its figures.

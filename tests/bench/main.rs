@@ -17,6 +17,7 @@ mod job;
 mod kills;
 mod material;
 mod mesh;
+mod pairs;
 mod patients;
 #[path = "../it/python.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
@@ -39,6 +40,7 @@ fn main() {
         ("fem", fem::bars),
         ("contact", contact::bars),
         ("experiment", experiment::bars),
+        ("pairs", pairs::bars),
         ("patients", patients::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),

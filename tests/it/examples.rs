@@ -1,5 +1,7 @@
 //! The examples, as they stand, do what they say.
 
+#[path = "../../examples/add_a_law.rs"]
+mod add_a_law;
 #[path = "../../examples/pair_to_report.rs"]
 mod pair_to_report;
 #[path = "../../examples/sample_prior.rs"]
@@ -21,6 +23,13 @@ fn slow_a_pair_becomes_a_case_whose_numbers_can_be_read() {
 fn a_mesh_sinks_under_its_weight() {
     let largest_mm = simulate_mesh::run().unwrap();
     assert!((0.1..20.0).contains(&largest_mm), "{largest_mm}");
+}
+
+#[test]
+fn a_law_of_ones_own_is_simulated_like_the_houses() {
+    let [neo_hookean, the_same, stiffening] = add_a_law::run().unwrap();
+    assert!((the_same / neo_hookean - 1.0).abs() < 1e-6, "{the_same} {neo_hookean}");
+    assert!(stiffening < 0.99 * neo_hookean, "{stiffening} {neo_hookean}");
 }
 
 #[test]

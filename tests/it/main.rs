@@ -11,6 +11,7 @@ mod doubtful_inputs;
 mod examples;
 mod fem;
 mod job;
+mod label_maps;
 mod made;
 mod material;
 mod mesh_engines;

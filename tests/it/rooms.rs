@@ -7,6 +7,7 @@ use std::path::Path;
 /// room -> rooms it may import, in the order the data flows.
 fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
     let all = [
+        "anatomy",
         "geometry",
         "artefact",
         "image",
@@ -23,23 +24,24 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "workflow",
     ];
     BTreeMap::from([
+        ("anatomy", vec![]),
         ("geometry", vec![]),
         ("artefact", vec![]),
         ("image", vec!["geometry", "artefact"]),
         ("register", vec!["geometry", "image"]),
-        ("segment", vec!["geometry", "image", "register"]),
+        ("segment", vec!["anatomy", "geometry", "image", "register"]),
         ("resect", vec!["geometry", "image", "register", "segment"]),
         ("mesh", vec!["geometry", "image", "segment", "artefact"]),
         ("tag", vec!["geometry", "segment", "mesh"]),
         ("material", vec!["artefact"]),
         ("fem", vec!["geometry", "mesh", "material"]),
-        ("experiment", all[..10].to_vec()),
+        ("experiment", all[..11].to_vec()),
         ("layout", vec!["geometry"]),
         (
             "report",
             vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment", "layout"],
         ),
-        ("workflow", all[..13].to_vec()),
+        ("workflow", all[..14].to_vec()),
         ("cli", all.to_vec()),
     ])
 }

@@ -10,8 +10,6 @@ const SETTINGS: &str = "\
 sd_levels = [0.0]
 [prior]
 study = \"mre\"
-[anat.sag]
-iterations = [20, 10, 5]
 ";
 
 fn json(arguments: &[&str]) -> Value {

@@ -1,6 +1,6 @@
 //! The group level: every subject's numbers in one table and one page.
 
-use super::Args;
+use super::options::Args;
 use crate::artefact::write_whole;
 use crate::cli::{Failure, Session};
 use crate::report::cohort::{Cohort, Member};

@@ -1,8 +1,8 @@
 //! The participant level: each subject through the same code as `hgm run`, then its files under BIDS names.
 
-use super::Args;
+use super::options::Args;
 use crate::artefact::write_whole;
-use crate::cli::failure::in_one_line;
+use crate::cli::failure::{Answered, in_one_line};
 use crate::cli::{Failure, Session, run};
 use crate::report::cohort::Status;
 use crate::workflow::Settings;
@@ -75,7 +75,10 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
                 write_whole(&log, log_bytes.as_bytes())?;
                 let (kind, error) = failure.parts();
                 eprintln!("hgm: {kind}: {subject}: {}", in_one_line(error));
-                if matches!(failure, Failure::QualityGate(_)) { Status::QualityGate } else { Status::Failed }
+                match failure {
+                    Failure::QualityGate(e) => Status::of(e.downcast_ref::<Answered>().map(|a| a.answer)),
+                    _ => Status::Failed,
+                }
             }
         };
         let failed = status == Status::Failed;

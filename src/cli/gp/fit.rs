@@ -1,11 +1,9 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
-use super::{StudyOptions, VERSION, facts};
-use crate::artefact::{Produced, Stage};
+use super::options::StudyOptions;
 use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
-use crate::material::gp::{Hyperparameters, fit_hyperparameters, negative_log_likelihood};
-use crate::material::training::TrainingData;
+use crate::workflow::fit_gp;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -36,26 +34,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut settings = session.settings(flags)?.gp;
     settings.finalists = settings.finalists.min(settings.starts.max(1));
     let studies = args.studies.read()?;
-    let stage = Stage::new("gp-fit", VERSION, &args.output, &(&settings, studies.curves)).seed(settings.seed);
-    let outcome = studies.input(stage).run(session.options.force, || {
-        let data = TrainingData::from_literature(&studies.models, studies.curves);
-        let fit = fit_hyperparameters(&data, &settings)?;
-        let facts = json!({
-            "negative_log_likelihood": fit.negative_log_likelihood,
-            "negative_log_likelihood_of_published_hyperparameters":
-                negative_log_likelihood(&Hyperparameters::published(), &data),
-            "gradient_norm": fit.gradient_norm,
-            "lengthscale": fit.hyperparameters.lengthscale,
-            "studies": studies.models.len(),
-            "observations": data.observations(),
-            "unique_inputs": data.inputs().len(),
-            "starts": fit.starts,
-        });
-        let files = vec![("hyperparameters.toml".to_owned(), fit.hyperparameters.to_toml().into_bytes())];
-        Ok::<_, crate::material::gp::FitRefusal>(Produced { files, facts, ..Produced::default() })
-    });
-    let facts = facts(outcome)?;
-    let file = args.output.join("hyperparameters.toml").display().to_string();
+    let made = fit_gp(&studies, &settings, &args.output, session.options.force)?;
+    let (facts, file) = (made.facts, made.files[0].display().to_string());
     let figure = |name: &str| facts[name].as_f64().unwrap_or(f64::NAN);
     let text = format!(
         "{} observations of {} studies, rank {}\n\

@@ -1,14 +1,13 @@
 //! `hgm gp sample`: materials from the generative model.
 
-use super::{HyperparameterOptions, StudyOptions, VERSION, facts};
-use crate::artefact::{Produced, Stage};
+use super::options::{HyperparameterOptions, StudyOptions};
 use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
 use crate::material::Task;
-use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior, nine_levels, sample_prior};
+use crate::material::generative::{SampleSettings, nine_levels};
 use crate::material::gp::Spread;
-use crate::material::meta_model::{FitError, MetaModel};
-use crate::report::material_tables::{Sampled, curves_csv, materials_csv, posterior_csv, quantiles};
+use crate::material::meta_model::MetaModel;
+use crate::workflow::{Wanted, sample_gp};
 use anyhow::anyhow;
 use serde_json::json;
 use std::fmt::Write;
@@ -71,48 +70,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };
-    let seed = session.options.seed.unwrap_or(0);
-
-    let used = json!({
-        "task": args.task.to_string(), "law": args.law, "search": settings.meta_model, "curves": studies.curves,
-        "stretches": args.stretches, "levels": if args.draws.is_none() { levels.clone() } else { vec![] },
-        "draws": args.draws, "spread": args.spread, "write_curves": args.curves,
-        "hyperparameters": settings.hyperparameters.to_toml(),
-    });
-    let how = if args.draws.is_some() { "draws" } else { "samples" };
-    let name = format!("{how}-{}", args.task);
-    let stage = Stage::new(&format!("gp-{name}"), VERSION, &args.output, &used).seed(seed);
-    let outcome = studies.input(stage).run(session.options.force, || {
-        let joint = joint_tissue_prior(args.task, &studies.models, &settings);
-        let sampled: Vec<Sampled> = match args.draws {
-            None => sample_prior(&joint.prior, &levels, &settings)?
-                .into_iter()
-                .map(|m| Sampled { sd_level: Some(m.sd_level), draw: None, fit: m.fit })
-                .collect(),
-            Some(draws) => draw_materials(&joint, draws, seed, args.spread, &settings)?
-                .into_iter()
-                .map(|m| Sampled { sd_level: None, draw: Some(m.draw), fit: m.fit })
-                .collect(),
-        };
-        let mut files = vec![
-            (format!("{name}.csv"), materials_csv(&sampled, args.law).into_bytes()),
-            (format!("posterior-{}.csv", args.task), posterior_csv(&joint).into_bytes()),
-        ];
-        if let Some(draws) = args.draws.filter(|_| args.curves) {
-            files
-                .push((format!("curves-{}.csv", args.task), curves_csv(&joint, draws, seed, args.spread).into_bytes()));
-        }
-        let facts = json!({ "shear_modulus_pa": quantiles(&sampled), "materials": shown(&sampled) });
-        Ok::<_, FitError>(Produced { files, facts, ..Produced::default() })
-    });
-    let facts = facts(outcome)?;
-    let file = args.output.join(format!("{name}.csv")).display().to_string();
-    session.emit(&json!({ "file": file, "settings": used, "seed": seed, "result": facts }), &summary(&facts, &file))
-}
-
-/// All materials, or the first twenty of a long list: the rest is in the file.
-fn shown(sampled: &[Sampled]) -> Vec<&Sampled> {
-    sampled.iter().take(20).collect()
+    let wanted = match args.draws {
+        None => Wanted::Levels(levels),
+        Some(count) => Wanted::Draws { count, spread: args.spread, curves: args.curves },
+    };
+    let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
+    let made = sample_gp(&studies, args.task, &wanted, &settings, seed, place)?;
+    let (file, facts) = (made.files[0].display().to_string(), made.facts);
+    session.emit(
+        &json!({ "file": file, "settings": made.settings, "seed": seed, "result": facts }),
+        &summary(&facts, &file),
+    )
 }
 
 fn summary(facts: &serde_json::Value, file: &str) -> String {

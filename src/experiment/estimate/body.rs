@@ -318,7 +318,8 @@ fn materials(
     log_parameters: &[f64],
     poisson_ratio: f64,
 ) -> Result<Materials, BodyError> {
-    let mut materials = Materials::new();
+    // Tissues that are not estimated keep the template's.
+    let mut materials = template.materials.clone();
     for (unknown, log) in unknowns.iter().zip(log_parameters) {
         if let Unknown::ShearModulus(tissue) = unknown {
             for &label in &tissue.labels {

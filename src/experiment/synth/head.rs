@@ -20,6 +20,8 @@ use rayon::prelude::*;
 
 /// White matter in the head's units.
 pub const WHITE: f32 = 210.0;
+/// Grey matter in the head's units.
+pub const GREY: f32 = 146.0;
 /// Ventricular fluid in the head's units.
 pub const FLUID: f32 = 48.0;
 const MUSCLE: f64 = 92.0;
@@ -38,12 +40,19 @@ pub struct Head {
     pub labels: LabelMap<Mni>,
     /// Signed distance in mm from the inner surface of the skull, negative inside.
     pub skull_mm: Volume<f32, Mni>,
+    /// Where a point of the head lies in the template, roughly.
+    pub template_from_head: AffineTransform<Mni, Mni>,
+}
+
+/// Room for scalp, nose and neck.
+pub fn grid() -> Grid<Mni> {
+    Grid::axis_aligned([206, 262, 228], [1.0; 3], [-103.0, -146.0, -120.0])
 }
 
 /// The template's intensity made more like a scan's: an average of 152 heads has too bright fluid.
 fn contrast(template: f32) -> f32 {
     const CURVE: [(f32, f32); 6] =
-        [(0.0, 10.0), (55.0, 34.0), (82.0, FLUID), (169.0, 146.0), (215.0, WHITE), (255.0, 250.0)];
+        [(0.0, 10.0), (55.0, 34.0), (82.0, FLUID), (169.0, GREY), (215.0, WHITE), (255.0, 250.0)];
     let upper = CURVE.iter().position(|&(x, _)| template < x).unwrap_or(CURVE.len() - 1).max(1);
     let ((x0, y0), (x1, y1)) = (CURVE[upper - 1], CURVE[upper]);
     y0 + (y1 - y0) * (template - x0) / (x1 - x0)
@@ -207,8 +216,7 @@ fn below_skin(p: [f64; 3]) -> f64 {
 
 /// Builds the head of one patient: layer thickness and texture follow the seed.
 pub fn head_around(atlas: &Atlas, seed: u64) -> Head {
-    // Room for scalp, nose and neck.
-    let grid = Grid::<Mni>::axis_aligned([206, 262, 228], [1.0; 3], [-103.0, -146.0, -120.0]);
+    let grid = grid();
     let same = AffineTransform::identity();
     let labels = resample_nearest(&atlas.labels, &grid, &same, 0);
     let template = resample_nearest(&atlas.t1, &grid, &same, 0);
@@ -252,5 +260,5 @@ pub fn head_around(atlas: &Atlas, seed: u64) -> Head {
     let soft = gaussian(&sharp, 0.55);
     let data = sharp.data.iter().zip(&soft.data).zip(&brain.data);
     let t1 = data.map(|((&sharp, &soft), &brain)| if brain { sharp } else { soft }).collect();
-    Head { t1: Volume::from_data(grid, t1), labels, skull_mm }
+    Head { t1: Volume::from_data(grid, t1), labels, skull_mm, template_from_head: same }
 }

@@ -1,6 +1,6 @@
 //! A synthetic patient: a pre- and a post-operative scan and the truth behind them.
 //!
-//! The template's brain gets a head, a random anatomy and two poses; the front of one temporal lobe is taken out and the
+//! The template's brain gets a head, a random anatomy and two poses; part of a lobe is taken out and the
 //! brain sags. What is known exactly goes out beside the scans: the rigid transform, the masks, the displacement.
 
 mod enhancement;
@@ -8,24 +8,28 @@ mod field;
 mod files;
 mod frame;
 mod head;
+mod lobe;
 mod resection;
 mod sag;
 mod sag_fem;
 mod scan;
+mod scanned_head;
 mod settings;
 
 pub use frame::Patient;
+pub use head::Head;
+pub use lobe::Lobe;
 pub use settings::{Contrast, SagKind, SynthError, SynthSettings};
 
 use crate::experiment::smooth_noise::SmoothNoise;
-use crate::geometry::{Frame, Position, Post, Pre, RigidTransform};
+use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
 use enhancement::Enhancement;
 use field::{Field, in_template};
 use frame::centre;
-use head::{FLUID, Head};
+use head::FLUID;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use resection::Resection;
@@ -192,7 +196,20 @@ impl Content {
 /// [`SynthError`] for settings out of range, a lobe too small for the resection, or a finite-element sag that fails.
 pub fn synthesize(settings: &SynthSettings) -> Result<SyntheticPatient, SynthError> {
     settings.check()?;
-    let anatomy = operate(settings)?;
+    synthesize_on(head::head_around(atlas::template(), settings.seed), None, settings)
+}
+
+/// The same on another head; `taken`, in the head's frame, says what is taken out instead of part of a lobe.
+///
+/// # Errors
+/// As [`synthesize`]; also a mask without brain.
+pub fn synthesize_on(
+    head: Head,
+    taken: Option<&Mask<Mni>>,
+    settings: &SynthSettings,
+) -> Result<SyntheticPatient, SynthError> {
+    settings.check()?;
+    let anatomy = operate(head, taken, settings)?;
     let stream = |n| CounterRng::new(settings.seed, n);
     let (pre_rng, post_rng) = (stream(401), stream(402));
     let pre_from_patient = scan::pose::<Pre>(pre_rng, settings.rotation_deg, settings.translation_mm);
@@ -287,15 +304,18 @@ fn per_voxel<T: Copy + Send, F: Frame>(grid: Grid<F>, value: impl Fn(usize) -> T
 }
 
 /// Head, anatomy, resection and sag.
-fn operate(settings: &SynthSettings) -> Result<Anatomy, SynthError> {
-    let head = head::head_around(atlas::template(), settings.seed);
+fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> Result<Anatomy, SynthError> {
     let wide = Grid::<Patient>::axis_aligned([64, 72, 68], [4.0; 3], [-126.0, -160.0, -140.0]);
     let warp = field::random_anatomy(wide, settings.seed, settings.anatomy_mm);
     let brain_grid = Grid::<Patient>::axis_aligned([186, 234, 192], [1.0; 3], [-92.5, -134.5, -88.5]);
     let labels: LabelMap<Patient> = per_voxel(brain_grid, |n| {
         head.labels.nearest(in_template(&warp, centre(&brain_grid, n))).unwrap_or(label::BACKGROUND)
     });
-    let resection = resection::resect(&labels, &warp, settings)?;
+    let in_head = |p: Point3<f64>| in_template(&warp, p);
+    let resection = match taken {
+        Some(mask) => resection::resect_mask(&labels, in_head, mask)?,
+        None => resection::resect(&labels, |p| head.template_from_head.apply(in_head(p)), settings)?,
+    };
     let sag = match settings.sag {
         SagKind::None => None,
         SagKind::Smooth => Some(sag::smooth(&head, &warp, &resection, settings)),

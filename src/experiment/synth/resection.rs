@@ -1,17 +1,16 @@
-//! What the surgeon takes: the front of one temporal lobe.
+//! What the surgeon takes: part of a lobe, or what a mask says.
 
-use super::field::{Field, in_template};
 use super::frame::{Patient, centre};
 use super::settings::{SynthError, SynthSettings};
 use crate::experiment::smooth_noise::SmoothNoise;
-use crate::geometry::Position;
+use crate::geometry::{Mni, Position};
 use crate::image::components::{Connectivity, largest_component};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, open};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
-use crate::segment::atlas::{Side, temporal_lobe};
+use crate::segment::atlas::Side;
 use crate::segment::label;
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -32,13 +31,17 @@ impl Resection {
     }
 }
 
-/// Takes `resection_cc` from the temporal pole backwards, with an uneven wall; never the ventricle.
-pub fn resect(labels: &LabelMap<Patient>, anatomy: &Field, settings: &SynthSettings) -> Result<Resection, SynthError> {
+/// Takes `resection_cc` from where the surgeon of the lobe begins, with an uneven wall; never the ventricle.
+pub fn resect(
+    labels: &LabelMap<Patient>,
+    in_template: impl Fn(Point3<f64>) -> Position<Mni> + Sync,
+    settings: &SynthSettings,
+) -> Result<Resection, SynthError> {
     let grid = labels.grid;
     let noise = |stream, size_mm| SmoothNoise::new(CounterRng::new(settings.seed, stream), size_mm);
     let (wall, lobe_edge) = (noise(201, 16.0), noise(202, 24.0));
     let sign = if settings.side == Side::Left { -1.0 } else { 1.0 };
-    // How late a voxel would be taken: an elliptic distance from the temporal pole, uneven by a few mm.
+    // How late a voxel would be taken: uneven by a few mm.
     let order: Vec<f32> = (0..grid.len())
         .into_par_iter()
         .map(|n| {
@@ -46,14 +49,13 @@ pub fn resect(labels: &LabelMap<Patient>, anatomy: &Field, settings: &SynthSetti
             if !matches!(labels.data[n], label::CSF | label::GREY_MATTER | label::WHITE_MATTER) {
                 return f32::INFINITY;
             }
-            let q = in_template(anatomy, p).mm;
+            let at = in_template(p);
             let edge = 2.0 * lobe_edge.at(p.into());
-            let lobe = temporal_lobe(Position::new(q.x + sign * edge, q.y + edge, q.z + edge));
-            if lobe != Some(settings.side) {
+            let moved = Position::new(at.mm.x + sign * edge, at.mm.y + edge, at.mm.z + edge);
+            if !settings.lobe.holds(settings.side, moved) {
                 return f32::INFINITY;
             }
-            let from_pole = [(q.x - sign * 42.0) / 1.0, (q.y - 16.0) / 1.7, (q.z + 30.0) / 1.05];
-            (from_pole.iter().map(|d| d * d).sum::<f64>().sqrt() + 2.5 * wall.at(p.into())) as f32
+            (settings.lobe.order_mm(settings.side, at) + 2.5 * wall.at(p.into())) as f32
         })
         .collect();
     let mut lobe: Vec<f32> = order.iter().copied().filter(|o| o.is_finite()).collect();
@@ -62,12 +64,38 @@ pub fn resect(labels: &LabelMap<Patient>, anatomy: &Field, settings: &SynthSetti
     let lobe_cc = lobe.len() as f64 * voxel_cc;
     let wanted = (settings.resection_cc / voxel_cc) as usize;
     if lobe.is_empty() || settings.resection_cc > 0.8 * lobe_cc {
-        return Err(SynthError::LobeTooSmall { wanted_cc: settings.resection_cc, lobe_cc, side: settings.side });
+        return Err(SynthError::LobeTooSmall {
+            wanted_cc: settings.resection_cc,
+            lobe_cc,
+            side: settings.side,
+            lobe: settings.lobe,
+        });
     }
     let limit = lobe[wanted.min(lobe.len() - 1)];
     let taken = Mask::from_data(grid, order.iter().map(|&o| o < limit).collect());
     // A suction tip leaves neither threads nor islands.
-    let smooth = close(&open(&taken, 2.0), 3.0);
+    Ok(walled(labels, &close(&open(&taken, 2.0), 3.0)))
+}
+
+/// Takes what a mask of the head holds of the brain; never the ventricle.
+pub fn resect_mask(
+    labels: &LabelMap<Patient>,
+    in_head: impl Fn(Point3<f64>) -> Position<Mni> + Sync,
+    mask: &Mask<Mni>,
+) -> Result<Resection, SynthError> {
+    let grid = labels.grid;
+    let taken = Mask::from_fn(grid, |n| {
+        let brain = matches!(
+            labels.data[n],
+            label::CSF | label::GREY_MATTER | label::WHITE_MATTER | label::TUMOUR | label::OEDEMA
+        );
+        brain && mask.nearest(in_head(centre(&grid, n))) == Some(true)
+    });
+    if taken.count() == 0 { Err(SynthError::NothingToTake) } else { Ok(walled(labels, &taken)) }
+}
+
+fn walled(labels: &LabelMap<Patient>, smooth: &Mask<Patient>) -> Resection {
+    let grid = labels.grid;
     let ventricle = labels.map(|l| l == label::VENTRICLE);
     let head = labels.map(|l| l != label::BACKGROUND);
     let kept = smooth
@@ -81,5 +109,5 @@ pub fn resect(labels: &LabelMap<Patient>, anatomy: &Field, settings: &SynthSetti
     let inside = (0..grid.len()).filter(|&n| region.data[n]);
     let sum =
         inside.fold((Point3::origin().coords, 0f64), |(sum, count), n| (sum + centre(&grid, n).coords, count + 1.0));
-    Ok(Resection { wall_mm, centroid: Point3::from(sum.0 / sum.1.max(1.0)) })
+    Resection { wall_mm, centroid: Point3::from(sum.0 / sum.1.max(1.0)) }
 }

@@ -1,5 +1,6 @@
 //! What a synthetic patient is made of.
 
+use super::lobe::Lobe;
 use crate::segment::atlas::Side;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -49,8 +50,10 @@ impl Contrast {
 pub struct SynthSettings {
     /// Seed of anatomy, poses, bias and noise.
     pub seed: u64,
-    /// The operated temporal lobe.
+    /// The operated hemisphere.
     pub side: Side,
+    /// The operated lobe.
+    pub lobe: Lobe,
     /// Volume to be resected, in cubic centimetres.
     pub resection_cc: f64,
     /// Voxel size of both scans in mm.
@@ -94,6 +97,7 @@ impl Default for SynthSettings {
         Self {
             seed: 1,
             side: Side::Left,
+            lobe: Lobe::Temporal,
             resection_cc: 35.0,
             spacing_mm: 1.0,
             post_slice_mm: 1.0,
@@ -117,7 +121,7 @@ impl Default for SynthSettings {
 }
 
 /// Why no patient could be made.
-#[derive(Debug, Error, PartialEq)]
+#[derive(Debug, Error)]
 pub enum SynthError {
     /// A setting outside of what makes sense.
     #[error(
@@ -137,8 +141,9 @@ pub enum SynthError {
     },
     /// The lobe is smaller than what is to be taken from it.
     #[error(
-        "a resection of {wanted_cc:.1} cc: this patient's {side} temporal lobe has {lobe_cc:.1} cc; ask for at most {:.1} \
+        "a resection of {wanted_cc:.1} cc: this patient's {side} {} lobe has {lobe_cc:.1} cc; ask for at most {:.1} \
          cc (80 % of it)",
+        lobe.name(),
         0.8 * lobe_cc
     )]
     LobeTooSmall {
@@ -148,7 +153,28 @@ pub enum SynthError {
         lobe_cc: f64,
         /// The side.
         side: Side,
+        /// Which lobe.
+        lobe: Lobe,
     },
+    /// What is to be taken out holds no brain.
+    #[error("the mask of what is to be taken out holds no brain of this head; draw it on the scan of the head")]
+    NothingToTake,
+    /// A head whose tissues are not those of a T1.
+    #[error(
+        "the head is no T1-weighted scan: fluid {fluid:.0}, grey matter {grey:.0} and white matter {white:.0} must grow brighter \
+         in this order; give a T1"
+    )]
+    NotT1 {
+        /// Mean intensity.
+        fluid: f64,
+        /// Mean intensity.
+        grey: f64,
+        /// Mean intensity.
+        white: f64,
+    },
+    /// A head that cannot be taken apart.
+    #[error("the head: {0}")]
+    Head(#[from] crate::segment::HeadError),
     /// The simulated sag failed.
     #[error(
         "the finite-element sag failed: {0}; ask for a smaller effective_density_kg_per_m3 or stiffer tissue, or sag = \"smooth\""

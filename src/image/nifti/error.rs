@@ -17,7 +17,7 @@ pub struct NiftiError {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum NiftiProblem {
     /// The name does not end as a NIfTI file does.
-    #[error("file name: only .nii and .nii.gz are read; {hint}")]
+    #[error("file name: only .nii, .nii.gz, .mgz and .mgh are read; {hint}")]
     Extension {
         /// How to convert what the name suggests.
         hint: &'static str,
@@ -182,6 +182,41 @@ pub enum NiftiProblem {
         /// The first of them.
         first: f32,
     },
+    /// A label map holds something else than whole numbers.
+    #[error("voxels: {count} values are not whole numbers from 0 to 16777216, the first is {first}; give a label map")]
+    NotCodes {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        first: f32,
+    },
+    /// A label map where a mask is wanted.
+    #[error(
+        "voxels: it holds several whole numbers ({}) besides 0, so it is a label map and no mask; make a mask of the label \
+         you mean (one number, 0 elsewhere), or give it as a label map",
+        .numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    NotMask {
+        /// The first of them, ascending.
+        numbers: Vec<i64>,
+    },
+    /// Named as FreeSurfer's and something else.
+    #[error(
+        "MGH header: version is {version} and must be 1 ({bytes} bytes were looked at, a header has 284): this is no .mgz or \
+         .mgh file, or it is damaged; copy or export it again"
+    )]
+    NotMgh {
+        /// Bytes looked at.
+        bytes: usize,
+        /// The first number.
+        version: i32,
+    },
+    /// FreeSurfer's file without orientation.
+    #[error(
+        "goodRASFlag is not 1: the orientation is not known and left could be taken for right; convert the original scan \
+         again with mri_convert"
+    )]
+    NoRas,
     /// A mask without a voxel inside.
     #[error("voxels: the mask is empty (every voxel is 0); draw it, or leave the option out")]
     EmptyMask,

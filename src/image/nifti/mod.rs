@@ -1,4 +1,4 @@
-//! NIfTI-1 and NIfTI-2 bytes to volumes and back, behind a guard.
+//! NIfTI-1 and NIfTI-2 bytes to volumes and back, and FreeSurfer's .mgh and .mgz to volumes, behind one guard.
 //!
 //! The voxels are decoded by the `nifti` crate; everything around it is checked here, because a wrong answer about a
 //! patient's left and right is worse than none: gzip CRC and length, header against real size before anything is reserved,
@@ -8,6 +8,7 @@ mod encode;
 mod error;
 mod gzip;
 mod header;
+mod mgh;
 mod orientation;
 mod which;
 
@@ -45,7 +46,7 @@ pub struct NiftiImage {
     pub orientation: Orientation,
 }
 
-/// Reads a scan. `name` is what messages call the file; it must end in `.nii` or `.nii.gz`.
+/// Reads a scan. `name` is what messages call the file; it must end in `.nii`, `.nii.gz`, `.mgz` or `.mgh`.
 ///
 /// # Errors
 /// [`NiftiError`] names the file, the field and the remedy for everything that is refused.
@@ -78,11 +79,31 @@ pub fn decode_labels(
     Ok((image.volume.map(|x| x.round() as u8), image.warnings))
 }
 
-/// Reads a mask. Whole numbers: all but 0 are inside. Fractions (a soft mask): above half of the largest value, and a
-/// warning says so. Returns the warnings beside it.
+/// Reads a label map as another tool wrote it: whole numbers from 0 to 2^24. Returns the warnings beside it.
 ///
 /// # Errors
-/// [`NiftiError`], also for a mask without a voxel inside.
+/// [`NiftiError`], also for values that are no labels.
+pub fn decode_codes(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+) -> Result<(Volume<u32, Native>, Vec<String>), NiftiError> {
+    let image = read(bytes, name, options)?;
+    // Beyond this, 32-bit floats skip whole numbers.
+    const LARGEST: f32 = 16_777_216.0;
+    let is_code = |x: f32| (x - x.round()).abs() < 1e-3 && (-0.5..=LARGEST).contains(&x);
+    let mut others = image.volume.data.iter().copied().filter(|&x| !is_code(x));
+    if let Some(first) = others.next() {
+        return Err(refused(name, NiftiProblem::NotCodes { count: 1 + others.count(), first }));
+    }
+    Ok((image.volume.map(|x| x.round() as u32), image.warnings))
+}
+
+/// Reads a mask. Whole numbers: one number besides 0, which is inside. Fractions (a soft mask): above half of the largest
+/// value, and a warning says so. Returns the warnings beside it.
+///
+/// # Errors
+/// [`NiftiError`], also for a mask without a voxel inside and for a label map.
 pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(Mask<Native>, Vec<String>), NiftiError> {
     let NiftiImage { volume, mut warnings, .. } = read(bytes, name, options)?;
     let soft = volume.data.iter().any(|x| (x - x.round()).abs() > 1e-3);
@@ -91,6 +112,20 @@ pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(M
         warnings.push(format!("the mask holds fractions; voxels above {half} are inside"));
         volume.map(|x| x > half)
     } else {
+        let mut numbers: Vec<i64> = Vec::new();
+        for x in &volume.data {
+            let number = x.round() as i64;
+            if number != 0 && numbers.last() != Some(&number) && !numbers.contains(&number) {
+                numbers.push(number);
+            }
+            if numbers.len() > MOST_LISTED {
+                break;
+            }
+        }
+        if numbers.len() > 1 {
+            numbers.sort_unstable();
+            return Err(refused(name, NiftiProblem::NotMask { numbers }));
+        }
         volume.map(|x| x.round() != 0.0)
     };
     if mask.data.iter().all(|&inside| !inside) {
@@ -98,6 +133,9 @@ pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(M
     }
     Ok((mask, warnings))
 }
+
+/// Numbers of a label map that a message lists.
+const MOST_LISTED: usize = 6;
 
 /// Reads a displacement as [`encode_vectors`] writes it: three volumes, the components in mm along R, A, S.
 ///
@@ -139,7 +177,8 @@ fn refused(name: &str, problem: NiftiProblem) -> NiftiError {
 }
 
 fn read(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
-    check_extension(name).and_then(|()| read_checked(bytes, options)).map_err(|problem| refused(name, problem))
+    let known = if mgh::is_mgh(name) { Ok(()) } else { check_extension(name) };
+    known.and_then(|()| read_checked(bytes, mgh::is_mgh(name), options)).map_err(|problem| refused(name, problem))
 }
 
 fn check_extension(name: &str) -> Result<(), NiftiProblem> {
@@ -152,8 +191,6 @@ fn check_extension(name: &str) -> Result<(), NiftiProblem> {
         "convert the DICOM series with dcm2niix"
     } else if ends(&[".hdr", ".img", ".hdr.gz", ".img.gz"]) {
         "join the header/image pair into one .nii file (fslchfiletype NIFTI_GZ, or load and save with nibabel)"
-    } else if ends(&[".mgz", ".mgh"]) {
-        "convert it with mri_convert or nibabel"
     } else if ends(&[".nrrd", ".nhdr", ".mha", ".mhd"]) {
         "save it as NIfTI (3D Slicer or SimpleITK do)"
     } else {
@@ -162,7 +199,7 @@ fn check_extension(name: &str) -> Result<(), NiftiProblem> {
     Err(NiftiProblem::Extension { hint })
 }
 
-fn read_checked(bytes: &[u8], options: &ReadOptions) -> Result<NiftiImage, NiftiProblem> {
+fn read_checked(bytes: &[u8], mgh: bool, options: &ReadOptions) -> Result<NiftiImage, NiftiProblem> {
     let packed = gzip::is_gzip(bytes);
     let unpacked;
     let head = if packed {
@@ -171,11 +208,11 @@ fn read_checked(bytes: &[u8], options: &ReadOptions) -> Result<NiftiImage, Nifti
     } else {
         bytes
     };
-    let header = Header::parse(head)?;
+    let header = if mgh { mgh::header(head)? } else { Header::parse(head)? };
     let layout = header.layout(options.volume)?;
     let (slope, intercept) = header.scaling()?;
     let mut warnings = Vec::new();
-    let (grid, orientation) = orientation::grid(&header, layout.dims, options.prefer, &mut warnings)?;
+    let (grid, orientation) = orientation::grid(&header, layout.dims, options.prefer.filter(|_| !mgh), &mut warnings)?;
     if header.bitpix as usize != 8 * layout.kind.size_of() {
         warnings.push(format!(
             "bitpix is {}, datatype {} has {}; datatype is believed",

@@ -10,6 +10,11 @@ use thiserror::Error;
 pub enum EngineError {
     #[error("no voxel carries a label to mesh{}; check the label map", besides(without))]
     NoLabels { without: Vec<u8> },
+    #[error(
+        "the map holds {found} labels, {most} are meshed at most: say whose parcellation it is (it becomes grey matter, white \
+         matter, fluid), join labels, or leave some out"
+    )]
+    TooManyLabels { found: usize, most: usize },
     #[error("`{name}` is {value:?}: it must be {rule}")]
     Setting { name: &'static str, value: f64, rule: &'static str },
     #[error(

@@ -46,6 +46,7 @@ pub fn mesh_labels<F: Frame>(
     if labelled == 0 {
         return Err(no_labels());
     }
+    check_number_of_labels(&map, settings)?;
     // A first guess: tets of a fair mesh of edge h have about 0.17 h^3.
     let mut edge_mm = match settings.size {
         MeshSize::EdgeMm(edge) => edge,
@@ -103,6 +104,19 @@ pub fn mesh_labels<F: Frame>(
     let complex = polish(complex);
     let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
     Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
+}
+
+/// Labels, and halves of labels that are split, which one mesh can hold: sets of them are kept in 64 bits, one of which is
+/// the outside.
+const MOST_FIELDS: usize = 63;
+
+fn check_number_of_labels<F: Frame>(map: &LabelMap<F>, settings: &MeshSettings) -> Result<(), EngineError> {
+    let mut present = [false; 256];
+    map.data.iter().for_each(|&l| present[l as usize] = true);
+    let labels = || (1..=255u8).filter(|&l| present[l as usize]);
+    let halves = settings.split.as_ref().map_or(0, |split| labels().filter(|l| split.labels.contains(l)).count());
+    let (found, most) = (labels().count(), MOST_FIELDS - halves);
+    if found > most { Err(EngineError::TooManyLabels { found, most }) } else { Ok(()) }
 }
 
 /// Mean place of the labelled voxels.
@@ -184,6 +198,20 @@ pub(super) mod tests {
         assert!(shape.scaled_jacobian_min > 0.05, "{shape:?}");
         let border = surface_distance(&mesh, &ball_in_shell(), &[]).unwrap();
         assert!(border.mean_mm < 0.5 && border.percentile_95_mm < 1.0, "{border:?}");
+    }
+
+    #[test]
+    fn more_labels_than_a_mesh_can_hold_are_refused_in_words() {
+        let grid = Grid::<Mni>::axis_aligned([9; 3], [1.0; 3], [0.0; 3]);
+        let map = |most: usize| LabelMap::from_fn(grid, |n| 1 + (n % most) as u8);
+        let said = |most, split| {
+            let split = split.then(|| MidplaneSplit { labels: vec![2, 3], above_yz_mm: Vec::new() });
+            let settings = MeshSettings { split, ..MeshSettings::default() };
+            let refused = mesh_labels(&map(most), &settings, &EnginePrograms::default()).err();
+            refused.map_or(String::new(), |e| e.to_string())
+        };
+        assert!(said(64, false).contains("64 labels, 63 are meshed at most"), "{}", said(64, false));
+        assert!(said(62, true).contains("62 labels, 61 are meshed at most"));
     }
 
     #[test]

@@ -114,7 +114,8 @@ impl Cohort {
         let line = |row: &Row| -> Line {
             let name = &row.participant_id;
             let linked = html! { a href={ (name) ".html" } { (name) } };
-            let mut line = vec![if row.best_sample.is_some() {
+            let answered = matches!(row.status, Status::NoOperation | Status::NotOnePerson);
+            let mut line = vec![if row.best_sample.is_some() || answered {
                 linked
             } else {
                 html! { (name) }

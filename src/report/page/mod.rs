@@ -59,6 +59,8 @@ pub struct CasePage {
     pub outcome: Option<ExperimentOutcome>,
     /// Before and after registration.
     pub registration: Option<RegistrationFigure>,
+    /// Both scans when a step gave up.
+    pub refused: Option<CaptionedPicture>,
     /// Masks on slices.
     pub mosaics: Vec<Mosaic>,
     /// Pictures of the mesh.
@@ -188,6 +190,7 @@ impl CasePage {
         };
         let outcome = self.outcome.as_ref();
         add("summary", "Summary", outcome.map(results::summary));
+        add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());

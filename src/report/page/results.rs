@@ -92,6 +92,14 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
             tiles.push(tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note));
         }
     }
+    for (tissue, modulus) in &outcome.held_shear_modulus_pa {
+        let name = format!("Shear modulus, {}", tissue_name(tissue));
+        tiles.push(tile(
+            &name,
+            &quantity(Some(*modulus), 4, "Pa"),
+            "held at the prior of abnormal tissue, not estimated",
+        ));
+    }
     tiles.extend(outcome.volumes.iter().flat_map(volume_tiles));
     if let Some(floor) = outcome.noise_floor {
         let part = |name: &str, mm: Option<f64>| mm.map(|mm| format!("{name} {} mm", number(mm, 2)));
@@ -110,7 +118,11 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
         tiles.push(tile("Tetrahedra", &html! { (count(mesh.tets)) }, &note));
     }
     html! {
-        p class="lead" { (sentence(outcome)) } "\n"
+        @if let Some(answer) = outcome.answer {
+            p class="lead" { strong { (answer.sentence()) } } "\n"
+        } @else {
+            p class="lead" { (sentence(outcome)) } "\n"
+        }
         dl class="figures" { @for tile in tiles { (tile) } } "\n"
     }
 }

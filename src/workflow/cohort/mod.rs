@@ -77,7 +77,15 @@ pub fn subject(
     progress: &mut dyn Progress,
 ) -> Result<Case, WorkflowError> {
     let inputs = Inputs::pair(dataset.folder.join(&pair.pre.0), dataset.folder.join(&pair.post.0));
-    let case = run_to(goal, &inputs, place, settings, progress)?;
+    let case = run_to(goal, &inputs, place, settings, progress).or_else(|error| {
+        if error.answer().is_some() {
+            // What the scans said has its page, too.
+            let name = pair.pre.0.split('/').next().unwrap_or_default();
+            let page = Case::at(&place.folder).read(layout::PAGE)?;
+            write_whole(&out.join(format!("{name}.html")), &page)?;
+        }
+        Err(error)
+    })?;
     for (file, bytes) in subject_files(case.folder(), &pair.pre, &pair.post)? {
         write_whole(&out.join(file), &bytes)?;
     }
@@ -98,7 +106,9 @@ pub fn member(out: &Path, subject: &str) -> Result<Member, MemberError> {
         Err(_) => None,
         Ok(bytes) => Some(serde_json::from_slice(&bytes).map_err(|_| CohortError::Log { file })?),
     };
+    let answer = outcome.as_ref().and_then(|read| read.as_ref().ok()).and_then(|outcome| outcome.answer);
     let status = match (&log, &outcome) {
+        (Some(log), _) if log.exit_code == 4 && answer.is_some() => Status::of(answer),
         (Some(log), _) if log.exit_code == 4 => Status::QualityGate,
         (Some(_), _) => Status::Failed,
         (None, Some(_)) => Status::Done,

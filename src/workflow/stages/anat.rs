@@ -1,6 +1,6 @@
 //! Stage `anat`: both scans in MNI space, brain masks, labels, cavity, resected tissue.
 
-use super::WithReading;
+use super::reading::WithReading;
 use super::registration::transforms;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
@@ -16,10 +16,10 @@ use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
 use crate::segment::{atlas, label};
-use crate::workflow::case::{Case, CaseError};
-use crate::workflow::error::WorkflowError;
+use crate::workflow::case::Case;
+use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
-use crate::workflow::plan::StageName;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
@@ -118,6 +118,7 @@ pub(crate) fn anat(
             GivenMask::Post(mask) => mask_on(mask, &scans.pre.grid, &pre_from_post.inverse()),
         };
         let given = GivenMasks {
+            labels: own.labels.as_ref().map(|(labels, _)| labels.clone()),
             brain: own.brain.as_ref().map(on_pre),
             ventricle: own.ventricle.as_ref().map(on_pre),
             cavity: own.cavity.as_ref().map(on_mni),
@@ -129,8 +130,9 @@ pub(crate) fn anat(
                 p.doing(what);
             });
         };
-        let OperatedBrain { pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain } =
-            take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
+        let OperatedBrain {
+            pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain, ..
+        } = take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
 
         work.tell(|p| p.doing("writing"));
         let mut produced = Produced::default();

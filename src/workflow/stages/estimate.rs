@@ -3,24 +3,24 @@
 use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::estimate::{
-    DisplacementSettings, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem,
-    Turn, Unknown, moved_by, solve_problem,
+    Estimate, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::phantom::neo_hookean;
 use crate::experiment::prior::log_prior;
 use crate::experiment::sample::{Sample, Tissue};
 use crate::experiment::sweep::Reference;
-use crate::fem::{ElementKind, Loads, Scenario};
+use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
 use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::estimate_options::{EstimateOptions, Observed};
+use crate::workflow::facts::EstimateFacts;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
-use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 5;
@@ -28,96 +28,7 @@ const NAME: StageName = StageName::Estimate;
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
 
-/// What a patient's estimate is fitted to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Observed {
-    /// The displacement of the brain's depth, by deformable registration of the two scans.
-    #[default]
-    Displacement,
-    /// The distance to the surfaces of ventricle and cavity, closest points.
-    Surfaces,
-}
-
-/// How the estimate is posed; the table `[estimate]` of the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EstimateOptions {
-    /// The descent; its noise is the noise floor's where that is known.
-    pub descent: EstimateSettings,
-    /// What a patient's estimate is fitted to. Closest points pull towards no displacement at all: the surfaces are
-    /// there for comparison with what is published.
-    pub observed: Observed,
-    /// Which nodes' displacement is believed, and how far.
-    pub displacement: DisplacementSettings,
-    /// Errors of a segmented surface are alike over this distance, mm: nodes nearer to each other count as one.
-    pub correlation_mm: f64,
-    /// The element of a patient's body. Plain linear tetrahedra lock: with them grey matter came out a quarter softer.
-    pub element: ElementKind,
-    /// Standard deviation of ln(modulus) that a patient's model adds. Measured on a synthetic patient: from 60,000 to
-    /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
-    /// 60,000 lay within 7 % of the finer one.
-    pub model_log_sd: f64,
-    /// Also estimate the effective density, with the prior below.
-    pub density: bool,
-    /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
-    pub density_log_sd: f64,
-    /// Also estimate the direction of gravity, around the one given.
-    pub gravity_direction: bool,
-    /// Standard deviation of either angle, degrees: how differently a head lies on its pillow.
-    pub gravity_direction_sd_deg: f64,
-    /// Also estimate every pressure of the settings' `[[resection.pressure]]`, around the one given.
-    pub pressure: bool,
-    /// Standard deviation of ln(pressure).
-    pub pressure_log_sd: f64,
-    /// Noise of a phantom's displacements, mm: they are known to the solver's residual.
-    pub phantom_noise_mm: f64,
-}
-
-impl Default for EstimateOptions {
-    fn default() -> Self {
-        Self {
-            descent: EstimateSettings::default(),
-            observed: Observed::default(),
-            displacement: DisplacementSettings::default(),
-            correlation_mm: 5.0,
-            element: ElementKind::TET4_NODAL,
-            model_log_sd: 0.15,
-            density: false,
-            density_log_sd: 0.56,
-            gravity_direction: false,
-            gravity_direction_sd_deg: 15.0,
-            pressure: false,
-            pressure_log_sd: 0.7,
-            phantom_noise_mm: 0.01,
-        }
-    }
-}
-
 impl EstimateOptions {
-    /// Refuses what no estimate can be posed with.
-    ///
-    /// # Errors
-    /// The first setting out of its range, in words.
-    pub fn check(&self) -> Result<(), String> {
-        self.descent.check().map_err(|e| format!("[estimate.descent]: {e}"))?;
-        self.displacement.check().map_err(|e| format!("[estimate.displacement]: {e}"))?;
-        let above_zero = [
-            ("correlation_mm", self.correlation_mm),
-            ("density_log_sd", self.density_log_sd),
-            ("gravity_direction_sd_deg", self.gravity_direction_sd_deg),
-            ("pressure_log_sd", self.pressure_log_sd),
-            ("phantom_noise_mm", self.phantom_noise_mm),
-        ];
-        if let Some((name, value)) = above_zero.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            return Err(format!("`{name}` is {value}: it must be above 0"));
-        }
-        if !(self.model_log_sd >= 0.0 && self.model_log_sd.is_finite()) {
-            return Err(format!("`model_log_sd` is {}: it must be 0 or more", self.model_log_sd));
-        }
-        Ok(())
-    }
-
     /// Refuses to estimate loads that are not there.
     fn suits(&self, loads: &Loads) -> Result<(), &'static str> {
         let weightless = loads.gravity_m_per_s2 == [0.0; 3] || loads.density_kg_per_m3 == 0.0;
@@ -175,15 +86,6 @@ pub(crate) struct EstimateInput<'a> {
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
-}
-
-/// The estimate's numbers, and its state as one more sample.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct EstimateFacts {
-    /// Modes, intervals, limits.
-    pub estimate: EstimateOutcome,
-    /// Moduli and errors in the layout of a sample.
-    pub record: SampleOutcome,
 }
 
 /// The stage with its settings and inputs.

@@ -3,7 +3,7 @@
 use crate::artefact::Produced;
 use crate::segment::atlas;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work};
 
 /// Raised when the stage's code changes its result.

@@ -14,9 +14,9 @@ use crate::register::deformable::DisplacementField;
 use crate::segment::{label, with_closed_sulci};
 use crate::tag::{falx_sheet, tag_boundary_sets_with};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::facts::MeshFacts;
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
@@ -26,17 +26,6 @@ const NAME: StageName = StageName::Mesh;
 const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Sulci and fissures up to twice this width are closed in the mesh.
 const SULCUS_MM: f64 = 4.0;
-
-/// What the report says of the mesh.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct MeshFacts {
-    /// Size and quality.
-    pub mesh: MeshOutcome,
-    /// The boundary sets.
-    pub sets: Vec<SetOutcome>,
-    /// Sets that are not to be believed, a sentence each.
-    pub implausible: Vec<String>,
-}
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
@@ -68,8 +57,7 @@ pub(crate) fn mesh(
             None => p,
         };
         let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
-        let tissue = |l: u8| l == label::GREY_MATTER || l == label::WHITE_MATTER;
-        let tissue_of = whole.restricted(tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
+        let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
         let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));

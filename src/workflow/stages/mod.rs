@@ -8,13 +8,13 @@ mod brain_shift;
 mod estimate;
 mod labels;
 mod mesh;
+mod reading;
 mod reference;
 mod registration;
 mod samples;
 
 pub use anat::AnatFacts;
-pub use estimate::{EstimateFacts, EstimateOptions, Observed};
-pub use mesh::{MeshFacts, mesh_outcome};
+pub use mesh::mesh_outcome;
 pub use registration::RegistrationFacts;
 
 pub(crate) use anat::{Anatomy, anat, anat_stage};
@@ -25,16 +25,5 @@ pub(crate) use mesh::{mesh, mesh_stage};
 pub(crate) use reference::{
     known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference, reference_stage,
 };
-pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage};
-pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples};
-
-use crate::image::nifti::ReadOptions;
-use serde::Serialize;
-
-/// A stage's settings with how the user's files are read: another volume of the same file is another scan.
-#[derive(Serialize)]
-struct WithReading<'a, S> {
-    #[serde(flatten)]
-    settings: &'a S,
-    image: ReadOptions,
-}
+pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
+pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};

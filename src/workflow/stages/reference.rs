@@ -10,9 +10,9 @@ use crate::layout::{REFERENCE_STATE, REFERENCE_SURFACE, REST_MESH};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{Field, vtu};
 use crate::mesh::{TetMesh, TriMesh};
-use crate::workflow::case::{Case, CaseError};
-use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::StageName;
+use crate::workflow::case::Case;
+use crate::workflow::error::{CaseError, WorkflowError};
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
 
-use super::WithReading;
+use super::reading::WithReading;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::RegistrationOutcome;
 use crate::experiment::resection::GravityFrame;
@@ -9,11 +9,11 @@ use crate::image::Grid;
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
 use crate::register::{RigidFit, RigidMasks, register_rigid};
-use crate::segment::pose_of_head;
+use crate::segment::{pose_of_head, pose_of_labels};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::inputs::{ScanSums, Scans};
-use crate::workflow::plan::StageName;
+use crate::workflow::inputs::{OwnMasks, ScanSums, Scans};
+use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -43,9 +43,12 @@ pub(crate) fn registration(
     work: &Work<'_>,
     made: &mut Made,
     scans: &Scans,
+    own: &OwnMasks,
 ) -> Result<RegistrationFacts, WorkflowError> {
     let settings = &work.settings.register;
-    work.run(made, &NAME, &registration_stage(work, &scans.sums), || {
+    let stage = registration_stage(work, &scans.sums);
+    let stage = own.posing().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
+    work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("registration", 2));
         work.tell(|p| p.doing("post to pre"));
         let refused = |what| move |source| WorkflowError::Registration { what, source };
@@ -53,18 +56,27 @@ pub(crate) fn registration(
             .map_err(refused("the post-operative scan (moving) onto the pre-operative one (fixed)"))?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing("pre to MNI"));
-        let mni_from_pre = pose_of_head(&scans.pre)
-            .map_err(refused("the pre-operative scan (moving) onto the MNI template (fixed)"))?;
-        work.tell(|p| p.end());
         let mut produced = Produced::default();
         produced.warnings.extend(scans.warnings.iter().cloned());
         produced.warnings.extend(pre_from_post.warnings.iter().map(|w| format!("post to pre: {w}")));
-        produced.warnings.extend(mni_from_pre.warnings.iter().map(|w| format!("pre to MNI: {w}")));
+        let (mni_from_pre, fit) = if let Some((pose, _)) = &own.pose {
+            (*pose, by_hand(pose, &scans.pre.grid))
+        } else {
+            let found = match &own.labels {
+                // A label map says where the brain is, whatever the scan's contrast.
+                Some((labels, _)) => pose_of_labels(labels),
+                None => pose_of_head(&scans.pre),
+            };
+            let found = found.map_err(refused("the pre-operative scan (moving) onto the MNI template (fixed)"))?;
+            produced.warnings.extend(found.warnings.iter().map(|w| format!("pre to MNI: {w}")));
+            (found.fixed_from_moving, outcome(&found, &scans.pre.grid))
+        };
+        work.tell(|p| p.end());
         let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
         write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
         let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
-        write_transform(&mut produced, text, itk, &mni_from_pre.fixed_from_moving);
-        let fits = vec![outcome(&pre_from_post, &scans.post.grid), outcome(&mni_from_pre, &scans.pre.grid)];
+        write_transform(&mut produced, text, itk, &mni_from_pre);
+        let fits = vec![outcome(&pre_from_post, &scans.post.grid), fit];
         produced.facts = facts(&RegistrationFacts { fits });
         Ok(produced)
     })
@@ -102,15 +114,24 @@ fn write_transform<M: Frame, F: Frame>(
 }
 
 fn outcome<M: Frame, F: Frame>(fit: &RigidFit<M, F>, moving: &Grid<M>) -> RegistrationOutcome {
+    RegistrationOutcome {
+        similarity: "Mattes mutual information (nats)".to_owned(),
+        similarity_after: Some(fit.quality.mutual_information),
+        ..by_hand(&fit.fixed_from_moving, moving)
+    }
+}
+
+/// A transform that nothing was compared for.
+fn by_hand<M: Frame, F: Frame>(transform: &RigidTransform<M, F>, moving: &Grid<M>) -> RegistrationOutcome {
     let centre = moving.position(Point3::from(moving.dims.map(|n| (n as f64 - 1.0) / 2.0)));
-    let moved = fit.fixed_from_moving.apply(centre).mm - centre.mm;
+    let moved = transform.apply(centre).mm - centre.mm;
     RegistrationOutcome {
         moving: M::NAME.to_owned(),
         fixed: F::NAME.to_owned(),
-        rotation_deg: fit.fixed_from_moving.rotation.angle().to_degrees(),
+        rotation_deg: transform.rotation.angle().to_degrees(),
         translation_mm: moved.into(),
-        similarity: "Mattes mutual information (nats)".to_owned(),
+        similarity: "given by hand".to_owned(),
         similarity_before: None,
-        similarity_after: Some(fit.quality.mutual_information),
+        similarity_after: None,
     }
 }

@@ -1,7 +1,9 @@
 //! Stage `sim-SAMPLE`: one simulation each, so that a sweep can stop anywhere, resume, and be split over machines.
 
+use crate::anatomy::label;
 use crate::artefact::{Manifest, Produced, Stage};
-use crate::experiment::outcome::SampleOutcome;
+use crate::experiment::outcome::{MeshOutcome, SampleOutcome};
+use crate::experiment::prior::held_material;
 use crate::experiment::sample::{Sample, Tissue};
 use crate::experiment::sweep::{Reference, SolvedSample, solve_sample};
 use crate::fem::Scenario;
@@ -10,8 +12,9 @@ use crate::layout::SAMPLE_STATE;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::plan::{StageName, Subject};
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
+use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 3;
@@ -36,6 +39,23 @@ pub(crate) enum SampleMode {
     Run,
     /// Refuse and say which.
     Gather,
+}
+
+/// The scenario with the materials of what the mesh holds beside the varied tissues: tumour and oedema at the mean of their
+/// prior; with their shear moduli, Pa.
+pub(crate) fn with_held_tissues(
+    work: &Work<'_>,
+    mesh: &MeshOutcome,
+    mut scenario: Scenario,
+) -> Result<(Scenario, BTreeMap<String, f64>), WorkflowError> {
+    let mut moduli = BTreeMap::new();
+    let lesions = [label::TUMOUR, label::OEDEMA].into_iter().filter_map(label::name);
+    for name in lesions.filter(|name| mesh.volume_cc.contains_key(*name)) {
+        let held = held_material(name, work.settings.resection.poisson_ratio, &work.settings.prior)?;
+        moduli.insert(name.to_owned(), held.shear_modulus_pa);
+        scenario.materials.insert(name.to_owned(), held.material);
+    }
+    Ok((scenario, moduli))
 }
 
 /// The stage of one sample.

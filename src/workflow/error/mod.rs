@@ -1,26 +1,38 @@
 //! Why a job did not end well.
 
-use super::case::CaseError;
-use super::inputs::InputError;
-use super::meshing::MeshFileError;
+mod case;
+mod input;
+mod label_map;
+mod mesh_file;
+mod simulation;
+
+pub use case::CaseError;
+pub use input::{InputError, MaskRole};
+pub use label_map::LabelMapError;
+pub use mesh_file::MeshFileError;
+pub use simulation::SimulationError;
+
 use super::settings::SettingsError;
-use super::simulation::SimulationError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
-use crate::experiment::outcome::OutcomeError;
+use crate::experiment::outcome::{Answer, OutcomeError};
 use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
+use crate::experiment::synth::SynthError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
+use crate::material::gp::{FitRefusal, HyperparametersError};
+use crate::material::literature::StudyError;
+use crate::material::meta_model::FitError;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
 use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
 use crate::report::derivatives::DerivativesError;
-use crate::resect::PairError;
+use crate::resect::{PairError, ResectError};
 use crate::tag::{MARGIN, TagError};
 use thiserror::Error;
 
@@ -43,6 +55,8 @@ pub enum WorkflowError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Labels(#[from] LabelMapError),
     #[error(transparent)]
     Case(#[from] CaseError),
     #[error(transparent)]
@@ -67,6 +81,16 @@ pub enum WorkflowError {
     Observed(#[from] ObservedError),
     #[error(transparent)]
     Prior(#[from] PriorError),
+    #[error("{file}: {source}")]
+    Studies { file: String, source: StudyError },
+    #[error("{file}: {source}")]
+    Hyperparameters { file: String, source: HyperparametersError },
+    #[error("there is no literature model {id}; ids go from 0 to {last}")]
+    NoSuchModel { id: u32, last: u32 },
+    #[error(transparent)]
+    Gp(#[from] FitRefusal),
+    #[error(transparent)]
+    Law(#[from] FitError),
     #[error("samples of every task compare materials of the whole brain: they do not go with two tissues")]
     EveryTaskOfTwo,
     #[error("the table [{table}] asks for a simulation that cannot be done: {source}")]
@@ -89,6 +113,8 @@ pub enum WorkflowError {
     EstimateLaw { law: String },
     #[error(transparent)]
     Estimate(#[from] ProblemError),
+    #[error(transparent)]
+    Synth(#[from] SynthError),
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
     #[error(transparent)]
@@ -115,8 +141,21 @@ fn file_of(error: &ObservedError) -> &'static str {
 }
 
 impl WorkflowError {
+    /// What the two scans say, where that ends the job.
+    pub fn answer(&self) -> Option<Answer> {
+        match self {
+            Self::Pair(PairError::NotOnePerson { .. }) => Some(Answer::NotOnePerson),
+            Self::Pair(PairError::Resect(ResectError::NoOperation { .. })) => Some(Answer::NoOperation),
+            _ => None,
+        }
+    }
+
     /// Who is to do something about it.
     pub fn kind(&self) -> ErrorKind {
+        if self.answer().is_some() {
+            // The scans were compared: no fault of a file.
+            return ErrorKind::QualityGate;
+        }
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
             Self::Write(_)
@@ -124,6 +163,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Synth(SynthError::Sag(_))
             | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })
             | Self::Report(ReportError::Write(_))

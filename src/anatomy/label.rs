@@ -12,6 +12,10 @@ pub const WHITE_MATTER: u8 = 3;
 pub const VENTRICLE: u8 = 4;
 /// Resected tissue: a label of its own before meshing, so that the margin is smooth and conforming.
 pub const RESECTED: u8 = 5;
+/// Tumour: tissue with a modulus of its own.
+pub const TUMOUR: u8 = 6;
+/// Oedema around a tumour: tissue with a modulus of its own.
+pub const OEDEMA: u8 = 7;
 
 /// The name a scenario uses for a label; `None` for an unknown one.
 pub fn name(label: u8) -> Option<&'static str> {
@@ -21,6 +25,8 @@ pub fn name(label: u8) -> Option<&'static str> {
         WHITE_MATTER => "white_matter",
         VENTRICLE => "ventricle",
         RESECTED => "resected",
+        TUMOUR => "tumour",
+        OEDEMA => "oedema",
         _ => return None,
     })
 }
@@ -28,4 +34,9 @@ pub fn name(label: u8) -> Option<&'static str> {
 /// The label with this name, or with this number in digits.
 pub fn number(word: &str) -> Option<u8> {
     word.parse().ok().or_else(|| (0..=u8::MAX).find(|&l| name(l) == Some(word)))
+}
+
+/// Whether the label is tissue that carries load: neither fluid nor what was taken out.
+pub fn is_tissue(label: u8) -> bool {
+    matches!(label, GREY_MATTER | WHITE_MATTER | TUMOUR | OEDEMA)
 }

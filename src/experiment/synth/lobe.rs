@@ -1,0 +1,101 @@
+//! Where a surgeon begins and how far the lobe goes, by planes placed by eye on the template: for making patients, not for
+//! measuring.
+
+use crate::geometry::{Mni, Position};
+use crate::segment::atlas::{Side, temporal_lobe};
+use serde::{Deserialize, Serialize};
+
+/// A place of an operation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lobe {
+    /// From the temporal pole backwards.
+    #[default]
+    Temporal,
+    /// From the frontal pole backwards.
+    Frontal,
+    /// From the upper convexity inwards.
+    Parietal,
+    /// From the occipital pole forwards.
+    Occipital,
+    /// Around the middle of the insula.
+    Insular,
+}
+
+impl Lobe {
+    /// Every place.
+    pub const ALL: [Self; 5] = [Self::Temporal, Self::Frontal, Self::Parietal, Self::Occipital, Self::Insular];
+
+    /// The word in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Temporal => "temporal",
+            Self::Frontal => "frontal",
+            Self::Parietal => "parietal",
+            Self::Occipital => "occipital",
+            Self::Insular => "insular",
+        }
+    }
+
+    /// The place that a word names.
+    pub fn of_name(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|lobe| lobe.name() == word)
+    }
+
+    /// Whether a point of the template lies in the lobe of this side.
+    pub(super) fn holds(self, side: Side, p: Position<Mni>) -> bool {
+        let own_side = if side == Side::Left { p.mm.x < -2.0 } else { p.mm.x > 2.0 };
+        let [x, y, z] = [p.mm.x.abs(), p.mm.y, p.mm.z];
+        // The Sylvian fissure, and the central sulcus from there up and back to the vertex.
+        let above_sylvian = z > -2.0 - 0.35 * (y - 10.0);
+        let central_mm = -5.0 - 0.45 * (z - 15.0).max(0.0);
+        own_side
+            && match self {
+                Self::Temporal => temporal_lobe(p) == Some(side),
+                Self::Frontal => y > central_mm && above_sylvian && z > -30.0,
+                Self::Parietal => y < central_mm && y > -72.0 && above_sylvian && z > 18.0,
+                Self::Occipital => y < -68.0 && z > -8.0 && z < 45.0,
+                Self::Insular => (26.0..46.0).contains(&x) && (-22.0..28.0).contains(&y) && (-10.0..20.0).contains(&z),
+            }
+    }
+
+    /// How late a point would be taken: an elliptic distance from where the surgeon begins, mm.
+    pub(super) fn order_mm(self, side: Side, p: Position<Mni>) -> f64 {
+        let sign = if side == Side::Left { -1.0 } else { 1.0 };
+        let (begin, stretch) = match self {
+            Self::Temporal => ([42.0, 16.0, -30.0], [1.0, 1.7, 1.05]),
+            Self::Frontal => ([24.0, 62.0, 8.0], [1.0, 1.2, 1.0]),
+            Self::Parietal => ([36.0, -50.0, 62.0], [1.0, 1.0, 1.0]),
+            Self::Occipital => ([18.0, -104.0, 6.0], [1.0, 1.3, 1.0]),
+            Self::Insular => ([37.0, 4.0, 5.0], [0.7, 1.3, 1.1]),
+        };
+        let from = [p.mm.x - sign * begin[0], p.mm.y - begin[1], p.mm.z - begin[2]];
+        (0..3).map(|a| (from[a] / stretch[a]).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_lies_in_one_lobe_of_one_side_and_the_surgeon_begins_beside_it() {
+        let places = [
+            (Lobe::Temporal, [45.0, 10.0, -30.0]),
+            (Lobe::Frontal, [25.0, 50.0, 10.0]),
+            (Lobe::Parietal, [36.0, -50.0, 50.0]),
+            (Lobe::Occipital, [18.0, -95.0, 5.0]),
+        ];
+        for (lobe, [x, y, z]) in places {
+            for (side, x) in [(Side::Right, x), (Side::Left, -x)] {
+                let p = Position::new(x, y, z);
+                let held: Vec<Lobe> = Lobe::ALL.into_iter().filter(|l| l.holds(side, p)).collect();
+                assert_eq!(held, [lobe], "{p:?}");
+                assert!(lobe.order_mm(side, p) < 20.0);
+                let other = if side == Side::Left { Side::Right } else { Side::Left };
+                assert!(Lobe::ALL.iter().all(|l| !l.holds(other, p)));
+            }
+            assert_eq!(Lobe::of_name(lobe.name()), Some(lobe));
+        }
+    }
+}

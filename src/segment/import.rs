@@ -1,0 +1,242 @@
+//! A label map of another tool, carried to hgm's numbers once its anatomy makes sense.
+
+use crate::anatomy::{LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, label, recognise};
+use crate::geometry::Frame;
+use crate::image::{LabelMap, Volume};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// A label map in hgm's numbers, and what it was.
+#[derive(Clone, Debug)]
+pub struct ImportedLabels<F: Frame> {
+    /// hgm's numbers on the file's own grid.
+    pub labels: LabelMap<F>,
+    /// The table that was recognised.
+    pub table: String,
+    /// Which files hold such numbers.
+    pub files: &'static str,
+    /// Volumes by tissue, in the order of hgm's numbers; what does not occur is left out.
+    pub volumes_cc: Vec<(Tissue, f64)>,
+    /// Numbers that occur.
+    pub structures: usize,
+}
+
+/// Why a label map is not believed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ImportError {
+    /// Its numbers are not those of a table.
+    #[error(transparent)]
+    Numbers(#[from] LabelError),
+    /// Left lies on the right.
+    #[error(
+        "read as {table}, left and right are exchanged: its left structures lie {apart_mm:.0} mm to the right of its right \
+         ones; the file's orientation is wrong, or the numbers are another tool's"
+    )]
+    Mirrored {
+        /// The table.
+        table: String,
+        /// Distance between the two centres along left-right.
+        apart_mm: f64,
+    },
+    /// The tissues do not lie as in a brain.
+    #[error(
+        "read as {table}, it is no brain: {what}; check that the map is whole and that the numbers are those of this tool"
+    )]
+    NoBrain {
+        /// The table.
+        table: String,
+        /// What is wrong with it.
+        what: String,
+    },
+}
+
+/// Recognises the numbers of a map (among `chosen` tables where there is a choice) and carries them to hgm's.
+///
+/// # Errors
+/// [`ImportError`] for numbers no table has, and for a map whose tissues do not lie as in a brain.
+pub fn import_labels<F: Frame>(
+    codes: &Volume<u32, F>,
+    chosen: Option<&[&LabelTable]>,
+) -> Result<ImportedLabels<F>, ImportError> {
+    let counts = counts(codes);
+    let Recognised { table, found } = recognise(&counts, chosen)?;
+    let labels = codes.map(|code| table.structure(code).map_or(label::BACKGROUND, |s| s.tissue.label()));
+    let name = || table.name.clone();
+    if let Some(apart_mm) = sides_exchanged_mm(codes, table) {
+        return Err(ImportError::Mirrored { table: name(), apart_mm });
+    }
+    if let Some(what) = no_brain(&labels) {
+        return Err(ImportError::NoBrain { table: name(), what });
+    }
+    let mut volumes: BTreeMap<Tissue, f64> = BTreeMap::new();
+    for &(structure, voxels) in &found {
+        *volumes.entry(structure.tissue).or_default() += voxels as f64 * codes.grid.voxel_volume_mm3() / 1000.0;
+    }
+    volumes.remove(&Tissue::Outside);
+    let volumes_cc = volumes.into_iter().collect();
+    Ok(ImportedLabels { labels, table: name(), files: table.files, volumes_cc, structures: found.len() })
+}
+
+fn counts<F: Frame>(codes: &Volume<u32, F>) -> Vec<LabelCount> {
+    let slice = (codes.grid.dims[0] * codes.grid.dims[1]).max(1);
+    let of_slice = |slice: &[u32]| {
+        let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+        for &code in slice {
+            *counts.entry(code).or_default() += 1;
+        }
+        counts
+    };
+    let join = |mut a: BTreeMap<u32, usize>, b: BTreeMap<u32, usize>| {
+        for (code, voxels) in b {
+            *a.entry(code).or_default() += voxels;
+        }
+        a
+    };
+    let counts = codes.data.par_chunks(slice).map(of_slice).reduce(BTreeMap::new, join);
+    counts.into_iter().map(|(code, voxels)| LabelCount { code, voxels }).collect()
+}
+
+/// How far the left structures lie to the right of the right ones, where they do.
+fn sides_exchanged_mm<F: Frame>(codes: &Volume<u32, F>, table: &LabelTable) -> Option<f64> {
+    let mut sums = [[0.0, 0.0]; 2];
+    let mut side_of: BTreeMap<u32, Option<usize>> = BTreeMap::new();
+    let x_of = codes.grid.mm_from_voxel.row(0).into_owned();
+    for (n, &code) in codes.data.iter().enumerate().filter(|(_, code)| **code != 0) {
+        let side = *side_of
+            .entry(code)
+            .or_insert_with(|| table.structure(code).and_then(Structure::side).map(|s| usize::from(s == Side::Right)));
+        let Some(side) = side else { continue };
+        let v = codes.grid.voxel(n).map(|v| v as f64);
+        let x_mm = x_of[0] * v[0] + x_of[1] * v[1] + x_of[2] * v[2] + x_of[3];
+        sums[side][0] += x_mm;
+        sums[side][1] += 1.0;
+    }
+    if sums.iter().any(|s| s[1] == 0.0) {
+        return None;
+    }
+    let apart_mm = sums[0][0] / sums[0][1] - sums[1][0] / sums[1][1];
+    (apart_mm > 0.0).then_some(apart_mm)
+}
+
+/// What is wrong with a map as a brain, in words.
+///
+/// The limits are wide: children, old age and lesions pass; a tissue taken for another, a skull taken for a brain and half
+/// a map do not.
+fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
+    let cc = |l: u8| labels.data.iter().filter(|&&x| x == l).count() as f64 * labels.grid.voxel_volume_mm3() / 1000.0;
+    let (grey, white, ventricle) = (cc(label::GREY_MATTER), cc(label::WHITE_MATTER), cc(label::VENTRICLE));
+    let tissue = grey + white + cc(label::TUMOUR) + cc(label::OEDEMA) + cc(label::RESECTED);
+    if !(300.0..=2200.0).contains(&tissue) {
+        return Some(format!("grey and white matter are {tissue:.0} cc together, a brain has 300 to 2200"));
+    }
+    if !(0.4..=4.0).contains(&(grey / white)) {
+        return Some(format!(
+            "there are {grey:.0} cc of grey matter to {white:.0} cc of white, a brain has 0.4 to 4 times"
+        ));
+    }
+    if ventricle > 0.4 * tissue {
+        return Some(format!("the ventricles are {ventricle:.0} cc of {tissue:.0} cc of tissue"));
+    }
+    // Grey matter lies around white matter: more of it borders fluid and skull. Ventricles lie inside.
+    let [grey_open, white_open, ventricle_open] = [label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE]
+        .map(|l| open_share(labels, l, if l == label::VENTRICLE { 0 } else { label::CSF }));
+    if white_open > grey_open {
+        return Some("its white matter lies at the surface more than its grey matter does".to_owned());
+    }
+    if ventricle > 1.0 && ventricle_open > 0.35 {
+        return Some("its ventricles lie at the surface of the brain".to_owned());
+    }
+    None
+}
+
+/// The share of a label's faces to other labels that look at the background or at `also`.
+fn open_share<F: Frame>(labels: &LabelMap<F>, of: u8, also: u8) -> f64 {
+    let [nx, ny, _] = labels.grid.dims;
+    let (mut open, mut all) = (0u64, 0u64);
+    let mut face = |a: u8, b: u8| {
+        if a == of && b != of {
+            all += 1;
+            open += u64::from(b == label::BACKGROUND || b == also);
+        }
+    };
+    for n in 0..labels.data.len() {
+        let [i, j, _] = labels.grid.voxel(n);
+        let here = labels.data[n];
+        let steps = [(i + 1 < nx, 1), (j + 1 < ny, nx), (n + nx * ny < labels.data.len(), nx * ny)];
+        for (_, step) in steps.into_iter().filter(|s| s.0) {
+            let there = labels.data[n + step];
+            face(here, there);
+            face(there, here);
+        }
+    }
+    open as f64 / all.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::named;
+    use crate::geometry::Native;
+    use crate::image::Grid;
+
+    /// Two half balls of white matter in a shell of cortex with a ventricle and fluid around, in FreeSurfer's numbers.
+    fn aseg(flip: f64) -> Volume<u32, Native> {
+        let grid = Grid::axis_aligned([80; 3], [2.0; 3], [-79.0; 3]);
+        Volume::from_fn(grid, |n| {
+            let p = grid.voxel(n).map(|v| 2.0 * v as f64 - 79.0);
+            let r = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+            let left = flip * p[0] < 0.0;
+            let side = |l: u32, r: u32| if left { l } else { r };
+            match r {
+                r if r < 15.0 => side(4, 43),
+                r if r < 50.0 => side(2, 41),
+                r if r < 62.0 => side(3, 42),
+                r if r < 66.0 => 24,
+                _ => 0,
+            }
+        })
+    }
+
+    fn refused(codes: &Volume<u32, Native>, table: &str) -> String {
+        import_labels(codes, Some(&named(table))).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn tissues_come_out_in_hgms_numbers() {
+        let found = import_labels(&aseg(1.0), None).unwrap();
+        assert_eq!((found.table.as_str(), found.structures), ("freesurfer", 7));
+        assert_eq!(found.labels.at(40, 40, 40), label::VENTRICLE);
+        assert_eq!(found.labels.at(40, 40, 60), label::WHITE_MATTER);
+        assert_eq!(found.labels.at(40, 40, 68), label::GREY_MATTER);
+        assert_eq!(found.labels.at(40, 40, 72), label::CSF);
+        let volume: f64 = found.volumes_cc.iter().map(|v| v.1).sum();
+        assert!((volume - 1204.0).abs() < 20.0, "{volume}");
+    }
+
+    #[test]
+    fn a_mirrored_map_and_tissues_in_each_others_place_are_refused() {
+        assert!(refused(&aseg(-1.0), "freesurfer").contains("left and right are exchanged"));
+        let swapped = aseg(1.0).map(|c| [2, 3, 41, 42].iter().position(|x| *x == c).map_or(c, |n| [3, 2, 42, 41][n]));
+        assert!(refused(&swapped, "freesurfer").contains("white matter lies at the surface"));
+        let inside_out = aseg(1.0).map(|c| match c {
+            4 | 43 => 24,
+            24 => 4,
+            c => c,
+        });
+        assert!(refused(&inside_out, "freesurfer").contains("ventricles"));
+        let half = aseg(1.0).map(|c| if c == 2 || c == 41 { 0 } else { c });
+        assert!(refused(&half, "freesurfer").contains("missing"));
+    }
+
+    #[test]
+    fn a_map_of_three_tissues_in_another_order_is_refused() {
+        let own = aseg(1.0).map(|c| [0, 3, 2, 4, 1][[0, 2, 3, 4, 24].iter().position(|x| *x == c % 39).unwrap_or(0)]);
+        assert_eq!(import_labels(&own, None).unwrap().table, "hgm");
+        // SPM and SimNIBS count from the inside or from grey matter: 1 white, 2 grey, 3 fluid; 1 grey, 2 white, 3 fluid.
+        for order in [[0, 3, 2, 1, 4], [0, 3, 1, 2, 4]] {
+            let other = own.map(|c| order[c as usize]);
+            assert!(refused(&other, "hgm").contains("no brain"));
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Why a file that was given cannot be used.
+
+use std::fmt;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A mask of the user's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaskRole {
+    /// The brain.
+    Brain,
+    /// Lateral and third ventricles.
+    Ventricle,
+    /// The cavity.
+    Cavity,
+    /// The resected tissue.
+    Resected,
+    /// Labels of the pre-operative scan.
+    Labels,
+    /// The pose of the pre-operative scan.
+    Pose,
+}
+
+impl fmt::Display for MaskRole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Brain => "brain mask",
+            Self::Ventricle => "ventricle mask",
+            Self::Cavity => "cavity mask",
+            Self::Resected => "resected mask",
+            Self::Labels => "label map",
+            Self::Pose => "pose",
+        })
+    }
+}
+
+/// Why a file that was given cannot be used.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum InputError {
+    #[error("{}: is a folder; name a file", path.display())]
+    Folder { path: PathBuf },
+    #[error("{}: cannot be read; check the path: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{}: not UTF-8 text; save the file as UTF-8", path.display())]
+    NotText { path: PathBuf },
+    #[error(
+        "{} and {}: the two files are the same; give the pre-operative scan first, the post-operative second",
+        pre.display(), post.display()
+    )]
+    SameFile { pre: PathBuf, post: PathBuf },
+    #[error(
+        "{} and {}: the two scans have the same voxels; the post-operative one must show the surgery: give another file",
+        pre.display(), post.display()
+    )]
+    SameVoxels { pre: PathBuf, post: PathBuf },
+    #[error(
+        "{role} {name}: its grid ({} voxels) is that of neither scan (pre-operative {}, post-operative {}){}; resample \
+         the mask onto one of them",
+        size(*found), size(*pre), size(*post),
+        if [pre, post].contains(&found) { ": it lies elsewhere" } else { "" }
+    )]
+    MaskGrid { role: MaskRole, name: String, found: [usize; 3], pre: [usize; 3], post: [usize; 3] },
+}
+
+fn size([x, y, z]: [usize; 3]) -> String {
+    format!("{x} x {y} x {z}")
+}

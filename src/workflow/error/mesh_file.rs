@@ -1,0 +1,20 @@
+//! Why a label map in a file cannot be meshed.
+
+use super::input::InputError;
+use crate::mesh::format::WriteError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a label map in a file cannot be meshed.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum MeshFileError {
+    #[error("{}: the name of a mesh ends in .vtu, .msh, .inp or .feb", output.display())]
+    Output { output: PathBuf },
+    #[error("{file}: {source}")]
+    Format { file: String, source: WriteError },
+    #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
+    Noted { file: String },
+    #[error(transparent)]
+    Input(#[from] InputError),
+}

@@ -1,0 +1,25 @@
+//! What stages have found out, as their manifests keep it.
+
+use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::outcome::{MeshOutcome, SampleOutcome, SetOutcome};
+use serde::{Deserialize, Serialize};
+
+/// What the report says of the mesh.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MeshFacts {
+    /// Size and quality.
+    pub mesh: MeshOutcome,
+    /// The boundary sets.
+    pub sets: Vec<SetOutcome>,
+    /// Sets that are not to be believed, a sentence each.
+    pub implausible: Vec<String>,
+}
+
+/// The estimate's numbers, and its state as one more sample.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct EstimateFacts {
+    /// Modes, intervals, limits.
+    pub estimate: EstimateOutcome,
+    /// Moduli and errors in the layout of a sample.
+    pub record: SampleOutcome,
+}

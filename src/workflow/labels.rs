@@ -1,0 +1,116 @@
+//! Label maps of other tools: the file, whose numbers it holds, and what comes of it.
+
+use super::error::{LabelMapError, WorkflowError};
+use super::inputs::{read_input, read_text, shown};
+use super::progress::Progress;
+use crate::anatomy::{LabelCount, LabelTable, built_in, named, recognise, table_from_tsv};
+use crate::geometry::Native;
+use crate::image::nifti::{self, ReadOptions};
+use crate::image::{LabelMap, Volume};
+use crate::segment::import_labels;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The tables that a word names.
+enum Choice {
+    BuiltIn(Vec<&'static LabelTable>),
+    Own(LabelTable),
+}
+
+fn choice(word: &str) -> Result<Choice, WorkflowError> {
+    let tables = named(word);
+    if !tables.is_empty() {
+        return Ok(Choice::BuiltIn(tables));
+    }
+    if !word.to_ascii_lowercase().ends_with(".tsv") {
+        let known = built_in().iter().map(|t| t.name.as_str()).filter(|n| *n != "charm-labeling").collect();
+        return Err(LabelMapError::NoTable { word: word.to_owned(), known }.into());
+    }
+    let text = read_text(Path::new(word))?;
+    Ok(Choice::Own(
+        table_from_tsv(&text, word).map_err(|source| LabelMapError::Table { word: word.to_owned(), source })?,
+    ))
+}
+
+/// The map in hgm's numbers; says what it was taken for.
+fn imported(
+    codes: &Volume<u32, Native>,
+    name: &str,
+    whose: Option<&str>,
+    progress: &mut dyn Progress,
+) -> Result<LabelMap<Native>, WorkflowError> {
+    let choice = whose.map(choice).transpose()?;
+    let tables: Option<Vec<&LabelTable>> = choice.as_ref().map(|choice| match choice {
+        Choice::BuiltIn(tables) => tables.clone(),
+        Choice::Own(table) => vec![table],
+    });
+    let found = import_labels(codes, tables.as_deref())
+        .map_err(|source| LabelMapError::Import { name: name.to_owned(), source })?;
+    let volumes: Vec<String> =
+        found.volumes_cc.iter().map(|(tissue, cc)| format!("{} {cc:.0} cc", tissue.name())).collect();
+    progress.noted(&format!(
+        "{name}: read with the table {} ({}): {} structures, {}",
+        found.table,
+        found.files,
+        found.structures,
+        volumes.join(", ")
+    ));
+    Ok(found.labels)
+}
+
+fn codes(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+    progress: &mut dyn Progress,
+) -> Result<Volume<u32, Native>, WorkflowError> {
+    let (codes, odd) = nifti::decode_codes(bytes, name, options)?;
+    odd.iter().for_each(|warning| progress.noted(&format!("{name}: {warning}")));
+    Ok(codes)
+}
+
+/// The label map of a tool in hgm's numbers, from a file the user named; `progress` hears what it was taken for.
+///
+/// # Errors
+/// Numbers that no table has, or what makes it no brain.
+pub fn labels_of_tool(
+    path: &Path,
+    whose: Option<&str>,
+    options: &ReadOptions,
+    progress: &mut dyn Progress,
+) -> Result<LabelMap<Native>, WorkflowError> {
+    let name = shown(path);
+    imported(&codes(&read_input(path)?, &name, options, progress)?, &name, whose, progress)
+}
+
+/// A label map to be meshed: that of a known tool in hgm's numbers, numbers of no tool as they are.
+///
+/// # Errors
+/// Where `whose` was said and does not fit, or the map is a known tool's but for some numbers.
+pub fn any_labels(
+    bytes: &[u8],
+    name: &str,
+    whose: Option<&str>,
+    options: &ReadOptions,
+    progress: &mut dyn Progress,
+) -> Result<LabelMap<Native>, WorkflowError> {
+    let codes = codes(bytes, name, options, progress)?;
+    if whose.is_some() {
+        return imported(&codes, name, whose, progress);
+    }
+    let mut voxels = BTreeMap::<u32, usize>::new();
+    for &code in &codes.data {
+        *voxels.entry(code).or_default() += 1;
+    }
+    let counts: Vec<LabelCount> = voxels.into_iter().map(|(code, voxels)| LabelCount { code, voxels }).collect();
+    let holds = |set: &[u32]| counts.iter().any(|c| set.contains(&c.code));
+    // What a map of that tool is never without: then a number more is a slip to be told, not another kind of map.
+    let of_a_tool = built_in().iter().any(|t| t.name != "hgm" && t.needed.iter().all(|set| holds(set)));
+    if of_a_tool || matches!(recognise(&counts, None), Ok(found) if found.table.name != "hgm") {
+        return imported(&codes, name, None, progress);
+    }
+    if let Some(&LabelCount { code, .. }) = counts.iter().find(|c| c.code > 255) {
+        return Err(LabelMapError::TooLarge { name: name.to_owned(), code }.into());
+    }
+    Ok(codes.map(|code| code as u8))
+}

@@ -1,0 +1,107 @@
+//! A synthetic patient as files: on the template's head or on a scan's.
+
+use super::error::WorkflowError;
+use super::inputs::{read_input, shown};
+use super::labels::labels_of_tool;
+use super::progress::Progress;
+use super::settings::Settings;
+use crate::artefact::{Produced, Stage, StageError};
+use crate::experiment::synth::{Head, SynthError, synthesize, synthesize_on};
+use crate::geometry::{Mni, Pre};
+use crate::image::nifti::{self, encode_u8};
+use crate::image::{LabelMap, Mask, Volume};
+use crate::segment::native::mask_on;
+use crate::segment::{SegmentOverrides, atlas, pose_of_head, pose_of_labels, segment_by_labels, segment_head};
+use std::path::PathBuf;
+
+/// Raised when the code changes the patient of the same settings.
+const VERSION: u32 = 3;
+
+/// The files of a synthetic patient.
+#[derive(Clone, Debug, Default)]
+pub struct SyntheticFiles {
+    /// The folder: pre.nii.gz, post.nii.gz, truth/.
+    pub output: PathBuf,
+    /// A T1 whose head is operated; the template's without one.
+    pub head: Option<PathBuf>,
+    /// A label map of that scan.
+    pub dseg: Option<PathBuf>,
+    /// Whose numbers the label map holds.
+    pub labels: Option<String>,
+    /// What is taken out, in the grid of that scan; without it part of a lobe.
+    pub resected_mask: Option<PathBuf>,
+}
+
+/// Makes the patient, or skips it; the figures of its truth come back.
+///
+/// # Errors
+/// Settings out of range, a lobe too small, a head that cannot be used, the disk's.
+pub fn synthetic_patient(
+    files: &SyntheticFiles,
+    settings: &Settings,
+    force: bool,
+    progress: &mut dyn Progress,
+) -> Result<serde_json::Value, WorkflowError> {
+    let stage = Stage::new("synth", VERSION, &files.output, &settings.synth);
+    let mut stage = stage.frame("pre, post").seed(settings.synth.seed);
+    let mut given = None;
+    if let Some(path) = &files.head {
+        let bytes = read_input(path)?;
+        stage = stage.input("head", &bytes);
+        let scan = nifti::decode(&bytes, &shown(path), &settings.image)?;
+        let labels = match &files.dseg {
+            Some(dseg) => Some(labels_of_tool(dseg, files.labels.as_deref(), &settings.image, progress)?.relabelled()),
+            None => None,
+        };
+        if let Some(labels) = &labels {
+            stage = stage.input("label map", &encode_u8(labels));
+        }
+        let mask = match &files.resected_mask {
+            Some(path) => {
+                let bytes = read_input(path)?;
+                stage = stage.input("resected mask", &bytes);
+                Some(nifti::decode_mask(&bytes, &shown(path), &settings.image)?.0.relabelled())
+            }
+            None => None,
+        };
+        given = Some((scan.volume.relabelled(), labels, mask));
+    }
+    let outcome = stage.run(force, || {
+        let patient = match &given {
+            None => synthesize(&settings.synth)?,
+            Some((scan, labels, mask)) => {
+                let (head, taken) = posed_head(scan, labels.as_ref(), mask.as_ref(), settings)?;
+                synthesize_on(head, taken.as_ref(), &settings.synth)?
+            }
+        };
+        let facts = super::work::facts(&patient.truth);
+        Ok(Produced { files: patient.files(), facts, ..Produced::default() })
+    });
+    let outcome = outcome.map_err(|error| match error {
+        StageError::Compute(error) => error,
+        StageError::Write(error) => WorkflowError::Write(error),
+    })?;
+    Ok(outcome.manifest.facts)
+}
+
+/// A scan's head in the template's frame, and what is to be taken out of it.
+fn posed_head(
+    scan: &Volume<f32, Pre>,
+    labels: Option<&LabelMap<Pre>>,
+    mask: Option<&Mask<Pre>>,
+    settings: &Settings,
+) -> Result<(Head, Option<Mask<Mni>>), WorkflowError> {
+    let refused =
+        |source| WorkflowError::Registration { what: "the head (moving) onto the MNI template (fixed)", source };
+    let anat = &settings.anat;
+    let (pose, segmented) = if let Some(labels) = labels {
+        let pose = pose_of_labels(labels).map_err(refused)?.fixed_from_moving;
+        (pose, segment_by_labels(scan, &pose, labels).0)
+    } else {
+        let pose = pose_of_head(scan).map_err(refused)?.fixed_from_moving;
+        let found = segment_head(scan, &pose, &SegmentOverrides::default(), &anat.deformable, &anat.segment);
+        (pose, found.map_err(SynthError::from)?.0)
+    };
+    let head = Head::of_scan(scan, &pose, &segmented)?;
+    Ok((head, mask.map(|mask| mask_on(mask, &atlas::template().grid(), &pose.inverse()))))
+}
