@@ -5,14 +5,14 @@ use super::gp::StudyOptions;
 use super::{Failure, Reject, Session};
 use crate::material::law::Material;
 use crate::material::literature::citation;
-use crate::material::meta_model::{Fit, MetaModel, Search, StabilityRange};
+use crate::material::meta_model::{Fit, MetaModel, Search};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry, read_rheometry};
+use crate::report::in_words::fit_in_words;
 use crate::workflow::read_input;
 use anyhow::{Context, anyhow};
 use clap::Subcommand;
 use serde::Serialize;
 use serde_json::json;
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Fit constitutive laws to your own tests and to the literature
@@ -90,7 +90,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let mut text = format!("{name}: {} points of {measured}\n", test.stretches.len());
     for one in &fitted {
-        describe(&mut text, one);
+        text += &fit_in_words(&one.fit, one.parameter_names, &one.parameter_sd);
     }
     session
         .emit(&json!({ "source": name, "settings": settings, "points": test.stretches.len(), "fits": fitted }), &text)
@@ -110,41 +110,4 @@ fn points(args: &FitArgs) -> Result<(String, Rheometry), Failure> {
     let words = [model.study.clone(), citation(model)].into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>();
     let name = format!("literature model {id} {}", words.join(", "));
     Ok((name, Rheometry { measured: Measured::Energy, stretches: curve.stretches, values_pa }))
-}
-
-fn describe(text: &mut String, one: &Fitted) {
-    let fit = &one.fit;
-    let _ = write!(text, "\n{:<14}", fit.model.name());
-    for ((name, value), sd) in one.parameter_names.iter().zip(&fit.parameters).zip(&one.parameter_sd) {
-        let bound = if fit.at_bound.iter().any(|b| b == name) { " (at its bound)" } else { "" };
-        let _ = write!(text, "{name} = {value:.4} (sd {sd:.3}){bound}  ");
-    }
-    let _ = write!(
-        text,
-        "\n{:<14}shear modulus {:.1} Pa, R2 {:.4}, cost {:.4}{}\n{:<14}{}\n",
-        "",
-        fit.shear_modulus_pa,
-        fit.r_squared,
-        fit.cost,
-        if fit.converged { "" } else { ", the search did not converge" },
-        "",
-        verdict(fit)
-    );
-}
-
-fn verdict(fit: &Fit) -> String {
-    if fit.stability.everywhere() {
-        return "stable at every stretch: energy grows, energy is convex, true stress rises".to_owned();
-    }
-    let where_ = |range: StabilityRange| match range {
-        StabilityRange::Everywhere => "at every stretch",
-        StabilityRange::Window => "in the window only",
-        StabilityRange::Nowhere => "not even in the window",
-    };
-    format!(
-        "energy grows {}, is convex {}, true stress rises {}",
-        where_(fit.stability.energy_grows),
-        where_(fit.stability.convex),
-        where_(fit.stability.true_stress_rises)
-    )
 }

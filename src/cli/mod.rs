@@ -5,6 +5,7 @@
 //! 4 computed but the quality gate refused it (outputs kept).
 
 mod bids;
+mod compare;
 mod completions;
 mod demo;
 mod doctor;
@@ -57,6 +58,7 @@ enum Command {
     Sweep(sweep::Args),
     Reduce(reduce::Args),
     Estimate(estimate::Args),
+    Compare(compare::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
     Gp(gp::Args),
@@ -86,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args, &session),
         Command::Reduce(args) => reduce::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),
+        Command::Compare(args) => compare::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Gp(args) => gp::run(&args, &session),

@@ -76,7 +76,6 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
-        WorkflowError::EstimateLaw { .. } => "or try samples of that law with `hgm sweep --law`",
         WorkflowError::SampleMissing { .. } => {
             "run `hgm sweep CASE` on the shard it belongs to with the settings of the other shards (`hgm why CASE` tells \
              what differs)"

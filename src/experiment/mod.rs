@@ -1,5 +1,6 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
+pub mod compare;
 pub mod estimate;
 mod law_outcome;
 pub mod nodal_field;
@@ -16,3 +17,5 @@ pub mod smooth_noise;
 pub mod supports;
 pub mod sweep;
 pub mod synth;
+pub mod verdict;
+pub mod verdict_of_samples;

@@ -52,6 +52,27 @@ pub fn mask_surface(mask: &Mask<Mni>) -> TriMesh {
     isosurface(&smooth, 0.5)
 }
 
+/// What mesh, segmentation and registration make of a brain that has not moved, root mean square in mm: how far the mesh's
+/// sets lie from the pre-operative surfaces they follow (`own`), and how much further the brain's surface lies from nodes that
+/// cannot have moved (`still`) on one scan than on the other (`brains`). The two are independent; `None` where there is
+/// nothing to be measured.
+pub fn error_at_rest_mm(
+    mesh: &TetMesh,
+    own: &BTreeMap<String, TriMesh>,
+    still: &str,
+    brains: [&TriMesh; 2],
+) -> Option<f64> {
+    let away = |set: &str, surface: &TriMesh| {
+        let tree = ClosestPoint::new(surface)?;
+        let points: Vec<[f64; 3]> = mesh.node_sets.get(set)?.iter().map(|&n| mesh.nodes_mm()[n as usize]).collect();
+        Some(closest_distances_mm(&points, &tree))
+    };
+    let of_mesh: Vec<f64> = own.iter().filter_map(|(set, surface)| away(set, surface)).flatten().collect();
+    let [before, after] = [away(still, brains[0])?, away(still, brains[1])?];
+    let of_scans: Vec<f64> = before.iter().zip(&after).map(|(b, a)| a - b).collect();
+    Some(root_mean_square(&of_mesh)?.hypot(root_mean_square(&of_scans)?))
+}
+
 impl ObservedSurfaces {
     /// Pairs of set name and observed surface; every surface must have triangles and every set nodes in `mesh`.
     ///
@@ -107,5 +128,29 @@ impl ObservedSurfaces {
             }
         }
         errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::block;
+
+    /// A square sheet at height z over the block's base.
+    fn sheet(z: f64) -> TriMesh {
+        let corner = |x: f64, y: f64| [x, y, z];
+        let nodes_mm = vec![corner(-50.0, -50.0), corner(90.0, -50.0), corner(90.0, 90.0), corner(-50.0, 90.0)];
+        TriMesh { nodes_mm, triangles: vec![[0, 1, 2], [0, 2, 3]] }
+    }
+
+    #[test]
+    fn the_error_at_rest_is_what_mesh_and_scans_are_off_together() {
+        let mesh = block(3);
+        // The upper face lies .3 mm from the surface it follows; the brain's surface .4 mm further off on the other scan.
+        let own = BTreeMap::from([("superior".to_owned(), sheet(30.3))]);
+        let brains = [&sheet(-1.0), &sheet(-1.4)];
+        let error = error_at_rest_mm(&mesh, &own, "base", brains).unwrap();
+        assert!((error - 0.5).abs() < 1e-12, "{error}");
+        assert_eq!(error_at_rest_mm(&mesh, &own, "falx", brains), None);
     }
 }

@@ -5,7 +5,9 @@
 
 pub use super::law_outcome::LawOutcome;
 
+use super::compare::Comparison;
 use super::estimate::EstimateOutcome;
+use super::verdict::Verdict;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -103,6 +105,12 @@ pub struct ExperimentOutcome {
     /// Warnings in the order they were raised.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// What it comes down to; found once all else is there ([`ExperimentOutcome::with_verdict`]).
+    #[serde(default)]
+    pub verdict: Verdict,
+    /// The models that an estimate has tried, where there were several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
 }
 
 /// One simulation of a sweep.
@@ -158,11 +166,18 @@ pub struct NoiseFloor {
     /// Expected error of the segmented surfaces.
     #[serde(default)]
     pub segmentation_mm: Option<f64>,
+    /// What the pair itself shows where nothing can have moved, on the mesh and surfaces in use: all the others in one,
+    /// measured instead of expected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_rest_mm: Option<f64>,
 }
 
 impl NoiseFloor {
-    /// The parts together as independent errors, mm; `None` when no part is known.
+    /// What was measured at rest, else the expected parts together as independent errors, mm; `None` when none is known.
     pub fn combined_mm(&self) -> Option<f64> {
+        if self.at_rest_mm.is_some() {
+            return self.at_rest_mm;
+        }
         let parts = [self.registration_mm, self.voxel_mm, self.segmentation_mm];
         let squares: Vec<f64> = parts.iter().flatten().map(|mm| mm * mm).collect();
         (!squares.is_empty()).then(|| squares.iter().sum::<f64>().sqrt())
@@ -378,8 +393,13 @@ mod tests {
 
     #[test]
     fn independent_errors_add_in_squares() {
-        let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), segmentation_mm: None };
+        let floor = NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), ..NoiseFloor::default() };
         assert!((floor.combined_mm().unwrap() - 0.5).abs() < 1e-12);
+        assert_eq!(
+            NoiseFloor { at_rest_mm: Some(0.8), ..floor }.combined_mm(),
+            Some(0.8),
+            "measured wins over expected"
+        );
         assert!(NoiseFloor::default().combined_mm().is_none());
     }
 }

@@ -1,8 +1,12 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
-use super::estimate::{LogPrior, Scale};
+use super::estimate::{LogPrior, Scale, Unknown};
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
-use crate::material::generative::{SampleSettings, SampledMaterial, sample_shear_moduli};
+use crate::material::generative::{
+    SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
+};
+use crate::material::gp::Spread;
+use crate::material::literature::table;
 use crate::material::meta_model::FitError;
 use crate::material::meta_model::MetaModel;
 use crate::material::{Region, StudyKind, Task};
@@ -155,7 +159,55 @@ pub fn log_prior(tissue: &Tissue, prior: &PriorSettings) -> Result<LogPrior, Pri
         mean: log(1),
         sd: Some(0.5 * (log(2) - log(0))),
         scale: Scale::Logarithm,
+        correlation: Vec::new(),
     })
+}
+
+/// Draws behind the joint prior of a law's parameters: their mean is good to a fourteenth of their spread.
+const DRAWS: u64 = 200;
+/// Stretches that a draw is fitted over.
+const DRAWN_STRETCHES: usize = 101;
+/// Standard deviation of the log odds of a share of which nothing is known but that it is one (the logistic's).
+const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
+
+/// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and the exponent of
+/// Ogden's law or the share of C1 of Mooney and Rivlin's. Mean and covariance are those of laws fitted to whole random
+/// curves of the Gaussian process ([`Spread::Study`]: what one more study would report); an exponent at its bound of 5 says
+/// nothing of the exponent, so Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a
+/// stable law has is as likely as another.
+///
+/// # Errors
+/// [`PriorError`].
+pub fn law_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
+    let modulus = Unknown::ShearModulus(tissue.clone());
+    if prior.law == MetaModel::NEO_HOOKEAN {
+        return Ok(vec![(modulus, log_prior(tissue, prior)?)]);
+    }
+    let law = if prior.law == MetaModel::OGDEN { MetaModel::OGDEN_HIGH } else { prior.law };
+    let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
+    let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..settings };
+    let joint = joint_tissue_prior(task_of(tissue, prior.study)?, &table(), &settings);
+    let draws = draw_materials(&joint, DRAWS, 0, Spread::Study, &settings)
+        .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })?;
+    let moduli: Vec<f64> = draws.iter().map(|d| d.shear_modulus_pa.ln()).collect();
+    let (mean, sd) = mean_and_sd(&moduli);
+    let shape = Unknown::Shape(tissue.clone(), law);
+    let of_shape = if law == MetaModel::MOONEY_RIVLIN {
+        shape.prior(0.0, ANY_SHARE_SD)
+    } else {
+        let exponents: Vec<f64> = draws.iter().map(|d| d.fit.parameters[1]).collect();
+        let (shape_mean, shape_sd) = mean_and_sd(&exponents);
+        let products = moduli.iter().zip(&exponents).map(|(m, e)| (m - mean) * (e - shape_mean));
+        let correlation = products.sum::<f64>() / (draws.len() as f64 - 1.0) / (sd * shape_sd);
+        LogPrior { correlation: vec![correlation], ..shape.prior(shape_mean, shape_sd) }
+    };
+    Ok(vec![(modulus.clone(), modulus.prior(mean, sd)), (shape, of_shape)])
+}
+
+fn mean_and_sd(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    (mean, (squares / (values.len() as f64 - 1.0)).sqrt())
 }
 
 #[cfg(test)]
@@ -213,5 +265,16 @@ mod tests {
         assert!(matches!(log_prior(&bone, &PriorSettings::default()), Err(PriorError::UnknownTissue(_))));
         let none = samples_of_prior(&Tissue::whole_brain(), &[], 0.45, &PriorSettings::default());
         assert!(matches!(none, Err(PriorError::NoLevels)));
+    }
+
+    #[test]
+    fn the_joint_prior_of_ogdens_law_has_an_exponent_off_its_bound_and_a_modulus_near_the_neo_hookean_one() {
+        let tissue = &Tissue::grey_and_white()[0];
+        let ogden = law_priors(tissue, &PriorSettings { law: MetaModel::OGDEN, ..PriorSettings::default() }).unwrap();
+        let neo = law_priors(tissue, &PriorSettings::default()).unwrap();
+        assert_eq!((ogden.len(), neo.len()), (2, 1));
+        assert!((ogden[0].1.mean - neo[0].1.mean).abs() < 0.5 * neo[0].1.sd.unwrap(), "{ogden:?} {neo:?}");
+        assert!(ogden[1].1.mean < -6.0 && ogden[1].1.sd.unwrap() > 0.1, "{ogden:?}");
+        assert!(ogden[1].1.correlation[0].abs() < 1.0);
     }
 }

@@ -6,6 +6,7 @@ use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
 use super::skull::{SkullSettings, level_when_drained};
+use super::verdict_of_samples::compared;
 use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
 use crate::geometry::Frame;
 use crate::image::LabelMap;
@@ -62,6 +63,35 @@ impl CsfSettings {
     }
 }
 
+/// How the skull holds a patient's brain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Supports {
+    /// Not known: an estimate tries the others and weighs them by their evidence; samples are simulated as `fixed`.
+    #[default]
+    Evidence,
+    /// At its base, which does not move, as in the paper.
+    Fixed,
+    /// Only the cut brainstem is held, and the skull pushes back without friction.
+    Sliding,
+}
+
+impl Supports {
+    /// What an estimate tries, in this order.
+    pub fn family(self) -> Vec<Self> {
+        if self == Self::Evidence { vec![Self::Fixed, Self::Sliding] } else { vec![self] }
+    }
+
+    /// The word of files and texts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Evidence => "evidence",
+            Self::Fixed => "fixed",
+            Self::Sliding => "sliding",
+        }
+    }
+}
+
 /// Loads, supports and samples of a patient's sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -85,9 +115,8 @@ pub struct ResectionSettings {
     pub sd_levels: Vec<f64>,
     /// Node sets held still.
     pub fixed: Vec<String>,
-    /// How the skull holds the brain: `fixed` at its base, as in the paper, or `sliding`: only the cut brainstem is held
-    /// there, and the skull pushes back without friction.
-    pub supports: Support,
+    /// How the skull holds the brain.
+    pub supports: Supports,
     /// How the falx holds it where `supports` slide: `fixed` to it, or `sliding` along either side.
     pub falx: Support,
     /// The skull of `supports = "sliding"`.
@@ -113,7 +142,7 @@ impl Default for ResectionSettings {
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
             fixed: vec!["base".to_owned(), "falx".to_owned()],
-            supports: Support::Fixed,
+            supports: Supports::Evidence,
             falx: Support::Fixed,
             skull: SkullSettings::default(),
             csf: None,
@@ -176,20 +205,14 @@ impl ResectionSettings {
             registration_mm: Some(self.registration_error_mm),
             voxel_mm: Some(coarsest_voxel_mm / 12f64.sqrt()),
             segmentation_mm: Some(0.5 * coarsest_voxel_mm),
+            at_rest_mm: None,
         }
     }
 }
 
-/// Whether `deformed` is better than `rest` by more than the measurement is worth.
+/// Whether `deformed` is better than `rest` by more than the measurement is worth, in words.
 pub fn improvement(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> &'static str {
-    let floor_mm = floor.combined_mm().unwrap_or(0.0);
-    if rest_mm - deformed_mm > floor_mm {
-        "better than rest"
-    } else if deformed_mm - rest_mm > floor_mm {
-        "worse than rest"
-    } else {
-        "not distinguishable from rest"
-    }
+    compared(rest_mm, deformed_mm, floor).short()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 pub use super::skull::{SkullFrom, SkullSettings, level_when_drained, smooth_distance};
 
-use super::resection::ResectionSettings;
+use super::resection::{ResectionSettings, Supports};
 use crate::fem::{Contact, FemError, Scenario, Support, Wall};
 use crate::geometry::{Frame, SmoothField};
 use crate::image::LabelMap;
@@ -66,13 +66,13 @@ pub enum SupportsError {
 impl ResectionSettings {
     /// Whether [`Self::supported`] looks at the labels.
     pub fn needs_labels(&self) -> bool {
-        self.supports == Support::Sliding || self.csf.is_some()
+        self.supports == Supports::Sliding || self.csf.is_some()
     }
 
     /// What else holds and carries the brain, to follow a list of what is held.
     pub fn supports_in_words(&self) -> String {
         let mut words = String::new();
-        if self.supports == Support::Sliding {
+        if self.supports == Supports::Sliding {
             let from = match self.skull.from {
                 SkullFrom::Cortex => "from the cortex",
                 SkullFrom::Scan => "outside the fluid that the scan shows",
@@ -99,7 +99,7 @@ impl ResectionSettings {
             let level = csf.level(labels, scenario.loads.gravity_m_per_s2);
             scenario.loads.csf = Some(level.ok_or(SupportsError::NoFluid)?);
         }
-        if self.supports == Support::Fixed {
+        if self.supports != Supports::Sliding {
             return Ok(scenario);
         }
         let skull = self.skull.distance(labels).ok_or(SupportsError::NoSkull)?;
@@ -111,7 +111,7 @@ impl ResectionSettings {
     /// # Errors
     /// [`SupportsError::Fem`] when the falx of this mesh is no sheet.
     pub fn supported_mesh(&self, mesh: TetMesh, scenario: &Scenario) -> Result<TetMesh, SupportsError> {
-        if self.supports == Support::Fixed {
+        if self.supports != Supports::Sliding {
             return Ok(mesh);
         }
         Ok(scenario.body(&with_sliding_sets(&mesh, &self.skull))?.into_owned())

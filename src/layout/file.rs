@@ -51,6 +51,8 @@ pub enum Maker {
     Sample,
     /// The most probable moduli.
     Estimate,
+    /// Models beside each other.
+    Compare,
     /// The numbers gathered, with the settings and the provenance.
     Outcome,
     /// The page and the files for other viewers.

@@ -65,6 +65,8 @@ pub const SAMPLE_STATE: Family = Family("sim/{sample}.vtu");
 pub const ESTIMATE_STATE: &str = "sim/estimate.vtu";
 /// The estimate's numbers.
 pub const ESTIMATE_JSON: &str = "sim/estimate.json";
+/// Models beside each other, by their evidence.
+pub const COMPARISON: &str = "sim/compare.json";
 /// The experiment's numbers.
 pub const OUTCOME: &str = "sim/outcome.json";
 /// A line per sample.
@@ -189,6 +191,7 @@ pub const TABLE: &[Entry] = &[
     file(SAMPLE_STATE.0, "state of one sample", Space::Mni, Maker::Sample),
     file(ESTIMATE_STATE, "state that the estimate leads to", Space::Mni, Maker::Estimate),
     file(ESTIMATE_JSON, "the estimate's numbers", Space::None, Maker::Estimate),
+    file(COMPARISON, "models beside each other, by their evidence", Space::None, Maker::Compare),
     file(OUTCOME, "the experiment's numbers", Space::None, Maker::Outcome),
     file(SAMPLES_TABLE, "a line per sample", Space::None, Maker::Outcome),
     file(SETTINGS, "every setting that was used, by room", Space::None, Maker::Outcome),

@@ -2,8 +2,9 @@
 
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::{Answer, ExperimentOutcome};
-use crate::experiment::resection::improvement;
 use crate::experiment::rmse::median_and_mad;
+use crate::experiment::verdict::Finding;
+use crate::experiment::verdict_of_samples::compared;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
@@ -194,12 +195,15 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
     let mut verdict = None;
     if let Some(outcome) = &member.outcome {
         let best = outcome.best();
+        let found = outcome.verdict.finding;
+        // A stiffness that is not claimed takes no part in a cohort's.
+        let claimed = found == Finding::Nothing || found.has_stiffness();
         for tissue in &outcome.tissues {
             add(format!("{tissue}_sd_level"), best.and_then(|sample| sample.sd_levels.get(tissue).copied()));
             let modulus = best.and_then(|sample| sample.shear_modulus_pa.get(tissue).copied());
-            add(format!("{tissue}_shear_modulus_pa"), modulus);
+            add(format!("{tissue}_shear_modulus_pa"), modulus.filter(|_| claimed));
         }
-        for posterior in outcome.estimate.iter().map(|e| &e.posterior) {
+        for posterior in outcome.estimate.iter().map(|e| &e.posterior).filter(|_| claimed) {
             for (name, [low, high]) in posterior.names.iter().zip(&posterior.interval_95) {
                 let name = name.replace(' ', "_");
                 add(format!("{name}_95_low"), Some(*low));
@@ -228,7 +232,7 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
         let margin = (outcome.rest_rmse_mm.get("margin"), best.and_then(|sample| sample.rmse_mm.get("margin")));
         if let (Some(rest), Some(deformed)) = margin {
-            verdict = Some(improvement(*rest, *deformed, &floor));
+            verdict = Some(if found == Finding::Nothing { compared(*rest, *deformed, &floor) } else { found }.short());
         }
     }
     Row {

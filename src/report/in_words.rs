@@ -1,16 +1,21 @@
 //! What was found in a few lines of text.
 
+use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::resection::improvement;
+use crate::material::law::StabilityRange;
+use crate::material::meta_model::Fit;
 
 /// Best sample, errors and verdicts.
 pub fn summary(outcome: &ExperimentOutcome) -> String {
-    let mut text = String::new();
+    let mut text = format!("{}\n", outcome.verdict.sentence);
     let floor = outcome.noise_floor.unwrap_or_default();
-    if let Some(best) = outcome.best() {
+    if let Some(best) = outcome.best().filter(|_| outcome.verdict.finding.has_stiffness()) {
         let moduli: Vec<String> = best.shear_modulus_pa.iter().map(|(t, m)| format!("{t} {m:.0} Pa")).collect();
         text += &format!("best sample {} ({})\n", best.id, moduli.join(", "));
+    }
+    if let Some(best) = outcome.best() {
         for (set, deformed) in &best.rmse_mm {
             let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
             let verdict = improvement(rest, *deformed, &floor);
@@ -23,12 +28,28 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
     text
 }
 
+/// The models that were tried, the most probable first.
+pub fn models_table(comparison: &Comparison) -> String {
+    let best = comparison.candidates.first().map_or(0.0, |c| c.log_evidence);
+    let mut text =
+        String::from("model                                              log odds  weight  explained  finding\n");
+    for c in &comparison.candidates {
+        let (odds, share, finding) = (c.log_evidence - best, 100.0 * c.explained_share, c.finding.short());
+        text += &format!("{:<49} {odds:>9.1} {:>7.3} {share:>8.0} %  {finding}\n", c.name, c.weight);
+    }
+    text
+}
+
 /// Parameters with their intervals, and what limits them.
 pub fn estimate_table(estimate: &EstimateOutcome) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         estimate;
-    let mut text = String::from("parameter                            mode   95 % interval\n");
-    for (n, name) in posterior.names.iter().enumerate() {
+    let mut text = format!("{}\n", estimate.verdict.sentence);
+    let shown = estimate.verdict.finding.has_stiffness();
+    if shown {
+        text += "parameter                            mode   95 % interval\n";
+    }
+    for (n, name) in posterior.names.iter().enumerate().filter(|_| shown) {
         let [low, high] = posterior.interval_95[n];
         text += &format!("{name:<32} {:>8.1}   {low:.1} to {high:.1}\n", posterior.mode[n]);
     }
@@ -48,7 +69,7 @@ pub fn estimate_table(estimate: &EstimateOutcome) -> String {
 /// Rest against the estimate's state at every set.
 pub fn comparison(outcome: &ExperimentOutcome, estimate: &SampleOutcome) -> String {
     let floor = outcome.noise_floor.unwrap_or_default();
-    let mut text = String::new();
+    let mut text = outcome.comparison.as_ref().map_or_else(String::new, models_table);
     for (set, deformed) in &estimate.rmse_mm {
         let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
         text += &format!(
@@ -70,4 +91,34 @@ pub fn phantom_summary(outcome: &ExperimentOutcome, nearest: Option<&str>) -> St
         text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
     }
     text
+}
+
+/// A law fitted to a curve: its parameters with their standard deviations, how well it fits and where it is stable.
+pub fn fit_in_words(fit: &Fit, names: &[&str], sd: &[f64]) -> String {
+    let mut text = format!("\n{:<14}", fit.model.name());
+    for ((name, value), sd) in names.iter().zip(&fit.parameters).zip(sd) {
+        let bound = if fit.at_bound.iter().any(|b| b == name) { " (at its bound)" } else { "" };
+        text += &format!("{name} = {value:.4} (sd {sd:.3}){bound}  ");
+    }
+    let search = if fit.converged { "" } else { ", the search did not converge" };
+    let (modulus_pa, r2, cost) = (fit.shear_modulus_pa, fit.r_squared, fit.cost);
+    text += &format!("\n{:<14}shear modulus {modulus_pa:.1} Pa, R2 {r2:.4}, cost {cost:.4}{search}\n", "");
+    text + &format!("{:<14}{}\n", "", stability_in_words(fit))
+}
+
+fn stability_in_words(fit: &Fit) -> String {
+    if fit.stability.everywhere() {
+        return "stable at every stretch: energy grows, energy is convex, true stress rises".to_owned();
+    }
+    let where_ = |range: StabilityRange| match range {
+        StabilityRange::Everywhere => "at every stretch",
+        StabilityRange::Window => "in the window only",
+        StabilityRange::Nowhere => "not even in the window",
+    };
+    format!(
+        "energy grows {}, is convex {}, true stress rises {}",
+        where_(fit.stability.energy_grows),
+        where_(fit.stability.convex),
+        where_(fit.stability.true_stress_rises)
+    )
 }

@@ -34,6 +34,9 @@ pub struct EstimateOptions {
     /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
     /// 60,000 lay within 7 % of the finer one.
     pub model_log_sd: f64,
+    /// Solve for a patient in a mesh of a quarter of the tetrahedra as well: what the mesh adds to the moduli is found from
+    /// the difference instead of taken from `model_log_sd`.
+    pub two_meshes: bool,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -59,6 +62,7 @@ impl Default for EstimateOptions {
             correlation_mm: 5.0,
             element: ElementKind::TET4_NODAL,
             model_log_sd: 0.15,
+            two_meshes: true,
             density: false,
             density_log_sd: 0.56,
             gravity_direction: false,

@@ -1,5 +1,6 @@
 //! What stages have found out, as their manifests keep it.
 
+use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::outcome::{MeshOutcome, SampleOutcome, SetOutcome};
 use serde::{Deserialize, Serialize};
@@ -22,4 +23,7 @@ pub struct EstimateFacts {
     pub estimate: EstimateOutcome,
     /// Moduli and errors in the layout of a sample.
     pub record: SampleOutcome,
+    /// The models that were tried, where there were several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
 }

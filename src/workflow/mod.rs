@@ -69,7 +69,7 @@ pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
-use crate::material::meta_model::MetaModel;
+use crate::experiment::compare::Comparison;
 use lock::Lock;
 use patient::{Images, Patient, Prepared};
 use phantom::Phantom;
@@ -134,10 +134,6 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     let engine = work.settings.mesh.engine;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(engine).map_err(refused)?;
-    let law = work.settings.prior.law;
-    if goal == Goal::Estimate && law != MetaModel::NEO_HOOKEAN {
-        return Err(WorkflowError::EstimateLaw { law: law.name().to_owned() });
-    }
     plan(work.settings, work.subject, goal).map(|_| ())
 }
 
@@ -201,6 +197,21 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
         phantom.gather()?;
     }
     Ok(work.case.clone())
+}
+
+/// Models of a prepared case beside each other: which of them what was seen speaks for.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn compare(
+    place: &Place,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<(Case, Comparison), WorkflowError> {
+    let work = Work::new(place, Subject::Patient, settings, progress);
+    prepared_case(&work, true)?;
+    let comparison = Patient::new(&work, Prepared::read(&work)?)?.compare()?;
+    Ok((work.case.clone(), comparison))
 }
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples.

@@ -16,6 +16,7 @@ pub(crate) fn finish(
     outcome: &ExperimentOutcome,
     manifests: &[&Manifest],
 ) -> Result<(), WorkflowError> {
+    let outcome = &outcome.clone().with_verdict();
     write_whole(&work.case.path(layout::OUTCOME), outcome.to_json(layout::OUTCOME)?.as_bytes())?;
     write_whole(&work.case.path(layout::SAMPLES_TABLE), samples_table(outcome).as_bytes())?;
     keep_settings(work)?;
@@ -102,4 +103,5 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
     outcome.warnings.retain(|w| !w.starts_with("estimate: "));
     outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
     outcome.estimate = Some(facts.estimate.clone());
+    outcome.comparison.clone_from(&facts.comparison);
 }

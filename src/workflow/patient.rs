@@ -7,11 +7,15 @@ use super::outcome::{finish, keep_settings, with_estimate};
 use super::plan;
 use super::refusal;
 use super::stage_name::StageName;
-use super::stages::{self, AnatFacts, Anatomy, EstimateInput, RegistrationFacts, SampleMode, SeenShift, Sweep};
+use super::stages::{
+    self, AnatFacts, Anatomy, EstimateInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
+};
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
+use crate::experiment::compare::Comparison;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
+use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
@@ -188,6 +192,8 @@ pub(crate) struct Patient<'w, 'a> {
     mesh: TetMesh,
     mesh_bytes: Vec<u8>,
     reference: Reference,
+    /// What mesh and scans are off without any movement, mm.
+    at_rest_mm: Option<f64>,
 }
 
 impl<'w, 'a> Patient<'w, 'a> {
@@ -203,11 +209,14 @@ impl<'w, 'a> Patient<'w, 'a> {
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, surfaces)?);
-        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference })
+        let at_rest_mm = stages::error_at_rest(&work.case, &anatomy, &mesh)?;
+        Ok(Self { work, prepared, scenario, held, mesh, mesh_bytes, reference, at_rest_mm })
     }
 
+    /// What the pair shows at rest, with what is expected of its parts beside it.
     fn floor(&self) -> NoiseFloor {
-        self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm)
+        let expected = self.work.settings.resection.noise_floor(self.prepared.anat.coarsest_voxel_mm);
+        NoiseFloor { at_rest_mm: self.at_rest_mm, ..expected }
     }
 
     /// Simulates the samples of one part, or all of them, and nothing else.
@@ -228,11 +237,44 @@ impl<'w, 'a> Patient<'w, 'a> {
 
     /// Estimates the moduli against what the post-operative scan shows.
     pub fn estimate(&self) -> Result<(), WorkflowError> {
+        self.with_images(|made, input| stages::estimate(self.work, made, input)).map(|_| ())
+    }
+
+    /// Models of this patient beside each other.
+    pub fn compare(&self) -> Result<Comparison, WorkflowError> {
+        self.with_images(|made, input| stages::compare(self.work, made, input))
+    }
+
+    /// What an estimate needs with what the images show, handed on.
+    fn with_images<T>(
+        &self,
+        then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
+    ) -> Result<T, WorkflowError> {
         let Self { work, prepared, .. } = self;
+        let settings = &work.settings.resection;
+        let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
+        let held = || -> Result<Vec<HeldBody>, WorkflowError> {
+            settings.supports.family().into_iter().map(|supports| self.held(supports)).collect()
+        };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let input = EstimateInput { shift: Some(&shift), ..self.asked(&tissues) };
-        stages::estimate(work, &mut prepared.made.clone(), &input).map(|_| ())
+        let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
+        let input = EstimateInput { shift, coarser, held, ..self.asked(&tissues) };
+        then(&mut prepared.made.clone(), &input)
+    }
+
+    /// The body as these supports hold it.
+    fn held(&self, supports: Supports) -> Result<HeldBody, WorkflowError> {
+        let work = self.work;
+        let settings = ResectionSettings { supports, ..work.settings.resection.clone() };
+        let anatomy = Anatomy::read(&work.case)?;
+        let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
+        let scenario = settings.supported(&template, &anatomy.labels)?;
+        let (scenario, _) = stages::with_held_tissues(work, &self.prepared.mesh.mesh, scenario)?;
+        let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
+        let mesh = settings.supported_mesh(rest, &scenario)?;
+        let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -243,8 +285,11 @@ impl<'w, 'a> Patient<'w, 'a> {
             tissues,
             poisson_ratio: settings.resection.poisson_ratio,
             reference: &self.reference,
+            coarser: None,
+            held: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
+            rigid_error_mm: settings.resection.registration_error_mm,
         }
     }
 

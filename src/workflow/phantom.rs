@@ -97,8 +97,11 @@ impl<'w, 'a> Phantom<'w, 'a> {
             tissues: &self.tissues,
             poisson_ratio: self.work.settings.phantom.poisson_ratio,
             reference: &self.reference,
+            coarser: None,
+            held: None,
             shift: None,
             noise_mm: self.work.settings.estimate.phantom_noise_mm,
+            rigid_error_mm: 0.0,
         }
     }
 

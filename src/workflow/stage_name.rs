@@ -34,6 +34,8 @@ pub enum StageName {
     Sample(String),
     /// The most probable moduli.
     Estimate,
+    /// Models beside each other.
+    Compare,
 }
 
 impl StageName {
@@ -47,7 +49,7 @@ impl StageName {
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
             (Self::Sample(_), Subject::Patient) => &[Mesh, Reference],
-            (Self::Sample(_), Subject::Phantom { .. }) | (Self::Estimate, _) => &[Reference],
+            (Self::Sample(_), Subject::Phantom { .. }) | (Self::Estimate | Self::Compare, _) => &[Reference],
         }
     }
 
@@ -61,6 +63,7 @@ impl StageName {
             Self::Reference => Maker::Reference,
             Self::Sample(_) => Maker::Sample,
             Self::Estimate => Maker::Estimate,
+            Self::Compare => Maker::Compare,
         })
     }
 
@@ -81,6 +84,7 @@ impl StageName {
             "mesh" => Self::Mesh,
             "reference" => Self::Reference,
             "estimate" => Self::Estimate,
+            "compare" => Self::Compare,
             other => Self::Sample(other.strip_prefix("sim-")?.to_owned()),
         })
     }
@@ -96,6 +100,7 @@ impl fmt::Display for StageName {
             Self::Reference => f.write_str("reference"),
             Self::Sample(id) => write!(f, "sim-{id}"),
             Self::Estimate => f.write_str("estimate"),
+            Self::Compare => f.write_str("compare"),
         }
     }
 }

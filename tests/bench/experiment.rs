@@ -1,7 +1,7 @@
 //! Bars of the phantom and of estimation.
 
 use crate::bar::{Bar, cpu_seconds, data, run_hgm};
-use hgm::experiment::estimate::{Estimate, EstimateSettings, Observation, Problem, Unknown, solve_problem};
+use hgm::experiment::estimate::{Errors, Estimate, EstimateSettings, Observation, Problem, Unknown, solve_problem};
 use hgm::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use hgm::experiment::phantom::PhantomSettings;
 use hgm::experiment::prior::{PriorSettings, samples_of_prior};
@@ -155,8 +155,10 @@ fn estimated(
         unknowns: Tissue::grey_and_white().into_iter().map(unknown).collect(),
         poisson_ratio: 0.45,
         observation: Observation::Nodes(observed),
-        independent_share: 1.0,
+        errors: Errors::Independent { share: 1.0 },
         model_log_sd: 0.0,
+        coarser: None,
+        body_known: true,
         start,
         instrument: None,
     };

@@ -6,6 +6,7 @@ use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::sample::Tissue;
 use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State};
 use crate::material::law::{Material, Parameter};
+use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
 use nalgebra::{DMatrix, DVector, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -14,8 +15,11 @@ use thiserror::Error;
 /// Something the estimate may change.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Unknown {
-    /// Shear modulus of a tissue, Pa.
+    /// Shear modulus of a tissue at rest, Pa.
     ShearModulus(Tissue),
+    /// What else the tissue's law has, its shear modulus held: the exponent of Ogden's, or the share of C1 in C1 + C2 of
+    /// Mooney and Rivlin's (its log odds).
+    Shape(Tissue, MetaModel),
     /// Effective density of all tissue, kg/m3.
     Density,
     /// Pressure on the facets of a set, Pa: `loads.pressure` of this index, in the direction given there.
@@ -46,19 +50,33 @@ impl Unknown {
     pub fn scale(&self) -> Scale {
         match self {
             Self::GravityTurn(_) => Scale::Angle,
+            Self::Shape(_, law) if *law == MetaModel::MOONEY_RIVLIN => Scale::Share,
+            Self::Shape(..) => Scale::Plain,
             _ => Scale::Logarithm,
+        }
+    }
+
+    /// The tissue whose stiffness it is.
+    pub fn tissue(&self) -> Option<String> {
+        match self {
+            Self::ShearModulus(tissue) => Some(tissue.name.clone()),
+            _ => None,
         }
     }
 
     /// What is known of it beforehand.
     pub fn prior(&self, mean: f64, sd: f64) -> LogPrior {
-        LogPrior { name: self.name(), mean, sd: Some(sd), scale: self.scale() }
+        LogPrior { name: self.name(), mean, sd: Some(sd), scale: self.scale(), correlation: Vec::new() }
     }
 
     /// How tables name it.
     pub fn name(&self) -> String {
         match self {
             Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
+            Self::Shape(tissue, law) if *law == MetaModel::MOONEY_RIVLIN => {
+                format!("share of c1_pa in c1_pa + c2_pa of {}", tissue.name)
+            }
+            Self::Shape(tissue, _) => format!("alpha of {}", tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
             Self::GravityTurn(Turn::Nodding) => "turn of gravity about left-right, degrees".to_owned(),
@@ -158,6 +176,11 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// The mesh.
+    pub(super) fn mesh(&self) -> &'a TetMesh {
+        self.mesh
+    }
+
     /// Compares with another observation from now on.
     pub(super) fn observe(&mut self, observation: Observation) {
         self.observation = observation;
@@ -168,7 +191,7 @@ impl<'a> Body<'a> {
         let mut loads = self.template.loads.clone();
         for (unknown, &value) in self.unknowns.iter().zip(parameters) {
             match unknown {
-                Unknown::ShearModulus(_) | Unknown::GravityTurn(_) => {}
+                Unknown::ShearModulus(_) | Unknown::Shape(..) | Unknown::GravityTurn(_) => {}
                 Unknown::Density => loads.density_kg_per_m3 = value.exp(),
                 Unknown::Pressure(n) => {
                     let pressure = &mut loads.pressure[*n].pressure_pa;
@@ -225,6 +248,17 @@ impl<'a> Body<'a> {
                 Unknown::GravityTurn(_) => {
                     let turning = self.turning(log_parameters, n);
                     by.extend((0..3).map(|axis| (By::Gravity(axis), n, turning[axis])));
+                }
+                Unknown::Shape(tissue, law) => {
+                    for name in tissue.labels.iter().filter_map(|&l| self.template.label_name(l)) {
+                        let own = materials.get(name);
+                        for (parameter, weight) in shape_slopes(*law, log_parameters[n]) {
+                            let parameter = own.and_then(|material| material.parameter(parameter, 0));
+                            by.extend(
+                                parameter.map(|p| (By::Material { name: name.to_owned(), parameter: p }, n, weight)),
+                            );
+                        }
+                    }
                 }
                 Unknown::ShearModulus(tissue) => {
                     let names = tissue.labels.iter().filter_map(|&l| self.template.label_name(l));
@@ -322,14 +356,41 @@ fn materials(
     let mut materials = template.materials.clone();
     for (unknown, log) in unknowns.iter().zip(log_parameters) {
         if let Unknown::ShearModulus(tissue) = unknown {
+            let shape = unknowns.iter().zip(log_parameters).find_map(|(other, value)| match other {
+                Unknown::Shape(of, law) if of == tissue => Some((*law, *value)),
+                _ => None,
+            });
             for &label in &tissue.labels {
                 let missing = || BodyError::NoName { label, tissue: tissue.name.clone() };
                 let name = template.label_name(label).ok_or_else(missing)?;
-                materials.insert(name.to_owned(), Material::neo_hookean(log.exp(), poisson_ratio));
+                materials.insert(name.to_owned(), material(log.exp(), shape, poisson_ratio));
             }
         }
     }
     Ok(materials)
+}
+
+/// The material of a shear modulus at rest (Pa) and what else its law has.
+pub fn material(shear_modulus_pa: f64, shape: Option<(MetaModel, f64)>, poisson_ratio: f64) -> Material {
+    match shape {
+        Some((law, value)) if law == MetaModel::MOONEY_RIVLIN => {
+            // mu = 2 (C1 + C2).
+            let (sum, share) = (0.5 * shear_modulus_pa, Scale::Share.value(value));
+            MetaModel::MOONEY_RIVLIN.material(&[share * sum, (1.0 - share) * sum], poisson_ratio)
+        }
+        // mu = mu_1 alpha_1 / 2.
+        Some((law, alpha)) => law.material(&[2.0 * shear_modulus_pa / alpha, alpha], poisson_ratio),
+        None => Material::neo_hookean(shear_modulus_pa, poisson_ratio),
+    }
+}
+
+/// How a law's own parameters change with its shape, the shear modulus held: d ln(parameter) / d shape.
+fn shape_slopes(law: MetaModel, shape: f64) -> [(&'static str, f64); 2] {
+    if law == MetaModel::MOONEY_RIVLIN {
+        let share = Scale::Share.value(shape);
+        return [("c1_pa", 1.0 - share), ("c2_pa", -share)];
+    }
+    [("alpha", 1.0 / shape), ("mu_pa", -1.0 / shape)]
 }
 
 fn normal_of([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {

@@ -4,6 +4,7 @@
 //! the skull, where tissue slides past bone, and at the cavity, where there is no tissue to be found again, its
 //! smoothness ties what moves to what does not.
 
+use super::{CorrelatedErrors, Process};
 use crate::experiment::setting::{SettingError, first_broken};
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use rayon::prelude::*;
@@ -11,9 +12,8 @@ use serde::{Deserialize, Serialize};
 
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
-/// Depth and noise were measured on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is
-/// known, with the registration's own error taken out; what they lead to stands in docs/evidence/patients.md. The
-/// distance is that at which the fit's smoothing (Gaussians of 8 mm) no longer ties two nodes together.
+/// Depth was chosen on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is known. Noise and
+/// length are what the registration shows of a pair that has not moved (docs/evidence/estimate.md).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplacementSettings {
@@ -21,15 +21,17 @@ pub struct DisplacementSettings {
     pub depth_mm: f64,
     /// Standard deviation of one component, mm.
     pub noise_mm: f64,
-    /// Nodes nearer to each other than this share their error, mm: they count as one.
+    /// Length over which errors are alike, mm: that of Matern's covariance of order 3/2.
     pub correlation_mm: f64,
+    /// Most nodes that are looked at; those between them say the same.
+    pub places: usize,
     /// How many times the registration's own error is measured on the estimate's state and taken out.
     pub re_registrations: usize,
 }
 
 impl Default for DisplacementSettings {
     fn default() -> Self {
-        Self { depth_mm: 10.0, noise_mm: 0.1, correlation_mm: 20.0, re_registrations: 1 }
+        Self { depth_mm: 10.0, noise_mm: 0.2, correlation_mm: 20.0, places: 400, re_registrations: 1 }
     }
 }
 
@@ -44,6 +46,7 @@ impl DisplacementSettings {
             ("depth_mm", &self.depth_mm, self.depth_mm >= 0.0, "0 or more"),
             ("noise_mm", &self.noise_mm, positive(self.noise_mm), "above 0"),
             ("correlation_mm", &self.correlation_mm, positive(self.correlation_mm), "above 0"),
+            ("places", &self.places, (10..=4000).contains(&self.places), "10 to 4000"),
         ])
     }
 
@@ -70,10 +73,10 @@ impl DisplacementSettings {
             .collect()
     }
 
-    /// The share of `observations` nodes of a mesh that are independent of each other.
-    pub fn independent_share(&self, mesh: &TetMesh) -> f64 {
-        let volume_mm3: f64 = (0..mesh.tets().len()).map(|t| mesh.volume_mm3(t)).sum();
-        (volume_mm3 / mesh.nodes_mm().len() as f64 / self.correlation_mm.powi(3)).min(1.0)
+    /// How far the displacements are believed, when the rigid registration is expected to be off by `rigid_mm`.
+    pub fn errors(&self, rigid_mm: f64) -> CorrelatedErrors {
+        let noise = Process { sd_mm: self.noise_mm, length_mm: self.correlation_mm };
+        CorrelatedErrors { noise, rigid_mm: rigid_mm.max(1e-6), places: self.places }
     }
 }
 

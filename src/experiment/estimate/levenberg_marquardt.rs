@@ -112,6 +112,12 @@ pub enum EstimateError {
         /// Parameters.
         parameters: usize,
     },
+    /// The errors' covariance has no factor.
+    #[error(
+        "the covariance of the errors cannot be factored: give `noise_mm` and `correlation_mm` of the table \
+         [estimate.displacement] above 0 and of a size that displacements have"
+    )]
+    Covariance,
     /// A residual is NaN or infinite.
     #[error(
         "the displacement of observation {0} is not a finite number: a file of the case is damaged; make the case \
@@ -131,11 +137,11 @@ pub fn estimate<M: Forward>(
     settings: &EstimateSettings,
 ) -> Result<Descent, EstimateError> {
     let weight = settings.noise_mm.powi(-2);
-    let precision = DVector::from_iterator(prior.len(), prior.iter().map(LogPrior::precision));
+    let precision = super::precision(prior);
     let mean = DVector::from_iterator(prior.len(), prior.iter().map(|p| p.mean));
     let cost = |theta: &DVector<f64>, r: &DVector<f64>| {
         let away = theta - &mean;
-        0.5 * weight * r.norm_squared() + 0.5 * away.dot(&away.component_mul(&precision))
+        0.5 * weight * r.norm_squared() + 0.5 * away.dot(&(&precision * &away))
     };
 
     let mut theta = DVector::from_column_slice(start);
@@ -152,8 +158,8 @@ pub fn estimate<M: Forward>(
     let mut convergence = Convergence::IterationsExhausted;
     'descent: for _ in 0..settings.iterations {
         let jt = here.jacobian_mm.transpose();
-        let gradient = &jt * &here.residuals_mm * weight + (&theta - &mean).component_mul(&precision);
-        let hessian = &jt * &here.jacobian_mm * weight + DMatrix::from_diagonal(&precision);
+        let gradient = &jt * &here.residuals_mm * weight + &precision * (&theta - &mean);
+        let hessian = &jt * &here.jacobian_mm * weight + &precision;
         loop {
             let scale = hessian.diagonal().map(|d| d.max(1e-12)) * damping;
             let damped = &hessian + DMatrix::from_diagonal(&scale);
@@ -230,7 +236,15 @@ mod tests {
     }
 
     fn no_prior() -> Vec<LogPrior> {
-        ["a", "b"].map(|name| LogPrior { name: name.to_owned(), mean: 0.0, sd: None, scale: Scale::Logarithm }).to_vec()
+        ["a", "b"]
+            .map(|name| LogPrior {
+                name: name.to_owned(),
+                mean: 0.0,
+                sd: None,
+                scale: Scale::Logarithm,
+                correlation: Vec::new(),
+            })
+            .to_vec()
     }
 
     #[test]
@@ -265,7 +279,13 @@ mod tests {
     #[test]
     fn a_tight_prior_holds_the_parameter() {
         let mut model = Compliance { observed: simulate(&[1.3, 0.4]) };
-        let tight = |mean| LogPrior { name: String::new(), mean, sd: Some(1e-6), scale: Scale::Logarithm };
+        let tight = |mean| LogPrior {
+            name: String::new(),
+            mean,
+            sd: Some(1e-6),
+            scale: Scale::Logarithm,
+            correlation: Vec::new(),
+        };
         let descent =
             estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();
         assert!((descent.log_parameters[0] - 2.0).abs() < 1e-4 && descent.log_parameters[1].abs() < 1e-4);

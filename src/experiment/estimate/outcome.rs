@@ -1,18 +1,39 @@
 //! From a posed problem to the estimate that is reported.
 
 use super::body::{Body, BodyError, Observation, Solved, Unknown};
+use super::correlated::{self, CorrelatedErrors, Odds, Shift};
+use super::evidence::Unexplained;
+use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
-use super::{Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Verdict, estimate, laplace};
+use super::{
+    Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace,
+};
 use crate::experiment::rmse::root_mean_square;
+use crate::experiment::sample::Tissue;
+use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
 use crate::fem::{Outcome, Scenario};
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use crate::register::deformable::DeformableError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Where a descent may end that another follows, in standard deviations of the posterior.
-const ROUGH: f64 = 0.1;
+pub(super) const ROUGH: f64 = 0.1;
+
+/// What is known of the errors of what was observed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Errors {
+    /// Independent of each other but for a share (neighbours see the same error), of the descent's noise.
+    Independent {
+        /// Share of the observations that are independent.
+        share: f64,
+    },
+    /// Alike over some distance, with a rigid remainder and a discrepancy of the model.
+    Correlated(CorrelatedErrors),
+}
 
 /// Everything an estimate starts from.
 pub struct Problem<'a> {
@@ -26,10 +47,15 @@ pub struct Problem<'a> {
     pub poisson_ratio: f64,
     /// What was observed.
     pub observation: Observation,
-    /// Share of the observations that are independent.
-    pub independent_share: f64,
-    /// Standard deviation of ln(modulus) that mesh, supports and outer surface add; 0 for a body known exactly.
+    /// How far it is believed.
+    pub errors: Errors,
+    /// Standard deviation of ln(modulus) that mesh and element add; 0 for a body known exactly. Only taken where it cannot be
+    /// found from a coarser mesh.
     pub model_log_sd: f64,
+    /// The same body in a coarser mesh: what mesh and element add is found from it, case by case.
+    pub coarser: Option<&'a TetMesh>,
+    /// Whether body and load are known exactly (a phantom's): then nothing is held against what is known of tissue.
+    pub body_known: bool,
     /// Where to start; the prior's mean when empty.
     pub start: Vec<f64>,
     /// The measurement behind nodes' displacements, where its own error is to be taken out, and how many times.
@@ -44,9 +70,12 @@ pub struct EstimateOutcome {
     pub posterior: Posterior,
     /// What was known before.
     pub prior: Vec<LogPrior>,
-    /// Standard deviation of ln(modulus) that the model itself adds to the intervals.
+    /// Largest standard deviation of ln(modulus) that the mesh itself adds to the intervals.
     #[serde(default)]
     pub model_log_sd: f64,
+    /// The same per parameter, in their order, where a coarser mesh was there to find it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh_log_sd: Vec<f64>,
     /// Observations (nodes of the observed sets, or components of displacements).
     pub observations: usize,
     /// How many of them count as independent.
@@ -66,6 +95,24 @@ pub struct EstimateOutcome {
     pub tangent_solves: usize,
     /// What limits the estimate, in sentences.
     pub limits: Vec<String>,
+    /// What it comes down to.
+    #[serde(default)]
+    pub verdict: Verdict,
+    /// Noise of the measurement and discrepancy of the model, where errors are alike over a distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unexplained: Option<Unexplained>,
+    /// The measurement's noise before it was held against the residual.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_noise: Option<Process>,
+    /// How probable the model is beside simpler explanations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odds: Option<Odds>,
+    /// Whether anything has moved, and what would have been seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift: Option<Shift>,
+    /// Root mean square of the rigid registration's remainder over the observed nodes, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rigid_remainder_mm: Option<f64>,
 }
 
 /// The estimate with the state behind it and how sure that state is.
@@ -79,6 +126,8 @@ pub struct Estimate {
     pub displacement_sd_mm: Vec<f64>,
     /// The 95 % bound of how far every node moves: |mean| + 1.96 sd along the mean, mm.
     pub displacement_95_mm: Vec<f64>,
+    /// The tissues' materials at the mode, by tissue.
+    pub materials: BTreeMap<String, Material>,
 }
 
 /// Why there is no estimate.
@@ -95,6 +144,26 @@ pub enum ProblemError {
     Instrument(#[from] DeformableError),
 }
 
+/// What a fit has found, whatever the errors are taken to be.
+pub(super) struct Fitted {
+    /// The minimum, of the problem's own parameters.
+    pub descent: Descent,
+    /// What the data alone say there.
+    pub fisher: nalgebra::DMatrix<f64>,
+    /// Standard deviation of one observation, mm.
+    pub noise_mm: f64,
+    /// How many observations count as independent.
+    pub independent: f64,
+    /// Root mean square of the residuals, mm.
+    pub residual_rms_mm: f64,
+    /// Observations.
+    pub observations: usize,
+    /// What was taken out of one observation, mm.
+    pub taken_out_rms_mm: Option<f64>,
+    /// What correlated errors say.
+    pub correlated: Option<correlated::Findings>,
+}
+
 /// Finds the most probable parameters and how sure they are.
 ///
 /// # Errors
@@ -104,55 +173,145 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
     let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
     let density_known = !unknowns.contains(&Unknown::Density);
-    let model_error: Vec<f64> = unknowns
+    let mut model_error: Vec<f64> = unknowns
         .iter()
         .map(|u| if matches!(u, Unknown::ShearModulus(_)) { problem.model_log_sd } else { 0.0 })
         .collect();
+    let tissues: Vec<Option<String>> = unknowns.iter().map(Unknown::tissue).collect();
+    let unknown = unknowns.clone();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
-    let share = problem.independent_share.clamp(1e-9, 1.0);
+    let fitted = match &problem.errors {
+        Errors::Correlated(errors) => correlated::fit(&mut body, errors, &prior, &start, problem.instrument, settings)?,
+        Errors::Independent { share } => {
+            fit_independent(&mut body, *share, &prior, &start, problem.instrument, settings)?
+        }
+    };
+    let posterior = laplace(&fitted.descent.log_parameters, &fitted.fisher, &prior);
+    let Solved { outcome: state, sensitivities } = body.solve(&fitted.descent.log_parameters)?;
+    // A model that is too stiff is made up for by a modulus that is too low: its error is not one of the displacement.
+    let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
+    let mut mesh_log_sd = Vec::new();
+    if let (Some(coarse), Some(found)) = (problem.coarser, &fitted.correlated) {
+        let mut coarse_body = Body::new(
+            coarse,
+            problem.template,
+            unknown.clone(),
+            problem.poisson_ratio,
+            Observation::Nodes(Vec::new()),
+        )?;
+        let there = coarse_body.solve(&fitted.descent.log_parameters)?.outcome.displacement_mm;
+        let there = at_places(coarse, &there, &found.places_mm);
+        let change =
+            |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
+        let made = found.made_up_by(change, prior.len());
+        let left = left_of_difference(problem.mesh, coarse);
+        mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
+        model_error = mesh_log_sd.clone();
+    }
+    let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
+    let posed = Posed {
+        prior: &prior,
+        tissues: &tissues,
+        weight_alone: only_weight && density_known,
+        body_known: problem.body_known,
+    };
+    let verdict = verdict(&fitted, settings, &posterior, &posed);
+    let materials = tissue_materials(&unknown, &fitted.descent.log_parameters, problem.poisson_ratio);
+    let posterior = match verdict.finding {
+        Finding::Widened => posterior.widened(),
+        finding if finding.has_stiffness() => posterior,
+        _ => posterior.withheld(),
+    };
+    let correlated = fitted.correlated;
+    let outcome = EstimateOutcome {
+        limits: verdict.because(),
+        verdict,
+        observations: fitted.observations,
+        independent_observations: fitted.independent,
+        noise_mm: fitted.noise_mm,
+        residual_rms_mm: fitted.residual_rms_mm,
+        taken_out_rms_mm: fitted.taken_out_rms_mm,
+        convergence: fitted.descent.convergence,
+        solves: body.solves,
+        tangent_solves: body.tangent_solves,
+        model_log_sd: model_error.iter().copied().fold(0.0, f64::max),
+        mesh_log_sd,
+        unexplained: correlated.as_ref().map(|c| c.unexplained),
+        measured_noise: correlated.as_ref().map(|c| c.measured_noise),
+        odds: correlated.as_ref().map(|c| c.odds),
+        rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
+        shift: correlated.map(|c| c.shift),
+        posterior,
+        prior,
+    };
+    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials })
+}
+
+/// The material of every tissue at these parameters.
+fn tissue_materials(unknowns: &[Unknown], values: &[f64], poisson_ratio: f64) -> BTreeMap<String, Material> {
+    let shape = |of: &Tissue| {
+        unknowns.iter().zip(values).find_map(|(unknown, value)| match unknown {
+            Unknown::Shape(tissue, law) if tissue == of => Some((*law, *value)),
+            _ => None,
+        })
+    };
+    let of = |(unknown, value): (&Unknown, &f64)| match unknown {
+        Unknown::ShearModulus(tissue) => {
+            Some((tissue.name.clone(), super::material(value.exp(), shape(tissue), poisson_ratio)))
+        }
+        _ => None,
+    };
+    unknowns.iter().zip(values).filter_map(of).collect()
+}
+
+/// The fit to observations that are independent but for a share.
+fn fit_independent(
+    body: &mut Body<'_>,
+    share: f64,
+    prior: &[LogPrior],
+    start: &[f64],
+    instrument: Option<(&Instrument<'_>, usize)>,
+    settings: &EstimateSettings,
+) -> Result<Fitted, ProblemError> {
+    let share = share.clamp(1e-9, 1.0);
     // Neighbours share their error: together they weigh as much as the independent ones alone.
     let descent_settings = EstimateSettings { noise_mm: settings.noise_mm / share.sqrt(), ..settings.clone() };
     // A state that the instrument is shown need not be the best one.
     let rough = EstimateSettings { decrement_tolerance: ROUGH, ..descent_settings.clone() };
-    let first = if problem.instrument.is_some_and(|(_, rounds)| rounds > 0) { &rough } else { &descent_settings };
-    let mut descent = estimate(&mut body, &prior, &start, first)?;
+    let first = if instrument.is_some_and(|(_, rounds)| rounds > 0) { &rough } else { &descent_settings };
+    let mut descent = estimate(body, prior, start, first)?;
     let mut taken_out_rms_mm = None;
-    if let Some((instrument, rounds)) = problem.instrument {
+    if let Some((instrument, rounds)) = instrument {
         let seen = body.observed_nodes().to_vec();
         for round in 1..=rounds {
             let known = body.solve(&descent.log_parameters)?.outcome.displacement_mm;
             let corrected = without_own_error(&seen, &known, instrument)?;
-            let pairs = seen.iter().zip(&corrected);
-            let taken_out: Vec<f64> = pairs.flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect();
-            taken_out_rms_mm = root_mean_square(&taken_out);
+            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected));
             body.observe(Observation::Nodes(corrected));
             let settings = if round < rounds { &rough } else { &descent_settings };
-            descent = estimate(&mut body, &prior, &descent.log_parameters, settings)?;
+            descent = estimate(body, prior, &descent.log_parameters, settings)?;
         }
     }
-    let residual_rms_mm = root_mean_square(descent.linearisation.residuals_mm.as_slice()).unwrap_or(0.0);
+    let residuals = &descent.linearisation.residuals_mm;
+    let residual_rms_mm = root_mean_square(residuals.as_slice()).unwrap_or(0.0);
     // What the model cannot explain is noise to it: a misfit above the measurement's widens the intervals.
     let noise_mm = settings.noise_mm.max(residual_rms_mm);
-    let posterior = laplace(&descent, &prior, noise_mm, share);
-    let Solved { outcome: state, sensitivities } = body.solve(&descent.log_parameters)?;
-    // A model that is too stiff is made up for by a modulus that is too low: its error is not one of the displacement.
-    let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
-    let posterior = posterior.with_model_error(&model_error);
-    let outcome = EstimateOutcome {
-        limits: limits(&posterior, &descent, settings.noise_mm, residual_rms_mm, only_weight && density_known),
-        observations: descent.linearisation.residuals_mm.len(),
-        independent_observations: share * descent.linearisation.residuals_mm.len() as f64,
+    let weighted = &descent.linearisation.jacobian_mm * (share.sqrt() / noise_mm);
+    Ok(Fitted {
+        fisher: information(&weighted, prior.len(), &[]),
         noise_mm,
+        independent: share * residuals.len() as f64,
         residual_rms_mm,
+        observations: residuals.len(),
         taken_out_rms_mm,
-        convergence: descent.convergence,
-        solves: body.solves,
-        tangent_solves: body.tangent_solves,
-        model_log_sd: problem.model_log_sd,
-        posterior,
-        prior,
-    };
-    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm })
+        correlated: None,
+        descent,
+    })
+}
+
+/// Component by component, mm.
+pub(super) fn differences(seen: &[(u32, [f64; 3])], corrected: &[(u32, [f64; 3])]) -> Vec<f64> {
+    seen.iter().zip(corrected).flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect()
 }
 
 /// Standard deviation and 95 % reach of every node by linear propagation of the posterior.
@@ -185,42 +344,101 @@ fn spread(mean: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>], posterior: &Poster
     (sd, reach.collect())
 }
 
-fn limits(posterior: &Posterior, descent: &Descent, noise_mm: f64, rms_mm: f64, weight_alone: bool) -> Vec<String> {
-    let mut limits = Vec::new();
-    for (name, verdict) in posterior.names.iter().zip(&posterior.identifiability.verdicts) {
-        match verdict {
-            Verdict::Identified => {}
-            Verdict::PriorDominated => {
-                limits.push(format!("{name}: the interval comes from the prior, the data add little"));
-            }
-            Verdict::NotIdentifiable => limits.push(format!("{name}: not identifiable from these data")),
+/// What a verdict needs of its problem.
+struct Posed<'a> {
+    prior: &'a [LogPrior],
+    /// The tissue whose shear modulus a parameter is.
+    tissues: &'a [Option<String>],
+    /// Nothing but weight loads the body, and the density is given.
+    weight_alone: bool,
+    body_known: bool,
+}
+
+/// What the figures come down to.
+fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, posed: &Posed<'_>) -> Verdict {
+    let Posed { prior, tissues, weight_alone, body_known } = *posed;
+    let mut unexplained = Vec::new();
+    let mut still = None;
+    let mut share = None;
+    let mut wider = None;
+    if let Some(found) = &fitted.correlated {
+        share = Some(found.shift.explained_share);
+        if !found.shift.seen {
+            let (log_odds, would_be_seen_mm) = (found.odds.moved_to_still, found.shift.would_be_seen_mm);
+            still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
         }
+        let (discrepancy_mm, noise_mm) = (found.unexplained.discrepancy.sd_mm, found.measured_noise.sd_mm);
+        let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
+        // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
+        if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
+            unexplained.push(reason);
+        } else if discrepancy_mm > noise_mm {
+            wider = Some(reason);
+        }
+        if found.odds.model_to_any_movement < super::STRONG {
+            unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
+        }
+    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt())
+    {
+        // A root mean square of n independent ones is known to its 1 / sqrt(2 n).
+        let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
+        unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
     }
-    if weight_alone {
-        limits.push(
-            "gravity alone fixes only modulus / (density x g): the moduli are as good as the effective density assumed"
-                .to_owned(),
-        );
+    let conflict = prior.iter().zip(&fitted.descent.log_parameters).filter_map(|(prior, value)| {
+        let sd = (value - prior.mean) / prior.sd?;
+        (sd.abs() > CONTRADICTION_SD).then(|| Reason::FarFromPrior { name: prior.name.clone(), sd })
+    });
+    let conflict: Vec<Reason> = if body_known { Vec::new() } else { conflict.collect() };
+    let named = || tissues.iter().enumerate().filter_map(|(n, tissue)| tissue.clone().map(|tissue| (n, tissue)));
+    let dominated = named().all(|(n, _)| posterior.identifiability.verdicts[n] != super::Knowledge::Identified);
+    let finding = if still.is_some() {
+        Finding::NoShift
+    } else if !unexplained.is_empty() {
+        Finding::Unexplained
+    } else if !conflict.is_empty() {
+        Finding::Conflict
+    } else if dominated {
+        Finding::PriorDominated
+    } else if wider.is_some() {
+        Finding::Widened
+    } else {
+        Finding::Identified
+    };
+    let answer = |n: usize| match (&fitted.correlated, finding) {
+        (Some(found), Finding::NoShift) => match found.shift.largest_share {
+            // A body of linear stiffness moves as 1 / modulus.
+            Some(share) if share > 0.0 => Claim::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
+            _ => Claim::Withheld,
+        },
+        _ if finding.has_stiffness() => {
+            Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
+        }
+        _ => Claim::Withheld,
+    };
+    let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
+    let mut reasons: Vec<Reason> = still.into_iter().chain(unexplained).chain(conflict).chain(wider).collect();
+    if finding.has_stiffness() {
+        let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != super::Knowledge::Identified);
+        reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
     }
-    if rms_mm > 1.5 * noise_mm {
-        limits.push(format!(
-            "the residual of {rms_mm:.2} mm is above the measurement's {noise_mm:.2} mm: the model does not explain all of the shift"
-        ));
+    if weight_alone && finding.has_stiffness() {
+        reasons.push(Reason::LoadAssumed);
     }
-    if descent.convergence == Convergence::IterationsExhausted {
-        limits.push("the iterations ran out before the minimum was reached".to_owned());
+    if fitted.descent.convergence == Convergence::IterationsExhausted {
+        reasons.push(Reason::NotConverged);
     }
-    limits
+    Verdict::new(finding, share, moduli, reasons)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::Turn;
+    use crate::experiment::estimate::{Scale, Turn, material};
     use crate::experiment::phantom::{PhantomSettings, block};
-    use crate::experiment::sample::Tissue;
+    use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
     use crate::fem::simulate;
+    use crate::material::meta_model::MetaModel;
 
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {
@@ -234,8 +452,10 @@ mod tests {
             unknowns: Tissue::grey_and_white().into_iter().map(unknown).collect(),
             poisson_ratio: 0.45,
             observation: Observation::Nodes(observed),
-            independent_share: 1.0,
+            errors: Errors::Independent { share: 1.0 },
             model_log_sd: 0.0,
+            coarser: None,
+            body_known: true,
             start: vec![2299f64.ln(), 1195f64.ln()],
             instrument: None,
         }
@@ -356,5 +576,115 @@ mod tests {
         assert!((wide - narrow.hypot(0.1)).abs() < 1e-12, "{narrow} {wide}");
         assert_eq!(exact.outcome.posterior.mode, rough.outcome.posterior.mode);
         assert_eq!(exact.displacement_sd_mm, rough.displacement_sd_mm);
+    }
+
+    /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.
+    fn seen_by_a_model_of_a_push_from_above(
+        force_n: Option<[f64; 3]>,
+        add: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> EstimateOutcome {
+        let (mesh, settings) = (block(5), settings());
+        let u = match force_n {
+            Some(two_tissue_force_n) => {
+                let pushed = PhantomSettings { two_tissue_force_n, ..settings.clone() };
+                let (scenario, tissues) = (pushed.scenario(), pushed.tissue_list());
+                let truth = scenario_of(&scenario, &tissues, &pushed.reference_sample()).unwrap();
+                simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm
+            }
+            None => vec![[0.0; 3]; mesh.nodes_mm().len()],
+        };
+        let moved = |(x, u): (&[f64; 3], &[f64; 3])| {
+            let more = add(*x);
+            [0, 1, 2].map(|a| u[a] + more[a])
+        };
+        let observed: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&u).map(moved).collect();
+        let known = |unknown: Unknown| {
+            let prior = unknown.prior(1100f64.ln(), 0.4);
+            (unknown, prior)
+        };
+        let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
+        let scenario = settings.scenario();
+        let problem = Problem {
+            unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
+            errors: Errors::Correlated(CorrelatedErrors { noise, rigid_mm: 0.1, places: 150 }),
+            start: Vec::new(),
+            body_known: false,
+            ..problem(&mesh, &scenario, every_node(&observed))
+        };
+        solve_problem(problem, &EstimateSettings::default()).unwrap().outcome
+    }
+
+    #[test]
+    fn a_shift_of_everything_is_taken_for_the_registrations_and_not_for_the_moduli() {
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.06, -0.04, 0.05]);
+        for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {
+            let [low, high] = found.posterior.interval_95[n];
+            assert!(low < truth && truth < high, "{:?}", found.posterior);
+        }
+        assert!(found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
+        assert!(found.shift.unwrap().explained_share > 0.95, "{:?}", found.shift);
+        let remainder = found.rigid_remainder_mm.unwrap();
+        assert!((remainder - 0.0877).abs() < 0.03, "{remainder}");
+    }
+
+    #[test]
+    fn without_a_shift_there_is_a_bound_and_no_stiffness() {
+        let wave = |x: [f64; 3]| [0.01 * (0.2 * x[1]).sin(), 0.01 * (0.15 * x[2]).cos(), 0.01 * (0.25 * x[0]).sin()];
+        let found = seen_by_a_model_of_a_push_from_above(None, wave);
+        assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
+        let bounds = found.verdict.moduli.iter().map(|(_, answer)| match answer {
+            Claim::Above { bound_pa } => *bound_pa,
+            other => panic!("{other:?}"),
+        });
+        // The body of the prior's mean would have moved by half a millimetre: noise of .02 mm leaves a tenth of it at most.
+        assert!(bounds.into_iter().all(|bound| bound > 4000.0), "{:?}", found.verdict);
+        let said = &found.posterior.identifiability.verdicts;
+        assert!(said.iter().all(|v| *v != crate::experiment::estimate::Knowledge::Identified), "{said:?}");
+    }
+
+    #[test]
+    fn a_push_from_the_side_is_not_explained_by_one_from_above() {
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]);
+        assert!(!found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
+        assert!(found.shift.unwrap().seen, "{:?}", found.odds);
+    }
+
+    /// The block, pushed hard enough that a law's shape shows, with the truth's law and the prior of that law.
+    fn of_law(truth: &Material, law: MetaModel) -> (EstimateOutcome, BTreeMap<String, Material>) {
+        let mesh = block(4);
+        let mut scenario = PhantomSettings { two_tissue_force_n: [0.0, 0.0, -0.35], ..settings() }.scenario();
+        for name in ["grey_matter", "white_matter"] {
+            scenario.materials.insert(name.to_owned(), truth.clone());
+        }
+        let observed = every_node(&simulate(&mesh, &scenario, &|_| {}).unwrap().displacement_mm);
+        let prior = PriorSettings { law, ..PriorSettings::default() };
+        let brain = Tissue::whole_brain().remove(0);
+        let problem = Problem {
+            unknowns: law_priors(&brain, &prior).unwrap(),
+            start: Vec::new(),
+            ..problem(&mesh, &scenario, observed)
+        };
+        let noise = EstimateSettings { noise_mm: 0.01, ..EstimateSettings::default() };
+        let found = solve_problem(problem, &noise).unwrap();
+        (found.outcome, found.materials)
+    }
+
+    #[test]
+    fn the_parameters_of_ogdens_and_of_mooney_and_rivlins_law_come_back_inside_their_intervals() {
+        let (alpha, modulus) = (-19.0, 670.0);
+        let truth = material(modulus, Some((MetaModel::OGDEN_HIGH, alpha)), 0.45);
+        let (found, materials) = of_law(&truth, MetaModel::OGDEN);
+        let inside = |outcome: &EstimateOutcome, n: usize, value: f64| {
+            let [low, high] = outcome.posterior.interval_95[n];
+            assert!(low.min(high) <= value && value <= high.max(low), "{value} {:?}", outcome.posterior);
+        };
+        inside(&found, 0, modulus);
+        inside(&found, 1, alpha);
+        assert_eq!(materials["brain"].name(), "ogden");
+        let truth = material(670.0, Some((MetaModel::MOONEY_RIVLIN, 0.5)), 0.45);
+        let (found, materials) = of_law(&truth, MetaModel::MOONEY_RIVLIN);
+        inside(&found, 0, 670.0);
+        inside(&found, 1, Scale::Share.value(0.5));
+        assert_eq!(materials["brain"].name(), "mooney-rivlin");
     }
 }

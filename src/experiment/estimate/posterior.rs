@@ -1,20 +1,26 @@
 //! How sure the estimate is, and what it cannot tell apart.
 
-use super::{Descent, LogPrior};
-use nalgebra::{DMatrix, SymmetricEigen};
+use super::LogPrior;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether the data say something about a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum Knowledge {
     /// The data narrow the prior.
     Identified,
     /// The interval comes from the prior: the data add little.
     PriorDominated,
     /// Without prior the interval spans more than a factor 10 either way: not identifiable.
     NotIdentifiable,
+    /// The data narrow the prior, but less than the measurement would: what the model leaves unexplained widens the interval.
+    Widened,
+    /// The figure is an average over models that cannot be told apart.
+    Averaged,
+    /// The figures stand under a model that the data do not bear out: they are not an answer.
+    Withheld,
 }
 
 /// The Laplace approximation: a Gaussian over the log-parameters.
@@ -37,8 +43,8 @@ pub struct Posterior {
 /// Panel of identifiability, from the data alone (prior left out).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identifiability {
-    /// One verdict per parameter.
-    pub verdicts: Vec<Verdict>,
+    /// One per parameter.
+    pub verdicts: Vec<Knowledge>,
     /// Correlation of the sensitivities d u / d ln(parameter), row by row; near 1: a valley.
     pub sensitivity_correlation: Vec<Vec<f64>>,
     /// Ratio of the largest to the smallest eigenvalue of the Gauss-Newton matrix.
@@ -50,18 +56,28 @@ pub struct Identifiability {
 }
 
 /// Two-sided 95 % of a Gaussian.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub const Z_95: f64 = 1.959_963_984_540_054;
 
-/// The Laplace posterior at the end of a descent. `noise_mm` is the standard deviation of one observation and
-/// `information_share` the share of observations that are independent (neighbouring surface points see the same
-/// error; 1 for independent ones).
-pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information_share: f64) -> Posterior {
+/// What the data alone say of the first `own` parameters: J^T J of independent residuals of standard deviation 1, the other
+/// parameters (of these precisions) integrated out.
+pub fn information(jacobian: &DMatrix<f64>, own: usize, others: &[f64]) -> DMatrix<f64> {
+    let all = jacobian.transpose() * jacobian;
+    let ours = all.view((0, 0), (own, own)).into_owned();
+    if others.is_empty() {
+        return ours;
+    }
+    let count = others.len();
+    let cross = all.view((own, 0), (count, own)).into_owned();
+    let theirs = all.view((own, own), (count, count)) + DMatrix::from_diagonal(&DVector::from_column_slice(others));
+    ours - cross.transpose() * invert(&theirs) * cross
+}
+
+/// The Laplace posterior at a minimum; `fisher` is what the data alone say there ([`information`]).
+pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
     let n = prior.len();
-    let jacobian = &descent.linearisation.jacobian_mm;
-    let fisher: DMatrix<f64> = jacobian.transpose() * jacobian * (information_share / (noise_mm * noise_mm));
-    let precision = DMatrix::from_fn(n, n, |r, c| if r == c { prior[r].precision() } else { 0.0 });
-    let covariance = invert(&(&fisher + &precision));
-    let data_only = invert(&fisher);
+    let precision = super::precision(prior);
+    let covariance = invert(&(fisher + &precision));
+    let data_only = invert(fisher);
 
     let eigen = SymmetricEigen::new(fisher.clone());
     let least = eigen.eigenvalues.imin();
@@ -73,15 +89,15 @@ pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information
     }
 
     let log_sd: Vec<f64> = (0..n).map(|p| covariance[(p, p)].max(0.0).sqrt()).collect();
-    let at = |p: usize, z: f64| prior[p].scale.value(descent.log_parameters[p] + z * log_sd[p]);
+    let at = |p: usize, z: f64| prior[p].scale.value(log_parameters[p] + z * log_sd[p]);
     let verdict = |p: usize| {
         let sd = data_only[(p, p)].max(0.0).sqrt();
         match prior[p].sd {
-            Some(prior_sd) if log_sd[p] > 0.7 * prior_sd => Verdict::PriorDominated,
-            Some(_) => Verdict::Identified,
+            Some(prior_sd) if log_sd[p] > 0.7 * prior_sd => Knowledge::PriorDominated,
+            Some(_) => Knowledge::Identified,
             // Written so that an infinite or NaN variance is not identifiable.
-            None if Z_95 * sd <= 10f64.ln() => Verdict::Identified,
-            None => Verdict::NotIdentifiable,
+            None if Z_95 * sd <= 10f64.ln() => Knowledge::Identified,
+            None => Knowledge::NotIdentifiable,
         }
     };
     let correlation = |r: usize, c: usize| {
@@ -106,21 +122,40 @@ pub fn laplace(descent: &Descent, prior: &[LogPrior], noise_mm: f64, information
 }
 
 impl Posterior {
-    /// With the model's own error (mesh, supports, the body's outer surface) added to the uncertainty of the parameters
-    /// whose `error` is given: standard deviations of their logarithms, in the order of the names.
+    /// With every figure marked that the data had narrowed: the interval is wider by what the model leaves unexplained.
     #[must_use]
-    pub fn with_model_error(mut self, error: &[f64]) -> Self {
+    pub fn widened(self) -> Self {
+        self.marked(Knowledge::Widened)
+    }
+
+    /// With every figure withheld that the data had narrowed: the model does not stand.
+    #[must_use]
+    pub fn withheld(self) -> Self {
+        self.marked(Knowledge::Withheld)
+    }
+
+    fn marked(mut self, mark: Knowledge) -> Self {
+        for verdict in self.identifiability.verdicts.iter_mut().filter(|v| **v == Knowledge::Identified) {
+            *verdict = mark;
+        }
+        self
+    }
+
+    /// With the model's own error (mesh, supports, the body's outer surface) added to the uncertainty of the parameters
+    /// whose `error` is given, at these values: standard deviations of their logarithms, in the order of the names.
+    #[must_use]
+    pub fn with_model_error(mut self, error: &[f64], values: &[f64], prior: &[LogPrior]) -> Self {
         for (p, error) in error.iter().enumerate().filter(|(_, e)| **e > 0.0) {
             self.log_covariance[p][p] += error * error;
             self.log_sd[p] = self.log_covariance[p][p].sqrt();
-            self.interval_95[p] = [-Z_95, Z_95].map(|z| self.mode[p] * (z * self.log_sd[p]).exp());
+            self.interval_95[p] = [-Z_95, Z_95].map(|z| prior[p].scale.value(values[p] + z * self.log_sd[p]));
         }
         self
     }
 }
 
 /// Inverse of a symmetric positive matrix; a flat direction gets a variance of 1e12 instead of infinity (JSON has none).
-fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = SymmetricEigen::new(matrix.clone());
     let inverse = eigen.eigenvalues.map(|l| if l > 1e-12 { 1.0 / l } else { 1e12 });
     &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
@@ -129,39 +164,30 @@ fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::{Convergence, Linearisation, Scale};
-    use nalgebra::DVector;
+    use crate::experiment::estimate::Scale;
 
-    fn descent(jacobian: DMatrix<f64>) -> Descent {
-        let residuals_mm = DVector::zeros(jacobian.nrows());
-        Descent {
-            log_parameters: vec![7.0; jacobian.ncols()],
-            linearisation: Linearisation { residuals_mm, jacobian_mm: jacobian },
-            costs: vec![0.0],
-            evaluations: 1,
-            convergence: Convergence::StepBelowTolerance,
-        }
+    /// The posterior of `jacobian` (mm) with independent residuals of .5 mm.
+    fn of(jacobian: DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
+        laplace(&vec![7.0; prior.len()], &information(&(jacobian / 0.5), prior.len(), &[]), prior)
     }
 
     fn prior(sd: Option<f64>) -> LogPrior {
-        LogPrior { name: "mu".to_owned(), mean: 7.0, sd, scale: Scale::Logarithm }
+        LogPrior { name: "mu".to_owned(), mean: 7.0, sd, scale: Scale::Logarithm, correlation: Vec::new() }
     }
 
     #[test]
     fn one_parameter_has_the_textbook_standard_deviation() {
-        let d = descent(DMatrix::from_element(25, 1, 2.0));
-        let posterior = laplace(&d, &[prior(None)], 0.5, 1.0);
+        let posterior = of(DMatrix::from_element(25, 1, 2.0), &[prior(None)]);
         // sd = noise / (|J|) = 0.5 / (2 sqrt 25).
         assert!((posterior.log_sd[0] - 0.05).abs() < 1e-12);
-        assert_eq!(posterior.identifiability.verdicts, [Verdict::Identified]);
+        assert_eq!(posterior.identifiability.verdicts, [Knowledge::Identified]);
         assert!((posterior.interval_95[0][1] / posterior.mode[0] - (0.05 * Z_95).exp()).abs() < 1e-12);
     }
 
     #[test]
     fn only_the_sum_is_seen_so_the_difference_is_the_valley() {
-        let d = descent(DMatrix::from_element(25, 2, 1.0));
-        let posterior = laplace(&d, &[prior(None), prior(None)], 0.5, 1.0);
-        assert_eq!(posterior.identifiability.verdicts, [Verdict::NotIdentifiable; 2]);
+        let posterior = of(DMatrix::from_element(25, 2, 1.0), &[prior(None), prior(None)]);
+        assert_eq!(posterior.identifiability.verdicts, [Knowledge::NotIdentifiable; 2]);
         assert!((posterior.identifiability.sensitivity_correlation[0][1] - 1.0).abs() < 1e-12);
         let valley = &posterior.identifiability.valley;
         assert!((valley[0] + valley[1]).abs() < 1e-9 && valley[0] > 0.0);
@@ -169,9 +195,26 @@ mod tests {
 
     #[test]
     fn without_sensitivity_the_prior_is_returned_and_said_to_be() {
-        let d = descent(DMatrix::zeros(25, 1));
-        let posterior = laplace(&d, &[prior(Some(0.4))], 0.5, 1.0);
+        let posterior = of(DMatrix::zeros(25, 1), &[prior(Some(0.4))]);
         assert!((posterior.log_sd[0] - 0.4).abs() < 1e-9);
-        assert_eq!(posterior.identifiability.verdicts, [Verdict::PriorDominated]);
+        assert_eq!(posterior.identifiability.verdicts, [Knowledge::PriorDominated]);
+    }
+
+    #[test]
+    fn a_parameter_that_is_integrated_out_leaves_what_is_left_of_the_others() {
+        let jacobian = DMatrix::from_fn(30, 3, |r, c| f64::from(((r * (c + 2) + c) % 7) as u32) - 2.5);
+        let others = [4.0];
+        let left = information(&jacobian, 2, &others);
+        // The inverse of the whole information with the other's prior, its block of the first two.
+        let mut whole = jacobian.transpose() * &jacobian;
+        whole[(2, 2)] += others[0];
+        let block = whole.try_inverse().unwrap().view((0, 0), (2, 2)).into_owned();
+        assert!((left.try_inverse().unwrap() - block).amax() < 1e-12);
+    }
+
+    #[test]
+    fn withheld_figures_are_none_that_the_data_had_narrowed() {
+        let posterior = of(DMatrix::from_element(25, 1, 2.0), &[prior(Some(1.0))]).withheld();
+        assert_eq!(posterior.identifiability.verdicts, [Knowledge::Withheld]);
     }
 }

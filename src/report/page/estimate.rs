@@ -1,12 +1,14 @@
 //! The estimate: most probable moduli with their intervals, and what the data can tell apart.
 
-use super::super::html::number;
+use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
-use crate::experiment::estimate::{EstimateOutcome, Verdict};
+use crate::experiment::compare::{Candidate, Comparison};
+use crate::experiment::estimate::{EstimateOutcome, Knowledge};
 use maud::{Markup, html};
 
-/// The section's body.
-pub fn section(estimate: &EstimateOutcome) -> Markup {
+/// The section's body; with the models that were tried, where there were several.
+pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Markup {
+    let claimed = estimate.verdict.finding.has_stiffness();
     let posterior = &estimate.posterior;
     let head = ["Parameter", "Most probable", "95 % interval", "Prior 95 %", "What the data say"].map(str::to_owned);
     let row = |n: usize| -> Row {
@@ -17,14 +19,17 @@ pub fn section(estimate: &EstimateOutcome) -> Markup {
             format!("{} to {}", at(-1.96), at(1.96))
         });
         let verdict = match posterior.identifiability.verdicts[n] {
-            Verdict::Identified => "identified",
-            Verdict::PriorDominated => "little: the interval is the prior's",
-            Verdict::NotIdentifiable => "not identifiable",
+            Knowledge::Identified => "identified",
+            Knowledge::PriorDominated => "little: the interval is the prior's",
+            Knowledge::NotIdentifiable => "not identifiable",
+            Knowledge::Widened => "narrowed, less than the measurement would: the model leaves something unexplained",
+            Knowledge::Averaged => "averaged over models that cannot be told apart",
+            Knowledge::Withheld => "withheld: the model does not stand",
         };
         let cells = [
             posterior.names[n].replace('_', " "),
-            number(posterior.mode[n], 5),
-            format!("{} to {}", number(low, 4), number(high, 4)),
+            if claimed { number(posterior.mode[n], 5) } else { "–".to_owned() },
+            if claimed { format!("{} to {}", number(low, 4), number(high, 4)) } else { "–".to_owned() },
             before,
             verdict.to_owned(),
         ];
@@ -35,7 +40,9 @@ pub fn section(estimate: &EstimateOutcome) -> Markup {
     let pair = |(name, along): (&String, &f64)| format!("{} {}", name.replace('_', " "), number(*along, 2));
     let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
     html! {
+        p { (estimate.verdict.sentence) }
         (table("Estimate", &head, &rows))
+        @if let Some(models) = models { (table_of_models(models)) }
         p {
             "Residual " (number(estimate.residual_rms_mm, 3)) " mm over " (estimate.observations) " observations ("
             (number(estimate.independent_observations, 3)) " of them independent), each known to "
@@ -61,4 +68,22 @@ pub fn section(estimate: &EstimateOutcome) -> Markup {
             ul { @for limit in &estimate.limits { li { (limit) } } }
         }
     }
+}
+
+/// What was tried, the most probable first.
+fn table_of_models(models: &Comparison) -> Markup {
+    let head = ["Model", "Log odds", "Weight", "Explained", "What it comes down to"].map(str::to_owned);
+    let best = models.candidates.first().map_or(0.0, |c| c.log_evidence);
+    let row = |(n, c): (usize, &Candidate)| -> Row {
+        let cells = [
+            c.name.clone(),
+            fixed(c.log_evidence - best, 1),
+            fixed(c.weight, 3),
+            format!("{} %", fixed(100.0 * c.explained_share, 0)),
+            c.finding.short().to_owned(),
+        ];
+        (n == 0, words(cells))
+    };
+    let rows: Vec<Row> = models.candidates.iter().enumerate().map(row).collect();
+    table("Models", &head, &rows)
 }

@@ -195,7 +195,11 @@ impl CasePage {
         add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());
         add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(results::samples));
-        add("estimate", "Estimate", outcome.and_then(|o| o.estimate.as_ref()).map(estimate::section));
+        add(
+            "estimate",
+            "Estimate",
+            outcome.and_then(|o| Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref()))),
+        );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
         add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));

@@ -7,6 +7,7 @@ use super::parts::quantity;
 use crate::experiment::outcome::{
     ExperimentKind, ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
 };
+use crate::experiment::verdict::Finding;
 use maud::{Markup, PreEscaped, html};
 
 /// A set's name for readers.
@@ -83,7 +84,9 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
                 .map_or_else(String::new, |rest| format!("undeformed: {} mm", number(*rest, 3)));
             tiles.push(tile(&format!("RMSE, {}", set_name(&set)), &quantity(Some(rmse), 3, "mm"), &note));
         }
-        for (tissue, modulus) in &best.shear_modulus_pa {
+        // A stiffness that is not claimed is no key figure.
+        let claimed = outcome.kind == ExperimentKind::Phantom || outcome.verdict.finding.has_stiffness();
+        for (tissue, modulus) in best.shear_modulus_pa.iter().filter(|_| claimed) {
             let truth = outcome.reference_shear_modulus_pa.get(tissue);
             let truth = truth.map(|t| format!("reference: {} Pa", number(*t, 5)));
             let level = best.sd_levels.get(tissue).map(|level| format!("{} SD of the prior", signed(*level)));
@@ -107,6 +110,7 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
             part("registration", floor.registration_mm),
             part("voxel", floor.voxel_mm),
             part("segmentation", floor.segmentation_mm),
+            part("measured at rest", floor.at_rest_mm),
         ]
         .into_iter()
         .flatten()
@@ -162,6 +166,9 @@ fn signed(level: f64) -> String {
 fn sentence(outcome: &ExperimentOutcome) -> String {
     let converged = outcome.samples.iter().filter(|s| s.converged).count();
     let tally = format!("{converged} of {} simulations converged.", outcome.samples.len());
+    if outcome.kind == ExperimentKind::Resection && outcome.verdict.finding != Finding::Nothing {
+        return format!("{} {tally} Compared with: {}.", outcome.verdict.sentence, outcome.reference);
+    }
     let Some(best) = outcome.best() else {
         return format!("{tally} There is no best sample. Compared with: {}.", outcome.reference);
     };

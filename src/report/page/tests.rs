@@ -34,7 +34,12 @@ fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
         samples: (0..9).map(sample).collect(),
         best_sample: Some("sample-04".to_owned()),
         rest_rmse_mm: map(vec![("ventricle", 1.2), ("margin", 4.0)]),
-        noise_floor: Some(NoiseFloor { registration_mm: Some(0.3), voxel_mm: Some(0.4), segmentation_mm: None }),
+        noise_floor: Some(NoiseFloor {
+            registration_mm: Some(0.3),
+            voxel_mm: Some(0.4),
+            segmentation_mm: None,
+            at_rest_mm: None,
+        }),
         sets: vec![SetOutcome { name: "margin".to_owned(), nodes: 12, area_mm2: Some(345.6), centroid_mm: None }],
         registrations: vec![RegistrationOutcome {
             moving: "post".to_owned(),

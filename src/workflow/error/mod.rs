@@ -104,13 +104,13 @@ pub enum WorkflowError {
     NoReferenceState { reason: String },
     #[error("table [resection]: {0}")]
     Supports(#[from] SupportsError),
+    #[error(
+        "no model could be compared: evidence is found for `observed = \"displacement\"` in the table [estimate], and at least \
+         one model must have an equilibrium"
+    )]
+    NoEvidence,
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
-    #[error(
-        "table [prior]: `law` is {law}: an estimate is made with neo-hookean materials alone, and an interval of another \
-         law's modulus would not be this patient's; set `law = \"neo-hookean\"` for it"
-    )]
-    EstimateLaw { law: String },
     #[error(transparent)]
     Estimate(#[from] ProblemError),
     #[error(transparent)]

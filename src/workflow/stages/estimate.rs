@@ -2,28 +2,30 @@
 
 use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
+use crate::experiment::compare::{Comparison, compare};
 use crate::experiment::estimate::{
-    Estimate, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by, solve_problem,
+    Errors, Estimate, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by,
+    solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
-use crate::experiment::phantom::neo_hookean;
-use crate::experiment::prior::log_prior;
-use crate::experiment::sample::{Sample, Tissue};
+use crate::experiment::prior::{PriorSettings, law_priors};
+use crate::experiment::resection::ResectionSettings;
+use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::sweep::Reference;
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
-use crate::material::meta_model::MetaModel;
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::estimate_options::{EstimateOptions, Observed};
 use crate::workflow::facts::EstimateFacts;
-use crate::workflow::stage_name::StageName;
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Estimate;
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
@@ -70,6 +72,25 @@ impl EstimateOptions {
     }
 }
 
+/// A body as one way of holding it poses it.
+pub(crate) struct HeldBody {
+    /// What holds it; none of a phantom.
+    pub settings: Option<ResectionSettings>,
+    /// Loads, supports, solver.
+    pub scenario: Scenario,
+    /// The undeformed mesh, with the sets that slide; the nodes of the case's mesh come first.
+    pub mesh: TetMesh,
+    /// What its state is compared with.
+    pub reference: Reference,
+}
+
+impl HeldBody {
+    /// What it assumes, in words.
+    pub fn name(&self) -> String {
+        self.settings.as_ref().map_or_else(String::new, |s| format!("supports {}", s.supports.name()))
+    }
+}
+
 /// What an estimate needs of its case.
 pub(crate) struct EstimateInput<'a> {
     /// The undeformed mesh and its file's bytes.
@@ -82,22 +103,34 @@ pub(crate) struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
+    /// The same body in a coarser mesh, made when it is asked for.
+    pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
+    /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
+    pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
     pub noise_mm: f64,
+    /// Expected error of the rigid registration, mm.
+    pub rigid_error_mm: f64,
+}
+
+/// The settings of what holds a patient: supports that are tried stand in no scenario.
+pub(super) fn held_by(work: &Work<'_>) -> serde_json::Value {
+    let ResectionSettings { supports, falx, skull, .. } = &work.settings.resection;
+    match work.subject {
+        Subject::Patient => serde_json::json!({ "supports": supports, "falx": falx, "skull": skull }),
+        Subject::Phantom { .. } => serde_json::Value::Null,
+    }
 }
 
 /// The stage with its settings and inputs.
 pub(crate) fn estimate_stage(work: &Work<'_>, made: &Made, input: &EstimateInput<'_>) -> Result<Stage, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
-    if prior.law != MetaModel::NEO_HOOKEAN {
-        return Err(WorkflowError::EstimateLaw { law: prior.law.name().to_owned() });
-    }
     let posed = serde_json::json!({
         "scenario": input.scenario, "tissues": input.tissues, "poisson_ratio": input.poisson_ratio,
-        "noise_mm": input.noise_mm, "estimate": options, "prior": prior,
+        "noise_mm": input.noise_mm, "estimate": options, "prior": prior, "held": held_by(work),
     });
     Ok(work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME))
 }
@@ -124,80 +157,184 @@ pub(crate) fn estimate(
     made: &mut Made,
     input: &EstimateInput<'_>,
 ) -> Result<EstimateFacts, WorkflowError> {
-    let (options, prior) = (&work.settings.estimate, &work.settings.prior);
     let stage = estimate_stage(work, made, input)?;
     work.run(made, &NAME, &stage, || {
-        work.tell(|p| p.begin("estimate", 1));
-        let mesh = input.mesh.0;
-        let mut unknowns = Vec::new();
-        for tissue in input.tissues {
-            unknowns.push((Unknown::ShearModulus(tissue.clone()), log_prior(tissue, prior)?));
+        let bodies = Bodies::of(work, input)?;
+        work.tell(|p| p.begin("estimate", bodies.list.len()));
+        let (mut models, mut warnings, mut refused) = (Vec::new(), Vec::new(), None);
+        for (n, body) in bodies.list.iter().enumerate() {
+            match bodies.solved(work, input, n, input.tissues, &work.settings.prior) {
+                Ok(found) => models.push((body.name(), found)),
+                // Supports without an equilibrium explain nothing; the others are still tried.
+                Err(error) => {
+                    warnings.push(format!("{}: left out: {error}", body.name()));
+                    refused.get_or_insert(error);
+                }
+            }
+            work.tell(|p| p.step());
         }
-        unknowns.extend(options.unknown_loads(&input.scenario.loads));
-        let patient = matches!(input.reference, Reference::Surfaces(_));
-        let mut scenario = input.scenario.clone();
+        work.tell(|p| p.end());
+        let found = match (models.len(), refused) {
+            (0, Some(error)) => return Err(error),
+            (0, None) => return Err(WorkflowError::NoEvidence),
+            (1, None) => (models.remove(0), None),
+            _ => chosen(models)?,
+        };
+        let ((name, found), comparison) = found;
+        let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
+        let mut produced = produced(body, input, found, comparison)?;
+        produced.warnings.extend(warnings);
+        Ok(produced)
+    })
+}
+
+/// The most probable model with the verdict over all of them.
+fn chosen(mut models: Vec<(String, Estimate)>) -> Result<((String, Estimate), Option<Comparison>), WorkflowError> {
+    let outcomes = models.iter().map(|(name, found)| (name.clone(), found.outcome.clone())).collect();
+    let Some((comparison, outcome)) = compare(outcomes) else {
+        // Errors that are not correlated give no evidence: the first of the family stands.
+        return Ok((models.remove(0), None));
+    };
+    let best = comparison.candidates.first().map(|c| c.name.clone()).unwrap_or_default();
+    let place = models.iter().position(|(name, _)| *name == best).unwrap_or(0);
+    let (name, found) = models.swap_remove(place);
+    Ok(((name, Estimate { outcome, ..found }), Some(comparison)))
+}
+
+/// The bodies that are tried, with what is observed of all of them.
+pub(super) struct Bodies {
+    pub list: Vec<HeldBody>,
+    /// Nodes deep enough to be believed, with their places (mm).
+    deep: Vec<(u32, [f64; 3])>,
+    /// The same body in a coarser mesh.
+    coarser: Option<TetMesh>,
+}
+
+impl Bodies {
+    /// Makes them.
+    pub fn of(work: &Work<'_>, input: &EstimateInput<'_>) -> Result<Self, WorkflowError> {
+        let options = &work.settings.estimate;
+        let list = match input.held {
+            Some(make) if options.observed == Observed::Displacement => make()?,
+            _ => Vec::new(),
+        };
+        let as_posed = || HeldBody {
+            settings: input.held.map(|_| work.settings.resection.clone()),
+            scenario: input.scenario.clone(),
+            mesh: input.mesh.0.clone(),
+            reference: input.reference.clone(),
+        };
+        let list = if list.is_empty() { vec![as_posed()] } else { list };
+        let coarser = match input.coarser {
+            Some(make) if options.two_meshes && options.observed == Observed::Displacement => Some(make()?),
+            _ => None,
+        };
+        // The same places for every body: evidence is of one set of data.
+        let deep = options.displacement.observed(input.mesh.0, |x| x);
+        Ok(Self { list, deep, coarser })
+    }
+
+    /// The estimate of one of them under a prior.
+    pub fn solved(
+        &self,
+        work: &Work<'_>,
+        input: &EstimateInput<'_>,
+        number: usize,
+        tissues: &[Tissue],
+        prior: &PriorSettings,
+    ) -> Result<Estimate, WorkflowError> {
+        let options = &work.settings.estimate;
+        let body = &self.list[number];
+        let mesh = &body.mesh;
+        let mut unknowns = Vec::new();
+        for tissue in tissues {
+            unknowns.extend(law_priors(tissue, prior)?);
+        }
+        unknowns.extend(options.unknown_loads(&body.scenario.loads));
+        let patient = matches!(body.reference, Reference::Surfaces(_));
+        let mut scenario = body.scenario.clone();
         if patient {
             scenario.solver.element = options.element;
         }
-        let (observation, independent_share, noise_mm) = observation(input, options);
+        let (observation, errors, noise_mm) = self.observation(body, input, options);
         let believed = &options.displacement;
         let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
             move |known: &[[f64; 3]]| {
                 work.tell(|p| p.doing("registering the estimate"));
                 let shown = shift.registration().sees(mesh, known, &shift.seen)?;
-                Ok(believed.observed(mesh, |x| moved_by(&shown, x)))
+                Ok(self.deep.iter().map(|(n, x)| (*n, moved_by(&shown, *x))).collect())
             }
         });
+        let supported = |coarse: &TetMesh| match &body.settings {
+            Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
+            None => Ok(coarse.clone()),
+        };
+        let coarser = self.coarser.as_ref().map(supported).transpose()?;
         let problem = Problem {
             mesh,
             template: &scenario,
             unknowns,
             poisson_ratio: input.poisson_ratio,
             observation,
-            independent_share,
+            errors,
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
+            coarser: coarser.as_ref(),
+            body_known: !patient,
             start: Vec::new(),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let found = solve_problem(problem, &settings)?;
-        work.tell(|p| p.end());
-        produced(input, found)
-    })
-}
+        Ok(solve_problem(problem, &settings)?)
+    }
 
-/// What is observed, the share of it that is independent, and the standard deviation of one observation in mm.
-fn observation(input: &EstimateInput<'_>, options: &EstimateOptions) -> (Observation, f64, f64) {
-    let mesh = input.mesh.0;
-    match (input.reference, input.shift) {
-        (Reference::Nodes(u), _) => {
-            (Observation::Nodes(u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect()), 1.0, input.noise_mm)
-        }
-        (Reference::Surfaces(_), Some(shift)) if options.observed == Observed::Displacement => {
-            let believed = &options.displacement;
-            let nodes = believed.observed(mesh, |x| moved_by(&shift.seen, x));
-            (Observation::Nodes(nodes), believed.independent_share(mesh), believed.noise_mm)
-        }
-        (Reference::Surfaces(surfaces), _) => {
-            // A node of a surface mesh of edge h stands for sqrt(3)/2 h^2 of it.
-            let area_mm2 = 0.75f64.sqrt() * mesh.median_edge_mm().powi(2);
-            let share = (area_mm2 / options.correlation_mm.powi(2)).min(1.0);
-            (Observation::Surfaces(surfaces.clone()), share, input.noise_mm)
+    /// What is observed, how far it is believed, and the standard deviation of one observation in mm.
+    fn observation(
+        &self,
+        body: &HeldBody,
+        input: &EstimateInput<'_>,
+        options: &EstimateOptions,
+    ) -> (Observation, Errors, f64) {
+        match (&body.reference, input.shift) {
+            (Reference::Nodes(u), _) => {
+                let nodes = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+                (Observation::Nodes(nodes), Errors::Independent { share: 1.0 }, input.noise_mm)
+            }
+            (Reference::Surfaces(_), Some(shift)) if options.observed == Observed::Displacement => {
+                let believed = &options.displacement;
+                let nodes = self.deep.iter().map(|(n, x)| (*n, moved_by(&shift.seen, *x))).collect();
+                let errors = Errors::Correlated(believed.errors(input.rigid_error_mm));
+                (Observation::Nodes(nodes), errors, believed.noise_mm)
+            }
+            (Reference::Surfaces(surfaces), _) => {
+                // A node of a surface mesh of edge h stands for sqrt(3)/2 h^2 of it.
+                let area_mm2 = 0.75f64.sqrt() * body.mesh.median_edge_mm().powi(2);
+                let share = (area_mm2 / options.correlation_mm.powi(2)).min(1.0);
+                (Observation::Surfaces(surfaces.clone()), Errors::Independent { share }, input.noise_mm)
+            }
         }
     }
 }
 
-fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, WorkflowError> {
-    let mesh = input.mesh.0;
-    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm } = found;
-    let errors = input.reference.errors(mesh, &state.displacement_mm);
-    let tissue = |(n, t): (usize, &Tissue)| {
+fn produced(
+    body: &HeldBody,
+    input: &EstimateInput<'_>,
+    found: Estimate,
+    comparison: Option<Comparison>,
+) -> Result<Produced, WorkflowError> {
+    let mesh = &body.mesh;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials } = found;
+    let errors = body.reference.errors(mesh, &state.displacement_mm);
+    let tissue = |t: &Tissue| {
+        // The parameters are named after the tissue.
+        let name = Unknown::ShearModulus(t.clone()).name();
+        let n = outcome.posterior.names.iter().position(|of| *of == name).unwrap_or(0);
         let (mode, prior) = (outcome.posterior.mode[n], &outcome.prior[n]);
         let level = prior.sd.map_or(0.0, |sd| (mode.ln() - prior.mean) / sd);
-        (t.name.clone(), neo_hookean(level, mode, input.poisson_ratio))
+        let neo_hookean = || Material::neo_hookean(mode, input.poisson_ratio);
+        let material = materials.get(&t.name).cloned().unwrap_or_else(neo_hookean);
+        (t.name.clone(), TissueSample { sd_level: level, shear_modulus_pa: mode, material })
     };
-    let sample =
-        Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().enumerate().map(tissue).collect(), task: None };
+    let sample = Sample { id: ESTIMATE.to_owned(), tissues: input.tissues.iter().map(tissue).collect(), task: None };
     let largest = state.displacement_mm.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
     let file = ESTIMATE_STATE.to_owned();
     let record = SampleOutcome {
@@ -232,6 +369,6 @@ fn produced(input: &EstimateInput<'_>, found: Estimate) -> Result<Produced, Work
     Ok(Produced {
         files: vec![(file, vtu::encode(mesh, &points, &cells)?), (ESTIMATE_JSON.to_owned(), json.into_bytes())],
         warnings: outcome.limits.iter().map(|limit| format!("estimate: {limit}")).collect(),
-        facts: facts(&EstimateFacts { estimate: outcome, record }),
+        facts: facts(&EstimateFacts { estimate: outcome, record, comparison }),
     })
 }

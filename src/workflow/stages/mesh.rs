@@ -1,18 +1,19 @@
 //! Stage `mesh`: label map to undeformed mesh with its boundary sets.
 
+use super::anat::Anatomy;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{MeshOutcome, SetOutcome};
 use crate::geometry::{Frame, Mni, Position};
 use crate::image::LabelMap;
 use crate::layout::{PRE_LABELS, REST_GMSH, REST_MESH, REST_SURFACE};
-use crate::mesh::engine::{MeshSettings, mesh_labels};
+use crate::mesh::engine::{MeshSettings, MeshSize, MeshingRecord, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
 use crate::segment::{label, with_closed_sulci};
-use crate::tag::{falx_sheet, tag_boundary_sets_with};
+use crate::tag::{TagReport, falx_sheet, tag_boundary_sets_with};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
 use crate::workflow::stage_name::StageName;
@@ -49,16 +50,7 @@ pub(crate) fn mesh(
     let (stage, settings) = mesh_stage(work, made);
     work.run(made, &NAME, &stage, || {
         let body = with_closed_sulci(labels, SULCUS_MM);
-        let source = template_from_labels.map_or("the template's labels", |_| PRE_LABELS);
-        let (mut whole, record) = mesh_labels(&body, &settings, &work.place.programs.engines())
-            .map_err(|error| WorkflowError::Engine { labels: source.to_owned(), source: error })?;
-        let in_template = |p: [f64; 3]| match template_from_labels {
-            Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
-            None => p,
-        };
-        let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
-        let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
-        let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
+        let Tagged { rest, whole, record, tags } = tagged(work, &body, &settings, template_from_labels)?;
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
         produced.files.push((REST_GMSH.to_owned(), msh::encode(&rest)?));
@@ -86,6 +78,46 @@ pub(crate) fn mesh(
         produced.facts = facts(&facts_of_mesh);
         Ok(produced)
     })
+}
+
+/// A mesh with its sets, whole and without what is no tissue.
+struct Tagged {
+    rest: TetMesh,
+    whole: TetMesh,
+    record: MeshingRecord,
+    tags: TagReport,
+}
+
+/// Meshes labels whose sulci are closed, and tags the sets.
+fn tagged(
+    work: &Work<'_>,
+    body: &LabelMap<Mni>,
+    settings: &MeshSettings,
+    template_from_labels: Option<&DisplacementField<Mni>>,
+) -> Result<Tagged, WorkflowError> {
+    let source = template_from_labels.map_or("the template's labels", |_| PRE_LABELS);
+    let (mut whole, record) = mesh_labels(body, settings, &work.place.programs.engines())
+        .map_err(|error| WorkflowError::Engine { labels: source.to_owned(), source: error })?;
+    let in_template = |p: [f64; 3]| match template_from_labels {
+        Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
+        None => p,
+    };
+    let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
+    let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
+    let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
+    Ok(Tagged { rest, whole, record, tags })
+}
+
+/// The same body in a quarter of the tetrahedra: what a mesh does to an estimate shows in the difference.
+pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> Result<TetMesh, WorkflowError> {
+    const PART: usize = 4;
+    let (_, mut settings) = mesh_stage(work, made);
+    settings.size = match settings.size {
+        MeshSize::Cells(cells) => MeshSize::Cells((cells / PART).max(1000)),
+        MeshSize::EdgeMm(edge_mm) => MeshSize::EdgeMm(edge_mm * (PART as f64).cbrt()),
+    };
+    let body = with_closed_sulci(&anatomy.labels, SULCUS_MM);
+    Ok(tagged(work, &body, &settings, Some(&anatomy.template_from_patient))?.rest)
 }
 
 /// Size and shape of what is simulated, and how well the `whole` mesh it was cut from fills its label map.

@@ -5,6 +5,7 @@
 
 mod anat;
 mod brain_shift;
+mod compare;
 mod estimate;
 mod labels;
 mod mesh;
@@ -19,11 +20,13 @@ pub use registration::RegistrationFacts;
 
 pub(crate) use anat::{Anatomy, anat, anat_stage};
 pub(crate) use brain_shift::SeenShift;
-pub(crate) use estimate::{EstimateInput, estimate, present_estimate};
+pub(crate) use compare::compare;
+pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use labels::labels;
-pub(crate) use mesh::{mesh, mesh_stage};
+pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
 pub(crate) use reference::{
-    known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference, reference_stage,
+    error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,
+    reference_stage,
 };
 pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};

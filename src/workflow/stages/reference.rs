@@ -3,13 +3,17 @@
 
 use super::anat::Anatomy;
 use crate::artefact::{Produced, Stage};
-use crate::experiment::observed::mask_surface;
+use crate::experiment::observed::{error_at_rest_mm, mask_surface};
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::sweep::{Reference, solve_sample};
-use crate::layout::{REFERENCE_STATE, REFERENCE_SURFACE, REST_MESH};
+use crate::geometry::Mni;
+use crate::image::nifti::{self, ReadOptions};
+use crate::layout::{POST_BRAIN, PRE_BRAIN, REFERENCE_STATE, REFERENCE_SURFACE, REST_MESH};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{Field, vtu};
 use crate::mesh::{TetMesh, TriMesh};
+use crate::segment::label;
+use crate::tag::BASE;
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::stage_name::StageName;
@@ -28,6 +32,22 @@ pub(crate) fn observed_surfaces(anatomy: &Anatomy) -> BTreeMap<String, TriMesh> 
         ("margin".to_owned(), mask_surface(&anatomy.cavity)),
         ("ventricle".to_owned(), mask_surface(&anatomy.post_ventricle)),
     ])
+}
+
+/// What mesh and scans are off without any movement, mm: the mesh's sets against the pre-operative masks they follow, and the
+/// brain's surface on one scan against the other where the skull's base holds it.
+pub(crate) fn error_at_rest(case: &Case, anatomy: &Anatomy, mesh: &TetMesh) -> Result<Option<f64>, WorkflowError> {
+    let of_label = |wanted: u8| mask_surface(&anatomy.labels.map(|l| l == wanted));
+    let own = BTreeMap::from([
+        ("margin".to_owned(), of_label(label::RESECTED)),
+        ("ventricle".to_owned(), of_label(label::VENTRICLE)),
+    ]);
+    let brain = |file: &str| -> Result<TriMesh, WorkflowError> {
+        let (mask, _) = nifti::decode_labels(&case.read(file)?, file, &ReadOptions::default())?;
+        Ok(mask_surface(&mask.relabelled::<Mni>().map(|l| l > 0)))
+    };
+    let (before, after) = (brain(PRE_BRAIN)?, brain(POST_BRAIN)?);
+    Ok(error_at_rest_mm(mesh, &own, BASE, [&before, &after]))
 }
 
 /// The stage of a patient with its input.

@@ -1,0 +1,157 @@
+//! Several models of one patient beside each other: which of them what was seen speaks for, and the estimate over all.
+//!
+//! MacKay, "Information Theory, Inference, and Learning Algorithms", chapter 28; averaging: Hoeting, Madigan, Raftery and
+//! Volinsky, Statistical Science 14, 1999.
+
+use super::estimate::{EstimateOutcome, Knowledge, STRONG, weights};
+use super::verdict::{Claim, Finding, Reason, Verdict};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One model of the family.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Candidate {
+    /// What it assumes, in words: `supports sliding, CSF given`.
+    pub name: String,
+    /// Logarithm of the evidence.
+    pub log_evidence: f64,
+    /// Probability beside the others, all equal beforehand.
+    pub weight: f64,
+    /// What its own estimate comes down to.
+    pub finding: Finding,
+    /// Share of the seen shift it explains.
+    pub explained_share: f64,
+    /// Shear moduli by tissue: most probable and 95 % interval, Pa.
+    pub moduli_pa: Vec<(String, [f64; 3])>,
+}
+
+/// The family, the most probable model first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// The models.
+    pub candidates: Vec<Candidate>,
+    /// Logarithm of the odds between the best two; absent with one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_odds: Option<f64>,
+    /// What it comes down to.
+    pub verdict: Verdict,
+}
+
+/// Models that no correlated errors were given to have no evidence and cannot be compared; `None` when none has one.
+///
+/// The estimate of the most probable model comes back beside the comparison, with the figures and the verdict of the whole
+/// family: averaged where the best two cannot be told apart.
+pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison, EstimateOutcome)> {
+    models.retain(|(_, m)| m.odds.is_some());
+    let evidence = |m: &EstimateOutcome| m.odds.map_or(f64::NEG_INFINITY, |o| o.log_evidence);
+    // The first of equals stays first: the order of the family is part of its definition.
+    models.sort_by(|(_, a), (_, b)| evidence(b).total_cmp(&evidence(a)));
+    let logs: Vec<f64> = models.iter().map(|(_, m)| evidence(m)).collect();
+    let weight = weights(&logs);
+    let candidates = models.iter().zip(&weight).map(|((name, m), &weight)| Candidate {
+        name: name.clone(),
+        log_evidence: evidence(m),
+        weight,
+        finding: m.verdict.finding,
+        explained_share: m.shift.map_or(0.0, |s| s.explained_share),
+        moduli_pa: tissues(m)
+            .map(|(tissue, n)| {
+                (tissue, [m.posterior.mode[n], m.posterior.interval_95[n][0], m.posterior.interval_95[n][1]])
+            })
+            .collect(),
+    });
+    let candidates: Vec<Candidate> = candidates.collect();
+    let (first, mut best) = models.first().cloned()?;
+    let log_odds = (logs.len() > 1).then(|| logs[0] - logs[1]);
+    let apart = log_odds.is_none_or(|odds| odds > STRONG);
+    if !apart && best.verdict.finding.has_stiffness() {
+        let reason = Reason::AnotherModel { models: [first, models[1].0.clone()], log_odds: log_odds.unwrap_or(0.0) };
+        average(&mut best, &models, &weight);
+        let answer = |(tissue, n): (String, usize)| {
+            let p = &best.posterior;
+            (tissue, Claim::Interval { mode_pa: p.mode[n], interval_95_pa: p.interval_95[n] })
+        };
+        let moduli = tissues(&best).map(answer).collect();
+        let reasons = std::iter::once(reason).chain(best.verdict.reasons.clone()).collect();
+        best.verdict = Verdict::new(Finding::CannotTell, best.verdict.explained_share, moduli, reasons);
+        best.limits = best.verdict.because();
+    }
+    let comparison = Comparison { candidates, log_odds, verdict: best.verdict.clone() };
+    Some((comparison, best))
+}
+
+/// The tissues of an estimate with their place among its parameters.
+fn tissues(outcome: &EstimateOutcome) -> impl Iterator<Item = (String, usize)> {
+    let name = |(n, name): (usize, &String)| Some((name.strip_prefix("shear_modulus_pa of ")?.to_owned(), n));
+    outcome.posterior.names.iter().enumerate().filter_map(name)
+}
+
+/// Moduli over all models: quantiles of the mixture of their posteriors.
+fn average(best: &mut EstimateOutcome, models: &[(String, EstimateOutcome)], weight: &[f64]) {
+    for (tissue, n) in tissues(best).collect::<Vec<_>>() {
+        // A model with other tissues says nothing of this one.
+        let parts: Vec<[f64; 3]> = models
+            .iter()
+            .zip(weight)
+            .filter_map(|((_, m), &weight)| {
+                let (_, at) = tissues(m).find(|(name, _)| *name == tissue)?;
+                Some([weight, m.posterior.mode[at].ln(), m.posterior.log_sd[at]])
+            })
+            .collect();
+        let (_, sd) = moments(&parts);
+        let p = &mut best.posterior;
+        p.mode[n] = quantile(&parts, 0.5).exp();
+        p.interval_95[n] = [quantile(&parts, 0.025).exp(), quantile(&parts, 0.975).exp()];
+        p.log_sd[n] = sd;
+        p.log_covariance[n][n] = sd * sd;
+        p.identifiability.verdicts[n] = Knowledge::Averaged;
+    }
+}
+
+/// Mean and standard deviation of a mixture of Gaussians (weight, mean, sd).
+fn moments(parts: &[[f64; 3]]) -> (f64, f64) {
+    let total: f64 = parts.iter().map(|[w, ..]| w).sum();
+    let mean = parts.iter().map(|[w, m, _]| w * m).sum::<f64>() / total;
+    let variance = parts.iter().map(|[w, m, s]| w * (s * s + (m - mean).powi(2))).sum::<f64>() / total;
+    (mean, variance.sqrt())
+}
+
+/// The value below which this share of a mixture of Gaussians lies, by bisection.
+fn quantile(parts: &[[f64; 3]], share: f64) -> f64 {
+    let total: f64 = parts.iter().map(|[w, ..]| w).sum();
+    let below = |x: f64| parts.iter().map(|[w, m, s]| w * normal_below((x - m) / s.max(1e-12))).sum::<f64>() / total;
+    let reach = |[_, m, s]: &[f64; 3]| (m - 12.0 * s, m + 12.0 * s);
+    let ends = parts.iter().map(reach).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
+    let (mut low, mut high) = ends;
+    for _ in 0..80 {
+        let middle = f64::midpoint(low, high);
+        if below(middle) < share { low = middle } else { high = middle }
+    }
+    f64::midpoint(low, high)
+}
+
+/// Share of a standard Gaussian below x, to 1e-7 (Abramowitz and Stegun 26.2.17).
+fn normal_below(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
+    let series =
+        t * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let above = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt() * series;
+    if x > 0.0 { 1.0 - above } else { above }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::estimate::Z_95;
+
+    #[test]
+    fn quantiles_of_one_gaussian_are_its_own_and_of_two_lie_between() {
+        let one = [[1.0, 7.0, 0.2]];
+        assert!((quantile(&one, 0.975) - (7.0 + 0.2 * Z_95)).abs() < 1e-5);
+        let two = [[0.5, 6.0, 0.1], [0.5, 8.0, 0.1]];
+        assert!((quantile(&two, 0.025) - (6.0 - 0.1 * 1.644_854)).abs() < 1e-4, "a twentieth of the lower one");
+        assert!((moments(&two).1 - (0.01f64 + 1.0).sqrt()).abs() < 1e-12);
+    }
+}

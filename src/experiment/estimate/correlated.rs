@@ -1,0 +1,304 @@
+//! The fit to displacements whose errors are alike over a distance, with what no model of the body explains: a rigid
+//! remainder and a smooth discrepancy, so that the intervals are as wide as the model is wrong.
+
+use super::body::{Body, Observation};
+use super::evidence::{Evidence, LinearModel, Unexplained};
+use super::mesh_error::made_up_by;
+use super::outcome::{Fitted, ROUGH, differences};
+use super::process::{Factor, Process, spread_out};
+use super::re_registration::{Instrument, MovedNode, without_own_error};
+use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
+use super::{Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, ProblemError, estimate, information};
+use crate::experiment::rmse::root_mean_square;
+use crate::experiment::verdict::CONTRADICTION_SD;
+use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is known of the errors of displacements beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CorrelatedErrors {
+    /// Noise of the measurement.
+    pub noise: Process,
+    /// Expected error of the rigid registration, mm.
+    pub rigid_mm: f64,
+    /// Most places that are looked at: they are chosen evenly, and what lies between them says the same.
+    pub places: usize,
+}
+
+/// How probable the model is beside simpler explanations: natural logarithms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Odds {
+    /// Evidence of the model with its discrepancy.
+    pub log_evidence: f64,
+    /// Evidence of the model were it exact.
+    pub log_evidence_exact: f64,
+    /// Odds of the model against a smooth movement of any kind.
+    pub model_to_any_movement: f64,
+    /// Odds of movement (the model's or any) against none.
+    pub moved_to_still: f64,
+}
+
+/// Whether anything has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Shift {
+    /// Movement is more probable than stillness by more than [`super::STRONG`].
+    pub seen: bool,
+    /// Root mean square of the displacement seen, rigid remainder taken away, mm.
+    pub seen_rms_mm: f64,
+    /// Share of it that the model explains.
+    pub explained_share: f64,
+    /// The shift, at its largest place, that would have been seen (three standard deviations of its size), mm.
+    pub would_be_seen_mm: f64,
+    /// Largest size (95 %, one-sided) of what the prior's most probable body would do under the load, as a share of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_share: Option<f64>,
+}
+
+/// Everything that the fit says beside the parameters.
+pub struct Findings {
+    /// Noise and discrepancy.
+    pub unexplained: Unexplained,
+    /// The noise as it was measured.
+    pub measured_noise: Process,
+    /// Model, any movement, none.
+    pub odds: Odds,
+    /// Size of the rigid remainder, mm.
+    pub rigid_remainder_mm: f64,
+    /// The shift.
+    pub shift: Shift,
+    /// The places that were looked at, mm, and their nodes.
+    pub places_mm: Vec<[f64; 3]>,
+    /// Their nodes.
+    pub nodes: Vec<u32>,
+    factor: Factor,
+    /// The Jacobian through the factor, and the prior's inverse covariance, rigid remainder included.
+    white_jacobian: DMatrix<f64>,
+    precision: DMatrix<f64>,
+}
+
+impl Findings {
+    /// The change of the first `own` parameters that makes up for a change (mm) of the model at the places, row by row.
+    pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Vec<f64> {
+        let rows = 3 * self.nodes.len();
+        let change = DMatrix::from_fn(rows, 1, |row, _| change_mm(row));
+        let white = self.factor.whiten(&change).column(0).into_owned();
+        made_up_by(&self.white_jacobian, &self.precision, &white, own)
+    }
+}
+
+/// One-sided 95 % of a Gaussian.
+const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
+
+/// A fit under way: the model, the places looked at, and the points where it was linearised.
+struct Fit<'b, 'a> {
+    body: &'b mut Body<'a>,
+    places_mm: Vec<[f64; 3]>,
+    rigid: RigidModes,
+    /// Priors of the model's own parameters and of the rigid remainder behind them.
+    prior: Vec<LogPrior>,
+    own: usize,
+}
+
+impl Fit<'_, '_> {
+    /// Descends under these errors; the linearisation of what is returned is in mm.
+    fn descend(
+        &mut self,
+        unexplained: &Unexplained,
+        start: &[f64],
+        settings: &EstimateSettings,
+    ) -> Result<Descent, ProblemError> {
+        let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
+        let settings = EstimateSettings { noise_mm: 1.0, ..settings.clone() };
+        let mut weighted = Weighted { model: &mut *self.body, rigid: &self.rigid, factor: &factor, plain: Vec::new() };
+        let mut descent = estimate(&mut weighted, &self.prior, start, &settings)?;
+        let (own, amounts) = descent.log_parameters.split_at(self.own);
+        let plain = weighted.plain.iter().rev().find(|(at, _)| at == own);
+        if let Some((_, plain)) = plain {
+            descent.linearisation = with_remainder(plain, &self.rigid, amounts);
+        }
+        Ok(descent)
+    }
+
+    /// The most probable errors around a point.
+    fn errors(&self, at: &Descent, measured: Process) -> Result<Evidence, ProblemError> {
+        Ok(self.linear(at).with_discrepancy(measured).ok_or(EstimateError::Covariance)?)
+    }
+
+    fn linear<'c>(&'c self, at: &'c Descent) -> LinearModel<'c> {
+        let away = at.log_parameters.iter().zip(&self.prior).map(|(value, prior)| value - prior.mean);
+        LinearModel {
+            places_mm: &self.places_mm,
+            residuals_mm: &at.linearisation.residuals_mm,
+            jacobian_mm: &at.linearisation.jacobian_mm,
+            away: DVector::from_iterator(self.prior.len(), away),
+            precision: super::precision(&self.prior),
+        }
+    }
+}
+
+/// Finds the parameters, the rigid remainder and the discrepancy together.
+///
+/// # Errors
+/// [`ProblemError`].
+pub(super) fn fit(
+    body: &mut Body<'_>,
+    errors: &CorrelatedErrors,
+    prior: &[LogPrior],
+    start: &[f64],
+    instrument: Option<(&Instrument<'_>, usize)>,
+    settings: &EstimateSettings,
+) -> Result<Fitted, ProblemError> {
+    let seen = body.observed_nodes().to_vec();
+    let own = prior.len();
+    if seen.len() <= own {
+        return Err(EstimateError::TooFewObservations { observations: 3 * seen.len(), parameters: own }.into());
+    }
+    let nodes_mm = body.mesh().nodes_mm();
+    let positions: Vec<[f64; 3]> = seen.iter().map(|(n, _)| nodes_mm[*n as usize]).collect();
+    let chosen = spread_out(&positions, errors.places);
+    let pick = |list: &[MovedNode]| -> Vec<MovedNode> { chosen.iter().map(|&n| list[n]).collect() };
+    let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
+    let rigid = RigidModes::new(&places_mm, errors.rigid_mm);
+    let prior: Vec<LogPrior> = prior.iter().cloned().chain(rigid.priors()).collect();
+    let seen_there = pick(&seen);
+    body.observe(Observation::Nodes(seen_there.clone()));
+    let pattern_mm = body.solve(start).map_err(|e| EstimateError::Start(e.to_string()))?.outcome.displacement_mm;
+    let mut fit = Fit { body, places_mm, rigid, prior, own };
+
+    let exact = Unexplained { noise: errors.noise, discrepancy: Process { sd_mm: 0.0, ..errors.noise } };
+    let rough = EstimateSettings { decrement_tolerance: ROUGH, ..settings.clone() };
+    let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
+    let mut descent = fit.descend(&exact, &from, &rough)?;
+    let mut unexplained = fit.errors(&descent, errors.noise)?.unexplained;
+    descent = fit.descend(&unexplained, &descent.log_parameters, &rough)?;
+    let mut taken_out_rms_mm = None;
+    if let Some((instrument, rounds)) = instrument {
+        for _ in 0..rounds {
+            let known = fit.body.solve(&descent.log_parameters[..own])?.outcome.displacement_mm;
+            let corrected = without_own_error(&seen, &known, instrument)?;
+            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected));
+            fit.body.observe(Observation::Nodes(pick(&corrected)));
+            descent = fit.descend(&unexplained, &descent.log_parameters, &rough)?;
+            unexplained = fit.errors(&descent, errors.noise)?.unexplained;
+        }
+    }
+    descent = fit.descend(&unexplained, &descent.log_parameters, settings)?;
+    let evidence = fit.errors(&descent, errors.noise)?;
+    let exact = fit.linear(&descent).with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
+    // A discrepancy that is not needed is none: its size would widen nothing but by chance.
+    let unexplained = if evidence.log_evidence > exact.log_evidence { evidence.unexplained } else { exact.unexplained };
+
+    let findings = fit.findings(errors, &seen_there, &pattern_mm, &descent, unexplained, [evidence, exact])?;
+    let precisions: Vec<f64> = fit.prior[own..].iter().map(LogPrior::precision).collect();
+    let residuals = descent.linearisation.residuals_mm.as_slice();
+    let residual_rms_mm = root_mean_square(residuals).unwrap_or(0.0);
+    let observations = residuals.len();
+    let total_sd_mm = unexplained.noise.sd_mm.hypot(unexplained.discrepancy.sd_mm);
+    let plain = Linearisation {
+        residuals_mm: descent.linearisation.residuals_mm.clone(),
+        jacobian_mm: descent.linearisation.jacobian_mm.columns(0, own).into_owned(),
+    };
+    descent.log_parameters.truncate(own);
+    Ok(Fitted {
+        fisher: information(&findings.white_jacobian, own, &precisions),
+        noise_mm: total_sd_mm,
+        independent: independent(&findings.factor, &fit.places_mm, total_sd_mm),
+        residual_rms_mm,
+        observations,
+        taken_out_rms_mm,
+        correlated: Some(findings),
+        descent: Descent { linearisation: plain, ..descent },
+    })
+}
+
+/// How many independent observations tell as much of a shift of everything as these do.
+fn independent(factor: &Factor, places_mm: &[[f64; 3]], sd_mm: f64) -> f64 {
+    let along_x = DMatrix::from_fn(3 * places_mm.len(), 1, |row, _| if row % 3 == 0 { 1.0 } else { 0.0 });
+    3.0 * factor.whiten(&along_x).norm_squared() * sd_mm * sd_mm
+}
+
+impl Fit<'_, '_> {
+    /// What the fit says of the shift and of the model, beside simpler explanations.
+    fn findings(
+        &self,
+        errors: &CorrelatedErrors,
+        seen: &[MovedNode],
+        pattern_mm: &[[f64; 3]],
+        descent: &Descent,
+        unexplained: Unexplained,
+        [evidence, exact]: [Evidence; 2],
+    ) -> Result<Findings, ProblemError> {
+        let rows = 3 * seen.len();
+        let flat = |u: &dyn Fn(usize) -> [f64; 3]| DVector::from_fn(rows, |row, _| u(row / 3)[row % 3]);
+        let seen_mm = flat(&|n| seen[n].1);
+        let unmoved = -&seen_mm;
+        let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
+        let still = LinearModel {
+            places_mm: &self.places_mm,
+            residuals_mm: &unmoved,
+            jacobian_mm: &self.rigid.columns_mm,
+            away: DVector::zeros(RIGID),
+            precision: DMatrix::from_diagonal(&DVector::from_column_slice(&precision)),
+        };
+        let nothing = still.with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
+        let anything = still.with_discrepancy(errors.noise).ok_or(EstimateError::Covariance)?;
+        let model = evidence.log_evidence.max(exact.log_evidence);
+        let odds = Odds {
+            log_evidence: model,
+            log_evidence_exact: exact.log_evidence,
+            model_to_any_movement: model - anything.log_evidence,
+            moved_to_still: model.max(anything.log_evidence) - nothing.log_evidence,
+        };
+
+        // How much of what the prior's most probable body would do is there, and how well that is known.
+        let pattern = flat(&|n| pattern_mm[seen[n].0 as usize]);
+        // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
+        let seen_at_all = odds.moved_to_still > super::STRONG;
+        let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
+        let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
+        let columns =
+            DMatrix::from_fn(
+                rows,
+                1 + RIGID,
+                |r, c| {
+                    if c == 0 { pattern[r] } else { self.rigid.columns_mm[(r, c - 1)] }
+                },
+            );
+        let white = factor.whiten(&columns);
+        let target = factor.whiten(&DMatrix::from_column_slice(rows, 1, seen_mm.as_slice()));
+        let mut normal = white.transpose() * &white;
+        (0..RIGID).for_each(|k| normal[(1 + k, 1 + k)] += precision[k]);
+        let largest_mm = pattern_mm.iter().map(|u| u.iter().map(|v| v * v).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        let size = normal.cholesky().map(|normal| {
+            let share = normal.solve(&(white.transpose() * target))[(0, 0)];
+            (share, normal.inverse()[(0, 0)].sqrt())
+        });
+        let remainder = &self.rigid.columns_mm * DVector::from_column_slice(&descent.log_parameters[self.own..]);
+        let residuals = &descent.linearisation.residuals_mm;
+        let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
+        // What was seen without the instrument's own error is what the model was held against.
+        let shifted = flat(&|n| self.body.observed_nodes()[n].1) - &remainder;
+        let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
+        Ok(Findings {
+            white_jacobian: factor.whiten(&descent.linearisation.jacobian_mm),
+            precision: super::precision(&self.prior),
+            factor,
+            places_mm: self.places_mm.clone(),
+            nodes: seen.iter().map(|(n, _)| *n).collect(),
+            unexplained,
+            measured_noise: errors.noise,
+            odds,
+            rigid_remainder_mm: rms(&remainder),
+            shift: Shift {
+                seen: seen_at_all,
+                seen_rms_mm: rms(&shifted),
+                explained_share: 1.0 - residuals.norm_squared() / shifted.norm_squared().max(f64::MIN_POSITIVE),
+                would_be_seen_mm: size.map_or(0.0, |(_, sd)| CONTRADICTION_SD * sd * largest_mm),
+                largest_share: size.map(|(share, sd)| share.max(0.0) + Z_95_ONE_SIDED * sd),
+            },
+        })
+    }
+}

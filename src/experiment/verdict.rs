@@ -1,0 +1,337 @@
+//! The verdict: what the numbers of a case amount to, found once and worded once. Terminal, page, tables and JSON take it
+//! from here.
+//!
+//! Two lines are drawn, both before any patient was seen: three standard deviations for a contradiction, and odds of
+//! e^3 = 20 to 1 for taking one explanation instead of another.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// From how many standard deviations on two figures contradict each other (2.7 in a thousand by chance).
+pub const CONTRADICTION_SD: f64 = 3.0;
+
+/// What it comes down to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Finding {
+    /// Nothing has moved that could be told from noise: a bound on the stiffness, no estimate.
+    NoShift,
+    /// Something has moved, and the model does not explain it: no stiffness.
+    Unexplained,
+    /// The model explains the shift only with a stiffness that no tissue has, or with a load that was not there.
+    Conflict,
+    /// Several models explain the shift about as well: the figures are averages over them.
+    CannotTell,
+    /// The shift is explained, and says little of the stiffness: the interval is the prior's.
+    PriorDominated,
+    /// The shift is explained but for more than the measurement's noise, and the intervals are as much wider.
+    Widened,
+    /// The shift is explained, and the stiffness follows from it.
+    Identified,
+    /// A sample explains the surfaces better than rest does.
+    Better,
+    /// No sample can be told from rest.
+    NotDistinguishable,
+    /// Every sample is further from the surfaces than rest is.
+    Worse,
+    /// Nothing was simulated.
+    #[default]
+    Nothing,
+}
+
+impl Finding {
+    /// Whether the figures of the stiffness may be read as an answer.
+    pub fn has_stiffness(self) -> bool {
+        matches!(self, Self::Identified | Self::Widened | Self::PriorDominated | Self::CannotTell | Self::Better)
+    }
+
+    /// In a few words, for a column of a table.
+    pub fn short(self) -> &'static str {
+        match self {
+            Self::NoShift => "no shift seen",
+            Self::Unexplained => "shift not explained",
+            Self::Conflict => "contradicts what is known",
+            Self::CannotTell => "cannot tell",
+            Self::PriorDominated => "the prior's",
+            Self::Widened => "widened by what is unexplained",
+            Self::Identified => "identified",
+            Self::Better => "better than rest",
+            Self::NotDistinguishable => "not distinguishable from rest",
+            Self::Worse => "worse than rest",
+            Self::Nothing => "nothing simulated",
+        }
+    }
+}
+
+/// What speaks for a finding, with its figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Reason {
+    /// Movement against stillness.
+    StillAsProbable {
+        /// Logarithm of the odds of movement.
+        log_odds: f64,
+        /// The smallest shift (at its largest place) that would have been seen, mm.
+        would_be_seen_mm: f64,
+    },
+    /// What is left is above what the measurement is worth.
+    Discrepancy {
+        /// Size of the discrepancy, mm.
+        discrepancy_mm: f64,
+        /// Size of the measurement's noise, mm.
+        noise_mm: f64,
+    },
+    /// A smooth movement without any mechanics is as good an explanation.
+    NoBetterThanAnyMovement {
+        /// Logarithm of the odds of the model against it.
+        log_odds: f64,
+    },
+    /// A parameter far from what is known of it.
+    FarFromPrior {
+        /// The parameter.
+        name: String,
+        /// Standard deviations of the prior.
+        sd: f64,
+    },
+    /// Another model is about as probable.
+    AnotherModel {
+        /// The two.
+        models: [String; 2],
+        /// Logarithm of the odds between them.
+        log_odds: f64,
+    },
+    /// The best state of a surface's set against rest.
+    Surface {
+        /// The set: `margin`.
+        set: String,
+        /// RMSE at rest, mm.
+        rest_mm: f64,
+        /// RMSE deformed, mm.
+        deformed_mm: f64,
+        /// What the measurement is worth, mm.
+        floor_mm: f64,
+    },
+    /// The moduli that cannot be told from the best one.
+    AsGood {
+        /// The tissue.
+        tissue: String,
+        /// From and to, Pa.
+        pa: [f64; 2],
+    },
+    /// The data add little to what was known of a parameter.
+    LittleSaid {
+        /// The parameter.
+        name: String,
+    },
+    /// Gravity fixes only a quotient.
+    LoadAssumed,
+    /// The descent was not finished.
+    NotConverged,
+}
+
+/// A figure of three digits, with thousands apart.
+fn pa(value: f64) -> String {
+    let digits = value.abs().max(1e-9).log10().floor() as i32;
+    let step = 10f64.powi((digits - 2).max(0));
+    let rounded = ((value / step).round() * step).round() as i64;
+    let text = rounded.to_string();
+    let head = text.len() % 3;
+    let mut parts: Vec<&str> = if head > 0 { vec![&text[..head]] } else { Vec::new() };
+    parts.extend((head..text.len()).step_by(3).map(|n| &text[n..n + 3]));
+    parts.join(",")
+}
+
+impl Reason {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        match self {
+            Self::StillAsProbable { log_odds, would_be_seen_mm } => format!(
+                "that nothing has moved is about as probable (log odds {log_odds:.1}); a shift of {would_be_seen_mm:.1} mm at \
+                 its largest place would have been seen"
+            ),
+            Self::Discrepancy { discrepancy_mm, noise_mm } => format!(
+                "the model leaves {discrepancy_mm:.2} mm in each direction unexplained, the measurement is good to \
+                 {noise_mm:.2} mm"
+            ),
+            Self::NoBetterThanAnyMovement { log_odds } => {
+                format!("any smooth movement explains what is seen as well as this load does (log odds {log_odds:.1})")
+            }
+            Self::FarFromPrior { name, sd } => {
+                format!("{name} comes out {sd:.1} standard deviations from what is known of it")
+            }
+            Self::AnotherModel { models: [a, b], log_odds } => {
+                format!("{a} and {b} explain the shift about as well (log odds {log_odds:.1})")
+            }
+            Self::Surface { set, rest_mm, deformed_mm, floor_mm } => format!(
+                "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
+            ),
+            Self::AsGood { tissue, pa: [low, high] } => {
+                format!("{tissue}: {} to {} Pa cannot be told apart", pa(*low), pa(*high))
+            }
+            Self::LittleSaid { name } => format!("{name}: the interval comes from the prior, the data add little"),
+            Self::LoadAssumed => {
+                "gravity alone fixes only modulus / (density x g): the moduli are as good as the effective density assumed"
+                    .to_owned()
+            }
+            Self::NotConverged => "the iterations ran out before the minimum was reached".to_owned(),
+        }
+    }
+}
+
+/// What is said of a tissue's shear modulus.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Claim {
+    /// Most probable value with its 95 % interval, Pa.
+    Interval {
+        /// Most probable.
+        mode_pa: f64,
+        /// 95 % interval.
+        interval_95_pa: [f64; 2],
+    },
+    /// Stiffer than this, Pa, with 95 % certainty.
+    Above {
+        /// The bound.
+        bound_pa: f64,
+    },
+    /// Anything between, Pa.
+    Range {
+        /// From and to.
+        range_pa: [f64; 2],
+    },
+    /// Nothing.
+    Withheld,
+}
+
+/// The verdict.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// What it comes down to.
+    pub finding: Finding,
+    /// One sentence or two.
+    pub sentence: String,
+    /// Share of the seen shift that the model explains: 1 - sum |seen - model|^2 / sum |seen|^2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explained_share: Option<f64>,
+    /// What is said of each tissue's shear modulus.
+    #[serde(default)]
+    pub moduli: Vec<(String, Claim)>,
+    /// What speaks for it.
+    #[serde(default)]
+    pub reasons: Vec<Reason>,
+}
+
+impl Verdict {
+    /// A verdict with its sentence.
+    pub fn new(
+        finding: Finding,
+        explained_share: Option<f64>,
+        moduli: Vec<(String, Claim)>,
+        reasons: Vec<Reason>,
+    ) -> Self {
+        let sentence = sentence(finding, explained_share, &moduli, &reasons);
+        Self { finding, sentence, explained_share, moduli, reasons }
+    }
+
+    /// The reasons in sentences.
+    pub fn because(&self) -> Vec<String> {
+        self.reasons.iter().map(Reason::sentence).collect()
+    }
+}
+
+/// `grey_matter` as a text has it.
+fn words(tissue: &str) -> String {
+    tissue.replace('_', " ")
+}
+
+fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], reasons: &[Reason]) -> String {
+    let each = |of: &dyn Fn(&Claim) -> Option<String>| {
+        let parts = moduli.iter().filter_map(|(t, a)| of(a).map(|text| format!("{} {text}", words(t))));
+        parts.collect::<Vec<_>>().join(", ")
+    };
+    let intervals = each(&|a| match a {
+        Claim::Interval { mode_pa, interval_95_pa: [low, high] } => {
+            Some(format!("{} Pa ({} to {})", pa(*mode_pa), pa(*low), pa(*high)))
+        }
+        _ => None,
+    });
+    let bounds = each(&|a| match a {
+        Claim::Above { bound_pa } => Some(format!("is stiffer than {} Pa", pa(*bound_pa))),
+        _ => None,
+    });
+    let ranges = each(&|a| match a {
+        Claim::Range { range_pa: [low, high] } => Some(format!("{} to {} Pa", pa(*low), pa(*high))),
+        _ => None,
+    });
+    let percent = share.map(|s| format!(" ({:.0} % of it)", 100.0 * s)).unwrap_or_default();
+    let first = reasons.first().map(Reason::sentence).unwrap_or_default();
+    match finding {
+        Finding::NoShift if bounds.is_empty() => format!("No shift seen: {first}. No stiffness is claimed."),
+        Finding::NoShift => format!("No shift seen: {first}. With the load as assumed, {bounds}."),
+        Finding::Unexplained => format!("The model does not explain the shift: {first}. No stiffness is claimed."),
+        Finding::Conflict => format!(
+            "The shift contradicts what is known: {first}. The load or the supports are not as assumed; no stiffness is \
+             claimed."
+        ),
+        Finding::CannotTell => format!("Cannot tell: {first}. Averaged over them: {intervals}."),
+        Finding::PriorDominated => format!(
+            "The model explains the shift{percent}, which says little of the stiffness: the interval is the prior's. \
+             {}.",
+            capitalised(&intervals)
+        ),
+        Finding::Widened => format!(
+            "The model explains most of the shift{percent}, and {first}: the intervals are as much wider. {}.",
+            capitalised(&intervals)
+        ),
+        Finding::Identified => format!("The model explains the shift{percent}: {intervals}."),
+        Finding::Better if ranges.is_empty() => "A sample explains the surfaces better than rest does.".to_owned(),
+        Finding::Better => format!("Better than rest; samples as good as the best have {ranges}."),
+        Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
+        Finding::Worse => format!("Every sample is further away than rest ({first}). No stiffness is claimed."),
+        Finding::Nothing => "Nothing was simulated.".to_owned(),
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interval(tissue: &str, mode_pa: f64) -> (String, Claim) {
+        (tissue.to_owned(), Claim::Interval { mode_pa, interval_95_pa: [0.8 * mode_pa, 1.25 * mode_pa] })
+    }
+
+    #[test]
+    fn a_stiffness_is_only_in_the_sentence_of_a_finding_that_has_one() {
+        let reasons = vec![Reason::FarFromPrior { name: "shear_modulus_pa of grey_matter".to_owned(), sd: 4.6 }];
+        for finding in [Finding::NoShift, Finding::Unexplained, Finding::Conflict] {
+            let verdict = Verdict::new(finding, Some(0.9), vec![interval("grey_matter", 41526.0)], reasons.clone());
+            assert!(!finding.has_stiffness() && !verdict.sentence.contains("41,500"), "{}", verdict.sentence);
+        }
+        for finding in [Finding::Identified, Finding::Widened, Finding::PriorDominated, Finding::CannotTell] {
+            let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());
+            assert!(finding.has_stiffness() && verdict.sentence.contains("rey matter 1,170 Pa (936 to 1,460)"));
+        }
+    }
+
+    #[test]
+    fn no_shift_gives_a_bound_and_names_what_would_have_been_seen() {
+        let reason = Reason::StillAsProbable { log_odds: -2.0, would_be_seen_mm: 0.64 };
+        let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
+        let text = Verdict::new(Finding::NoShift, None, vec![bound], vec![reason]).sentence;
+        assert!(text.contains("0.6 mm") && text.contains("grey matter is stiffer than 2,140 Pa"), "{text}");
+    }
+
+    #[test]
+    fn figures_have_three_digits_and_thousands_apart() {
+        assert_eq!(
+            [0.4, 49.3, 801.2, 1169.6, 41526.0, 1.2e6].map(pa),
+            ["0", "49", "801", "1,170", "41,500", "1,200,000"]
+        );
+    }
+}

@@ -1,0 +1,101 @@
+//! The verdict of an outcome: its estimate's, else that of its samples against rest.
+
+use super::outcome::{ExperimentOutcome, NoiseFloor, SampleOutcome};
+use super::verdict::{Claim, Finding, Reason, Verdict};
+
+impl ExperimentOutcome {
+    /// With its verdict, once all else is there.
+    #[must_use]
+    pub fn with_verdict(mut self) -> Self {
+        self.verdict = self.estimate.as_ref().map_or_else(|| of_samples(&self), |e| e.verdict.clone());
+        if self.verdict.finding == Finding::NoShift {
+            // Every sample fits noise as well as any other.
+            self.best_sample = None;
+        }
+        self
+    }
+}
+
+/// The best sample against rest, and which moduli cannot be told from its own.
+fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
+    let floor = outcome.noise_floor.unwrap_or_default();
+    let Some(best) = outcome.best() else { return Verdict::new(Finding::Nothing, None, Vec::new(), Vec::new()) };
+    let set = if best.rmse_mm.contains_key("margin") { "margin" } else { "all" };
+    let (Some(&deformed_mm), floor_mm) = (best.rmse_mm.get(set), floor.combined_mm().unwrap_or(0.0)) else {
+        return Verdict::new(Finding::Nothing, None, Vec::new(), Vec::new());
+    };
+    let Some(&rest_mm) = outcome.rest_rmse_mm.get(set) else {
+        // A phantom has no rest to be compared with: the samples are compared with each other.
+        let moduli = as_good(outcome, set, deformed_mm + floor_mm);
+        return Verdict::new(Finding::Better, None, moduli, Vec::new());
+    };
+    let finding = compared(rest_mm, deformed_mm, &floor);
+    let mut reasons = vec![Reason::Surface { set: set.to_owned(), rest_mm, deformed_mm, floor_mm }];
+    let moduli = as_good(outcome, set, deformed_mm + floor_mm);
+    for (tissue, answer) in &moduli {
+        if let Claim::Range { range_pa } = answer {
+            reasons.push(Reason::AsGood { tissue: tissue.clone(), pa: *range_pa });
+        }
+    }
+    Verdict::new(finding, None, moduli, reasons)
+}
+
+/// A state against rest: a difference below the floor means nothing.
+pub fn compared(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> Finding {
+    let floor_mm = floor.combined_mm().unwrap_or(0.0);
+    if rest_mm - deformed_mm > floor_mm {
+        Finding::Better
+    } else if deformed_mm - rest_mm > floor_mm {
+        Finding::Worse
+    } else {
+        Finding::NotDistinguishable
+    }
+}
+
+/// The range of moduli of the samples whose error at `set` is not above `limit_mm`, tissue by tissue.
+fn as_good(outcome: &ExperimentOutcome, set: &str, limit_mm: f64) -> Vec<(String, Claim)> {
+    let near = |s: &&SampleOutcome| s.rmse_mm.get(set).is_some_and(|rmse| *rmse <= limit_mm);
+    let near: Vec<&SampleOutcome> = outcome.samples.iter().filter(near).collect();
+    let range = |tissue: &String| {
+        let moduli = near.iter().filter_map(|s| s.shear_modulus_pa.get(tissue).copied());
+        let (low, high) = moduli.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        (low <= high).then(|| (tissue.clone(), Claim::Range { range_pa: [low, high] }))
+    };
+    outcome.tissues.iter().filter_map(range).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn swept(rest: f64, samples: &[(f64, f64)]) -> ExperimentOutcome {
+        let sample = |(n, (modulus, rmse)): (usize, &(f64, f64))| SampleOutcome {
+            id: format!("sample-{n:02}"),
+            shear_modulus_pa: BTreeMap::from([("brain".to_owned(), *modulus)]),
+            rmse_mm: BTreeMap::from([("margin".to_owned(), *rmse)]),
+            converged: true,
+            ..SampleOutcome::default()
+        };
+        ExperimentOutcome {
+            tissues: vec!["brain".to_owned()],
+            samples: samples.iter().enumerate().map(sample).collect(),
+            best_sample: Some("sample-01".to_owned()),
+            rest_rmse_mm: BTreeMap::from([("margin".to_owned(), rest)]),
+            noise_floor: Some(NoiseFloor { voxel_mm: Some(0.3), ..NoiseFloor::default() }),
+            ..ExperimentOutcome::default()
+        }
+    }
+
+    #[test]
+    fn samples_that_cannot_be_told_apart_give_their_range_and_not_the_best_one() {
+        let verdict = of_samples(&swept(3.0, &[(300.0, 1.2), (500.0, 1.0), (900.0, 1.25), (2000.0, 2.0)]));
+        assert_eq!(verdict.finding, Finding::Better);
+        assert_eq!(verdict.moduli, [("brain".to_owned(), Claim::Range { range_pa: [300.0, 900.0] })]);
+        assert!(verdict.sentence.contains("300 to 900 Pa"), "{}", verdict.sentence);
+        let still = of_samples(&swept(1.1, &[(300.0, 1.2), (500.0, 1.0)]));
+        assert_eq!(still.finding, Finding::NotDistinguishable);
+        assert!(still.sentence.contains("No stiffness"), "{}", still.sentence);
+        assert_eq!(of_samples(&swept(0.5, &[(300.0, 1.2), (500.0, 1.0)])).finding, Finding::Worse);
+    }
+}

@@ -1,0 +1,59 @@
+//! Stage `compare`: models of one patient beside each other, by their evidence.
+
+use super::estimate::{Bodies, EstimateInput, held_by};
+use crate::artefact::Produced;
+use crate::experiment::compare::{Comparison, compare as weigh};
+use crate::experiment::prior::PriorSettings;
+use crate::experiment::sample::Tissue;
+use crate::geometry::{Frame, Mni};
+use crate::layout::COMPARISON;
+use crate::material::meta_model::MetaModel;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::stage_name::StageName;
+use crate::workflow::work::{Made, Work, facts};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Compare;
+/// The laws of the family.
+const LAWS: [MetaModel; 3] = [MetaModel::NEO_HOOKEAN, MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN];
+
+/// Estimates every model of the family on the same displacement (or skips it): supports, one or two tissues, each law.
+pub(crate) fn compare(
+    work: &Work<'_>,
+    made: &mut Made,
+    input: &EstimateInput<'_>,
+) -> Result<Comparison, WorkflowError> {
+    let (options, prior) = (&work.settings.estimate, &work.settings.prior);
+    let posed = serde_json::json!({
+        "scenario": input.scenario, "poisson_ratio": input.poisson_ratio, "noise_mm": input.noise_mm,
+        "estimate": options, "prior": prior, "laws": LAWS, "held": held_by(work),
+    });
+    let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Mni::NAME);
+    work.run(made, &NAME, &stage, || {
+        let families = [(1, Tissue::whole_brain()), (2, Tissue::grey_and_white())];
+        let bodies = Bodies::of(work, input)?;
+        work.tell(|p| p.begin("models", bodies.list.len() * families.len() * LAWS.len()));
+        let (mut models, mut warnings) = (Vec::new(), Vec::new());
+        for (n, body) in bodies.list.iter().enumerate() {
+            for (count, tissues) in &families {
+                for law in LAWS {
+                    let of = if *count == 1 { "brain" } else { "grey and white matter" };
+                    let name = format!("{}, {} {of}", body.name(), law.name());
+                    work.tell(|p| p.doing(&name));
+                    match bodies.solved(work, input, n, tissues, &PriorSettings { law, ..prior.clone() }) {
+                        Ok(found) => models.push((name, found.outcome)),
+                        // A model that has no equilibrium explains nothing; the others are still compared.
+                        Err(error) => warnings.push(format!("{name}: left out: {error}")),
+                    }
+                    work.tell(|p| p.step());
+                }
+            }
+        }
+        work.tell(|p| p.end());
+        let (comparison, _) = weigh(models).ok_or(WorkflowError::NoEvidence)?;
+        let json = serde_json::to_string_pretty(&comparison).expect("figures are plain data") + "\n";
+        let files = vec![(COMPARISON.to_owned(), json.into_bytes())];
+        Ok(Produced { files, warnings, facts: facts(&comparison) })
+    })
+}
