@@ -375,8 +375,9 @@ mod tests {
     fn a_shadow_over_folds_that_are_still_there_is_no_cavity() {
         let h = head(12.0);
         let known = h.brain.map(|_| true);
-        let fold =
-            |n: usize| if (h.pre.grid.voxel(n)[0] / 2 + h.pre.grid.voxel(n)[2] / 3) % 2 == 0 { 30.0 } else { 0.0 };
+        let fold = |n: usize| {
+            if (h.pre.grid.voxel(n)[0] / 2 + h.pre.grid.voxel(n)[2] / 3).is_multiple_of(2) { 30.0 } else { 0.0 }
+        };
         let folded = |v: &Volume<f32, Mni>| Volume::from_fn(v.grid, |n| v.data[n] + fold(n));
         let pre = folded(&h.pre);
         let shadow = Volume::from_fn(pre.grid, |n| pre.data[n] * if h.hole.data[n] { 0.4 } else { 1.0 });

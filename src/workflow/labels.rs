@@ -65,7 +65,9 @@ fn codes(
     progress: &mut dyn Progress,
 ) -> Result<Volume<u32, Native>, WorkflowError> {
     let (codes, odd) = nifti::decode_codes(bytes, name, options)?;
-    odd.iter().for_each(|warning| progress.noted(&format!("{name}: {warning}")));
+    for warning in &odd {
+        progress.noted(&format!("{name}: {warning}"));
+    }
     Ok(codes)
 }
 
