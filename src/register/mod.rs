@@ -6,6 +6,7 @@ mod bspline;
 pub mod deformable;
 mod head;
 mod mutual_information;
+mod normalised;
 mod pyramid;
 mod rigid;
 mod sample;

@@ -3,12 +3,23 @@
 
 use super::bfgs::{self, Stopping};
 use super::mutual_information::{Bins, Interpolated, Pose, Similarity, similarity};
+use super::normalised::{LARGEST, agreement};
 use super::sample::Samples;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
+/// What a pose is judged by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    /// Mutual information: for two images of one head, or at the end.
+    Information,
+    /// Agreement of images over their own neighbourhoods, for a search: no gain and no histogram misleads it.
+    Agreement,
+}
+
 /// One resolution of the problem.
 pub(super) struct Level<'a> {
+    pub measure: Measure,
     pub samples: Samples,
     pub other: Interpolated<'a>,
     pub bins: Bins,
@@ -17,10 +28,20 @@ pub(super) struct Level<'a> {
 
 impl Level<'_> {
     pub(super) fn at(&self, pose: &Pose) -> Similarity {
-        similarity(&self.samples, &self.other, self.bins, pose, false)
+        self.similarity(pose, false)
     }
 
-    /// Mutual information, with poses that hide much of the sampled head from the other image counted less.
+    fn similarity(&self, pose: &Pose, with_gradient: bool) -> Similarity {
+        match self.measure {
+            Measure::Information => similarity(&self.samples, &self.other, self.bins, pose, with_gradient),
+            Measure::Agreement => {
+                let range = [-LARGEST, LARGEST];
+                agreement(&self.samples, &self.other, self.bins.sampled, range, pose, with_gradient)
+            }
+        }
+    }
+
+    /// The measure, with poses that hide much of the sampled head from the other image counted less.
     fn score(&self, pose: &Pose) -> f64 {
         let s = self.at(pose);
         s.mutual_information * s.known.sqrt()
@@ -132,7 +153,7 @@ fn left_jacobian(w: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// Maximises mutual information over motions from a base pose.
+/// Maximises the level's measure over motions from a base pose.
 pub(super) fn optimise(
     level: &Level<'_>,
     base: &Pose,
@@ -144,7 +165,7 @@ pub(super) fn optimise(
     let floor = 0.25 * level.at(base).known;
     let minimum = bfgs::minimise(DVector::zeros(freedom.parameters()), inverse_hessian, stopping, |parameters| {
         let pose = freedom.moved(base, radius_mm, parameters);
-        let mut s = similarity(&level.samples, &level.other, level.bins, &pose, true);
+        let mut s = level.similarity(&pose, true);
         if s.known < floor {
             // Sliding out of the other image is not a match.
             return (f64::INFINITY, DVector::zeros(freedom.parameters()));
@@ -169,6 +190,10 @@ pub(super) struct Reach {
     pub turns: Vec<Rotation3<f64>>,
     /// Shifts along x, y and z, mm.
     pub shifts_mm: [Vec<f64>; 3],
+    /// Sizes of the sampled head in the other image.
+    pub scales: Vec<f64>,
+    /// What the refinement of the best may do.
+    pub freedom: Freedom,
 }
 
 /// No turn, or one by `step_rad` to either side, about each axis.
@@ -188,8 +213,8 @@ pub(super) fn turns_about_axes(step_rad: f64) -> Vec<Rotation3<f64>> {
 pub(super) fn coarse(level: &Level<'_>, guesses: &[Pose], reach: &Reach, keep: usize) -> (Vec<Pose>, f64) {
     let mut poses = guesses.to_vec();
     let guess = guesses[0];
-    for turn in &reach.turns {
-        let linear = *turn.matrix() * guess.linear;
+    for (turn, scale) in reach.turns.iter().flat_map(|t| reach.scales.iter().map(move |s| (t, s))) {
+        let linear = *turn.matrix() * guess.linear * *scale;
         for &x in &reach.shifts_mm[0] {
             for &y in &reach.shifts_mm[1] {
                 for &z in &reach.shifts_mm[2] {
@@ -203,7 +228,7 @@ pub(super) fn coarse(level: &Level<'_>, guesses: &[Pose], reach: &Reach, keep: u
     ranked.truncate(6 * keep);
     let stopping = Stopping { longest_step_mm: 8.0, shortest_step_mm: 0.3, evaluations: 25 };
     let refined: Vec<Pose> =
-        ranked.par_iter().map(|(_, pose)| optimise(level, pose, Freedom::Rigid, None, stopping).pose).collect();
+        ranked.par_iter().map(|(_, pose)| optimise(level, pose, reach.freedom, None, stopping).pose).collect();
     let mut best: Vec<Pose> = Vec::new();
     for (_, pose) in rank(level, refined) {
         // Starts that ended in one place count once.

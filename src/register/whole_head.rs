@@ -2,18 +2,21 @@
 //!
 //! A stripped template says nothing of what surrounds the brain, and mutual information then gains by sliding the bright
 //! template over scalp and neck. Here bone is dark and scalp bright in both images. What is compared has its slow gain taken
-//! out first (a surface coil makes the scalp ten times as bright as the thalamus), sizes may differ within what heads do, and
-//! of several starts the winner is the one whose anatomy agrees locally, not the one whose histogram is best.
+//! out first (a surface coil makes the scalp ten times as bright as the thalamus), and the search itself compares every
+//! neighbourhood with its like, since under such a coil no histogram of the whole head means anything. Sizes may differ
+//! within what heads do. Of several starts the winner is the one whose anatomy agrees locally, not the one whose histogram
+//! is best; only the last step, from there, is mutual information's.
 
 use super::bfgs::Stopping;
 use super::bspline::prefilter;
 use super::deformable::force::local_correlation;
 use super::head;
 use super::mutual_information::{Bins, Interpolated, Pose};
+use super::normalised::{LARGEST, normalised};
 use super::pyramid::{on_grid_of, reduced_to};
 use super::rigid::{FitQuality, RegisterError, RigidFit, side};
 use super::sample::{Draw, draw};
-use super::search::{Freedom, Level, Reach, TETHER, coarse, optimise, rank, turns_about_axes};
+use super::search::{Freedom, Level, Measure, Reach, TETHER, coarse, optimise, rank, turns_about_axes};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
@@ -23,11 +26,24 @@ const LEVELS_MM: [f64; 3] = [8.0, 4.0, 2.0];
 /// The head is compared over its brain widened by this much: scalp and skull, not the face (cut off in shared scans), not
 /// the neck (which bends).
 const AROUND_MM: f64 = 20.0;
+/// A brain is compared over itself and this much: the dark gap to marrow and scalp.
+const EDGE_MM: f64 = 5.0;
 const BINS: usize = 40;
+/// The neighbourhood that a voxel is compared with, in voxels of its level (standard deviation).
+const WINDOW_VOXELS: f64 = 1.5;
+/// Contrast in a neighbourhood below this share of what the head shows is noise.
+const NOISE: f32 = 0.03;
+/// Levels at which poses are searched for.
+const SEARCHED: usize = 2;
+/// Sizes that starts have, over the mean head's: half way to a small child's and to a large man's.
+const SCALES: [f64; 2] = [0.93, 1.08];
 /// Local correlation with the mean head above which no other start is tried.
 const CLEAR: f64 = 0.5;
-/// Local correlation below which no head was found.
-const LEAST: f64 = 0.25;
+/// Local correlation below which no head was found: wrong poses of real heads stay well below, right ones above.
+const LEAST: f64 = 0.35;
+
+/// Loss of local correlation after which the last step is undone.
+const DRIFT: f64 = 0.05;
 
 /// The mean of many heads, on one grid with the brain inside it.
 #[derive(Clone, Copy, Debug)]
@@ -36,11 +52,14 @@ pub struct MeanHead<'a, F: Frame> {
     pub t1: &'a Volume<f32, F>,
     /// The brain.
     pub brain: &'a Mask<F>,
+    /// A brain without scalp and skull in its place.
+    pub bare: &'a Volume<f32, F>,
 }
 
 /// The mean head, ready to be compared with.
 pub(super) struct Prepared {
     levels: Vec<Volume<f32, Native>>,
+    normalised: Vec<Volume<f32, Native>>,
     region: Mask<Native>,
     /// Where the judge looks, on the grid of the second level.
     near_brain: Mask<Native>,
@@ -48,19 +67,39 @@ pub(super) struct Prepared {
 }
 
 impl<F: Frame> MeanHead<'_, F> {
+    pub(super) fn centre_mm(&self) -> Vector3<f64> {
+        head::centre_mm(&self.brain.clone().relabelled())
+    }
+
     pub(super) fn prepared(&self) -> Prepared {
-        let t1 = without_gain(&self.t1.clone().relabelled());
+        self.prepared_as(without_gain(&self.t1.clone().relabelled()), AROUND_MM)
+    }
+
+    /// As scans are shared whose scalp and skull have been taken away.
+    pub(super) fn stripped(&self) -> Prepared {
+        self.prepared_as(self.bare.clone().relabelled(), AROUND_MM)
+    }
+
+    /// The brain alone, for its own size: beyond its edge nothing is compared.
+    pub(super) fn brain_alone(&self) -> Prepared {
+        self.prepared_as(self.bare.clone().relabelled(), EDGE_MM)
+    }
+
+    fn prepared_as(&self, t1: Volume<f32, Native>, around_mm: f64) -> Prepared {
         let brain: Mask<Native> = self.brain.clone().relabelled();
         let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&t1, mm)).collect();
         let near_brain = on_grid_of(&morphology::dilate(&brain, 6.0), &levels[1]);
         let centre_mm = head::centre_mm(&brain);
-        Prepared { region: morphology::dilate(&brain, AROUND_MM), levels, near_brain, centre_mm }
+        let region = morphology::dilate(&brain, around_mm);
+        let normalised = (0..SEARCHED).map(|n| over_neighbourhood(&levels[n], &region, None, n)).collect();
+        Prepared { region, levels, normalised, near_brain, centre_mm }
     }
 }
 
 /// The scan, ready to be compared with.
 pub(super) struct Subject {
     levels: Vec<Volume<f32, Native>>,
+    normalised: Vec<Volume<f32, Native>>,
     coefficients: Vec<Volume<f32, Native>>,
     known: Vec<Option<Mask<Native>>>,
     pub foreground: Mask<Native>,
@@ -70,11 +109,25 @@ impl Subject {
     pub(super) fn new(image: &Volume<f32, Native>, known: Option<&Mask<Native>>) -> Self {
         let flat = without_gain(&reduced_to(image, LEVELS_MM[2]));
         let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&flat, mm)).collect();
-        let known = levels.iter().map(|l| known.map(|k| on_grid_of(k, l))).collect();
+        let known: Vec<_> = levels.iter().map(|l| known.map(|k| on_grid_of(k, l))).collect();
         let coefficients = levels.iter().map(along_thick_axes).collect();
         let foreground = not_air(&levels[1]);
-        Self { levels, coefficients, known, foreground }
+        let normalised = (0..SEARCHED)
+            .map(|n| along_thick_axes(&over_neighbourhood(&levels[n], &foreground, known[n].as_ref(), n)))
+            .collect();
+        Self { levels, normalised, coefficients, known, foreground }
     }
+}
+
+/// One level's image over its own neighbourhoods.
+fn over_neighbourhood(
+    image: &Volume<f32, Native>,
+    head: &Mask<Native>,
+    known: Option<&Mask<Native>>,
+    level: usize,
+) -> Volume<f32, Native> {
+    let [low, high] = head::range_within(image, head, 0.02, 0.98);
+    normalised(image, known, WINDOW_VOXELS * LEVELS_MM[level], NOISE * (high - low))
 }
 
 /// Spline coefficients along axes that are much coarser than the finest; along the others the smoothing spline is read.
@@ -102,6 +155,7 @@ pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: u
         seed: 1 + n as u64,
     };
     Level {
+        measure: Measure::Information,
         samples: draw(template, &head.region, &request),
         other: Interpolated {
             image: &subject.coefficients[n],
@@ -109,6 +163,20 @@ pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: u
             range: range_of_tissue(image, &subject.foreground),
         },
         bins: Bins { sampled: bins, interpolated: bins + 4 },
+        spacing_mm: LEVELS_MM[n],
+    }
+}
+
+/// One resolution of the search for poses.
+pub(super) fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
+    let range = [-LARGEST, LARGEST];
+    let request =
+        Draw { most, other_spacing_mm: LEVELS_MM[n], bins: BINS, range, centre_mm: head.centre_mm, seed: 1 + n as u64 };
+    Level {
+        measure: Measure::Agreement,
+        samples: draw(&head.normalised[n], &head.region, &request),
+        other: Interpolated { image: &subject.normalised[n], mask: subject.known[n].as_ref(), range },
+        bins: Bins { sampled: BINS, interpolated: BINS + 4 },
         spacing_mm: LEVELS_MM[n],
     }
 }
@@ -169,8 +237,9 @@ fn range_of_tissue(image: &Volume<f32, Native>, inside: &Mask<Native>) -> [f32; 
 /// Finds the rigid motion that takes a head onto the mean head.
 ///
 /// Starts from aligned centres and from where the scan lies, turned by up to 30 degrees; when none of them is clearly a
-/// head, turned by up to 75 degrees about any axis. Each is refined with 12 parameters held to the sizes of heads, at 4 mm; the best
-/// by local correlation over the brain is finished at 2 mm. The motion is the polar part of the affine map.
+/// head, as a brain without scalp and skull, and turned by up to 75 degrees about any axis. Each is refined with 12
+/// parameters held to the sizes of heads, at 4 mm; the best by local correlation over the brain is finished at 2 mm. The
+/// motion is the polar part of the affine map.
 ///
 /// # Errors
 /// [`RegisterError`]; [`RegisterError::NoHead`] when nothing at any start looks like a head.
@@ -180,42 +249,39 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
 ) -> Result<RigidFit<M, F>, RegisterError> {
     let moving = side("moving", moving, None)?;
     let subject = Subject::new(&moving.image, None);
-    let head = head.prepared();
-    let start_level = level(&head, &subject, 0, 2500);
-    let first = level(&head, &subject, 1, 15_000);
-    let centre = head.centre_mm;
-    let aligned = Pose { linear: Matrix3::identity(), centre, target: head::centre_mm(&subject.foreground) };
-    let as_they_lie = Pose { target: centre, ..aligned };
-    let judged = |poses: &[Pose]| -> Option<(f64, Pose)> {
-        let best = |a: (f64, Pose), b: (f64, Pose)| if b.0 > a.0 { b } else { a };
-        poses.iter().map(|p| refined(&first, p)).map(|p| (likeness(&head, &subject, &p), p)).reduce(best)
-    };
-
+    let whole = head.prepared();
     let near = Reach {
         turns: turns_about_axes(20f64.to_radians()),
         shifts_mm: [vec![-15.0, 15.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
+        scales: SCALES.to_vec(),
+        freedom: Freedom::Affine(TETHER),
     };
-    let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], &near, 3);
-    let mut found = judged(&starts).unwrap_or((0.0, aligned));
-    let mut best_start = starts.first().copied();
-    if found.0 < CLEAR {
+    let mut found = searched(&whole, &subject, &near, 4);
+    let mut stripped = None;
+    if found.likeness < CLEAR {
+        let bare = stripped.insert(head.stripped());
+        found = found.or(searched(bare, &subject, &near, 4), true);
+    }
+    if found.likeness < CLEAR {
         let far = Reach { turns: turns_within(75f64.to_radians(), 25f64.to_radians()), ..near };
-        let (starts, _) = coarse(&start_level, &[aligned], &far, 6);
-        if let Some(other) = judged(&starts).filter(|other| other.0 > found.0) {
-            found = other;
-            best_start = starts.first().copied();
+        found = found.or(searched(&whole, &subject, &far, 6), false);
+        if let Some(bare) = &stripped {
+            found = found.or(searched(bare, &subject, &far, 6), true);
         }
     }
-    let (likeness_4mm, pose) = found;
+    let head = stripped.filter(|_| found.bare).unwrap_or(whole);
+    let Found { likeness: likeness_4mm, pose, distinctness, .. } = found;
     if likeness_4mm < LEAST {
         return Err(RegisterError::NoHead { likeness: likeness_4mm, least: LEAST });
     }
-    let distinctness = best_start.map_or(0.0, |p| rank(&start_level, vec![p])[0].0 / ordinary.max(1e-12));
 
     let last = level(&head, &subject, 2, 80_000);
     let stopping = Stopping { longest_step_mm: 1.0, shortest_step_mm: 5e-3, evaluations: 60 };
     let optimum = optimise(&last, &pose, Freedom::Affine(TETHER), None, stopping);
-    let at = last.at(&optimum.pose);
+    // The last step climbs another measure than the one that judges: where it ran away, it is not taken.
+    let ran_away = likeness(&head, &subject, &optimum.pose) < likeness_4mm - DRIFT;
+    let finished = if ran_away { pose } else { optimum.pose };
+    let at = last.at(&finished);
     let quality = FitQuality {
         mutual_information: at.mutual_information,
         normalised_information: at.mutual_information / at.entropy.max(1e-12),
@@ -224,10 +290,60 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
         mirrored_ratio: None,
         evaluations: optimum.evaluations,
     };
-    let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&optimum.pose.linear));
+    let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&finished.linear));
     let moving_from_head: RigidTransform<Native, Native> =
-        RigidTransform::new(rotation, optimum.pose.target - rotation * optimum.pose.centre);
+        RigidTransform::new(rotation, finished.target - rotation * finished.centre);
     Ok(RigidFit { fixed_from_moving: moving_from_head.inverse().relabelled(), quality, warnings: quality.warnings() })
+}
+
+/// The best pose of a search.
+struct Found {
+    likeness: f64,
+    pose: Pose,
+    distinctness: f64,
+    /// Found with the mean head without scalp and skull.
+    bare: bool,
+}
+
+impl Found {
+    fn or(self, other: Self, bare: bool) -> Self {
+        if other.likeness > self.likeness { Self { bare, ..other } } else { self }
+    }
+}
+
+/// The most likely of the `keep` best poses within reach of aligned centres.
+fn searched(head: &Prepared, subject: &Subject, reach: &Reach, keep: usize) -> Found {
+    /// What an ordinary wrong pose agrees, at least: what more can be said is not a matter of the scan.
+    const ORDINARY: f64 = 0.02;
+    let start_level = search_level(head, subject, 0, 2500);
+    let first = search_level(head, subject, 1, 15_000);
+    let centre = head.centre_mm;
+    let aligned = Pose { linear: Matrix3::identity(), centre, target: head::centre_mm(&subject.foreground) };
+    let as_they_lie = Pose { target: centre, ..aligned };
+    let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], reach, keep);
+    let mut best = Found { likeness: 0.0, pose: aligned, distinctness: 0.0, bare: false };
+    for start in &starts {
+        let pose = refined(&first, start);
+        let likeness = likeness(head, subject, &pose);
+        if likeness > best.likeness {
+            best = Found { likeness, pose, ..best };
+        }
+    }
+    if let Some(start) = starts.first() {
+        best.distinctness = rank(&start_level, vec![*start])[0].0 / ordinary.max(ORDINARY);
+    }
+    best
+}
+
+/// The more likely of the whole and the stripped mean head at a pose.
+pub(super) fn likelier<F: Frame>(head: &MeanHead<'_, F>, subject: &Subject, pose: &Pose) -> Prepared {
+    let whole = head.prepared();
+    let likeness_of_whole = likeness(&whole, subject, pose);
+    if likeness_of_whole >= CLEAR {
+        return whole;
+    }
+    let bare = head.stripped();
+    if likeness(&bare, subject, pose) > likeness_of_whole { bare } else { whole }
 }
 
 /// The rotation of a linear map's polar decomposition.

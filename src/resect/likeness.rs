@@ -30,8 +30,8 @@ pub struct Likeness {
 impl Likeness {
     /// Below this the scans do not show one head, or one does not lie on the other.
     ///
-    /// On 27 pairs of free scans (adults, a child, 0.8 to 4.8 mm, with and without the scanner's normalisation, other
-    /// postures, cavities of 40 to 60 cc) one head had .95 and more, two heads .71 and less; `./run bench pairs` looks at it
+    /// Between what one head has shown under other gains, noise and slices of 5 mm, and what two heads have, even two that are
+    /// warped from one template; a pose that is off by the width of a sulcus falls below it, too. `./run bench pairs` looks at it
     /// again.
     pub const ONE_HEAD: f64 = 0.8;
 

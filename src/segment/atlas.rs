@@ -5,7 +5,7 @@
 
 use super::atlas_labels::derive_labels;
 use crate::geometry::{AffineTransform, Mni, Position};
-use crate::image::resample::resample_nearest;
+use crate::image::resample::{Interpolation, resample, resample_nearest};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 use std::io::Read;
@@ -69,7 +69,8 @@ pub fn mean_head() -> &'static MeanHead {
         let t1 = decode(include_bytes!("../../atlases/head/head.nii.gz")).map(f32::from);
         let template_from_head = head_from_template().inverse().expect("a stretch can be inverted");
         let brain = resample_nearest(&template().t1, &t1.grid, &template_from_head, 0).map(|x| x > 0);
-        MeanHead { t1, brain }
+        let bare = resample(&template().t1_f32(), &t1.grid, &template_from_head, Interpolation::Linear, 0.0).volume;
+        MeanHead { t1, brain, bare }
     })
 }
 
@@ -80,6 +81,8 @@ pub struct MeanHead {
     pub t1: Volume<f32, Mni>,
     /// The template's brain on it.
     pub brain: Mask<Mni>,
+    /// The template's T1 in this size: a brain without scalp and skull.
+    pub bare: Volume<f32, Mni>,
 }
 
 /// From the template, which is larger than people are, to the mean head in its natural size.

@@ -46,9 +46,10 @@ pub enum HeadError {
 
 /// Local correlation under which the fit is tried again without the stretch that was found.
 const DOUBTFUL: f64 = 0.5;
-/// Local correlation under which a fit is refused: half of the least that a right fit has shown (.28, a head with ventricles
-/// of three times the usual size).
-const LEAST: f64 = 0.14;
+/// Local correlation under which a fit is refused: half way between what a deformable fit reaches from a wrong pose, where it
+/// lines up whatever folds it meets, and what it reaches from the right one on the hardest heads (thick slices, small
+/// children, lesions, wide ventricles).
+const LEAST: f64 = 0.4;
 /// The brain found over the brain expected; hydrocephalus and atrophy change both.
 const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 
@@ -58,7 +59,7 @@ const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 /// [`RegisterError`].
 pub fn pose_of_head<F: Frame>(t1: &Volume<f32, F>) -> Result<RigidFit<F, Mni>, RegisterError> {
     let head = atlas::mean_head();
-    register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain })
+    register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare })
 }
 
 /// The template deformed onto a head; both in the MNI frame reached rigidly.
@@ -86,7 +87,7 @@ pub fn fit_template<F: Frame>(
 fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
     let head = atlas::mean_head();
     let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
-    let mean = MeanHead { t1: &head.t1, brain: &head.brain };
+    let mean = MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare };
     atlas::head_from_template().then(&subject_from_mean_head(&finite, &mean, Some(known)))
 }
 

@@ -1,14 +1,11 @@
-//! Bars of real heads that took no part in building: the program's answer on each, and invented mishaps of good ones.
+//! Bars of real heads that took no part in building: the program's answer on each.
 
 use crate::bar::{Bar, Finished, data, run_hgm};
-use hgm::geometry::{Native, RigidTransform};
-use hgm::image::nifti::{ReadOptions, decode, decode_labels, encode_f32};
-use hgm::image::resample::{Interpolation, resample};
-use hgm::image::{Grid, LabelMap, Mask, Volume};
-use hgm::material::random::CounterRng;
+use hgm::geometry::Native;
+use hgm::image::nifti::{ReadOptions, decode_labels, encode_f32};
+use hgm::image::{Grid, LabelMap, Volume};
 use hgm::segment::label;
-use hgm::segment::native::labels_on;
-use nalgebra::{Matrix4, Point3, Vector3};
+use nalgebra::{Matrix4, Vector3};
 use std::io::Read;
 use std::path::Path;
 
@@ -61,7 +58,6 @@ pub fn bars() -> Vec<Bar> {
         }
         if name == "good_b" {
             bars.push(cost(&found.run));
-            bars.extend(mishaps(&heads, labels, folder.path()));
         }
     }
     let all = HEADS.len();
@@ -70,12 +66,15 @@ pub fn bars() -> Vec<Bar> {
     bars
 }
 
-struct Segmented {
+/// The program's answer on a scan.
+pub struct Segmented {
     run: Finished,
-    labels: Option<LabelMap<Native>>,
+    /// Its labels; `None` when it was refused.
+    pub labels: Option<LabelMap<Native>>,
 }
 
-fn segmented(scan: &Path, out: &Path) -> Segmented {
+/// Runs `hgm segment` on a scan.
+pub fn segmented(scan: &Path, out: &Path) -> Segmented {
     let (scan, out_name) = (scan.display().to_string(), out.display().to_string());
     let run = run_hgm(&["segment", "-q", "--force", "--threads", "1", &scan, "-o", &out_name]);
     let labels = if run.ok { labels(&std::fs::read(out).unwrap(), &out_name) } else { None };
@@ -94,64 +93,6 @@ fn cost(run: &Finished) -> Bar {
         format!("{:.1} CPU-s, {:.2} GB", run.cpu_s, run.peak_gb),
         met,
     )
-}
-
-/// One good head turned, cropped, resized, shaded, noisy: the answer agrees with the first one, or there is none.
-fn mishaps(heads: &Path, first: &LabelMap<Native>, folder: &Path) -> Vec<Bar> {
-    let path = heads.join("good_b_t1.nii.gz");
-    let name = path.display().to_string();
-    let t1 = decode(&std::fs::read(&path).unwrap(), &name, &ReadOptions::default()).unwrap().volume;
-    let (mut right, mut refused, mut wrong) = (0, 0, Vec::new());
-    for seed in 0..6 {
-        let (hurt, t1_from_hurt, zoom) = hurt(&t1, seed);
-        let scan = folder.join(format!("hurt{seed}.nii.gz"));
-        std::fs::write(&scan, encode_f32(&hurt)).unwrap();
-        let found = segmented(&scan, &folder.join(format!("hurt{seed}_dseg.nii.gz")));
-        let Some(labels) = found.labels else {
-            refused += 1;
-            continue;
-        };
-        let expected = labels_on(first, &unzoomed(&hurt.grid, zoom), &t1_from_hurt);
-        let brain = |l: &LabelMap<Native>| Mask::from_data(hurt.grid, l.data.iter().map(|&l| l > 0).collect());
-        let dice = brain(&labels).dice(&brain(&expected));
-        if dice >= 0.93 { right += 1 } else { wrong.push(format!("seed {seed}: {dice:.3}")) }
-    }
-    let said = format!("{right} right, {refused} refused, {} wrong {wrong:?}", wrong.len());
-    vec![Bar::new("heads six mishaps of a good head", "Dice >= .93 or refused", said, wrong.is_empty())]
-}
-
-/// The head in another pose on another grid, its voxels said to be larger or smaller than they are, with a gain that varies by a
-/// factor of about 2 and noise; some are cut below the nose.
-fn hurt(t1: &Volume<f32, Native>, seed: u64) -> (Volume<f32, Native>, RigidTransform<Native, Native>, f64) {
-    let rng = CounterRng::new(seed, 77);
-    let draw = |n: u64| 2.0 * rng.uniform(n) - 1.0;
-    let direction = |n: u64| Vector3::new(draw(n), draw(n + 1), draw(n + 2)).normalize();
-    let middle = t1.grid.position(Point3::from(t1.grid.dims.map(|n| n as f64 / 2.0))).mm;
-    let angle = (seed as f64 * 12.0).to_radians();
-    let t1_from_hurt = RigidTransform::about(middle, direction(0) * angle, direction(3) * 25.0);
-    let centre = t1_from_hurt.inverse().apply(hgm::geometry::Position::from_point(middle)).mm;
-    let (spacing_mm, whole) = (1.1, [200, 230, 230]);
-    // Every second one ends 44 mm higher.
-    let cut = if seed.is_multiple_of(2) { 0 } else { 40 };
-    let dims = [whole[0], whole[1], whole[2] - cut];
-    let mut origin = [0, 1, 2].map(|a| centre[a] - 0.5 * spacing_mm * whole[a] as f64);
-    origin[2] += spacing_mm * cut as f64;
-    let grid = Grid::axis_aligned(dims, [spacing_mm; 3], origin);
-    let mut seen = resample(t1, &grid, &t1_from_hurt.to_affine(), Interpolation::Linear, 0.0).volume;
-    let shade = direction(6);
-    for n in 0..seen.data.len() {
-        let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
-        let gain = (0.35 * shade.dot(&(p - centre)) / 90.0).exp();
-        let noise: f64 = (0..4).map(|c| rng.uniform(1000 + 4 * n as u64 + c) - 0.5).sum();
-        seen.data[n] = (f64::from(seen.data[n]) * gain + 6.0 * noise).max(0.0) as f32;
-    }
-    let zoom = 1.0 + 0.1 * draw(9);
-    let grid = Grid::new(dims, Matrix4::new_scaling(zoom) * grid.mm_from_voxel).expect("a zoomed grid");
-    (Volume::from_data(grid, seen.data), t1_from_hurt, zoom)
-}
-
-fn unzoomed(grid: &Grid<Native>, zoom: f64) -> Grid<Native> {
-    Grid::new(grid.dims, Matrix4::new_scaling(1.0 / zoom) * grid.mm_from_voxel).expect("a grid")
 }
 
 /// A scan with FreeSurfer's labels of the same head.

@@ -7,6 +7,7 @@ mod bytes;
 mod cluster;
 mod cohort;
 mod contact;
+mod corruptions;
 mod evidence;
 mod experiment;
 mod fem;
@@ -33,6 +34,7 @@ fn main() {
     let rooms: Vec<Room> = vec![
         ("imaging", imaging::bars),
         ("heads", heads::bars),
+        ("corruptions", corruptions::bars),
         ("mesh", mesh::bars),
         ("material", material::bars),
         ("fem", fem::bars),

@@ -1,5 +1,6 @@
 //! One integration binary: laws that cross rooms, other people's tools, the command line.
 
+mod answers;
 mod bids;
 mod circles;
 mod cluster;

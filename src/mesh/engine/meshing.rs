@@ -204,7 +204,7 @@ pub(super) mod tests {
     fn more_labels_than_a_mesh_can_hold_are_refused_in_words() {
         let grid = Grid::<Mni>::axis_aligned([9; 3], [1.0; 3], [0.0; 3]);
         let map = |most: usize| LabelMap::from_fn(grid, |n| 1 + (n % most) as u8);
-        let said = |most, split: bool| {
+        let said = |most: usize, split: bool| {
             let split = split.then(|| MidplaneSplit { labels: vec![2, 3], above_yz_mm: Vec::new() });
             let settings = MeshSettings { split, ..MeshSettings::default() };
             let refused = mesh_labels(&map(most), &settings, &EnginePrograms::default()).err();

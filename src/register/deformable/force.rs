@@ -73,14 +73,14 @@ pub(super) fn force(
     let dims = grid.dims;
     let [nx, ny, _] = dims;
     let plane = nx * ny;
-    let product = |f: &(dyn Fn(usize) -> f32 + Sync)| {
-        let data: Vec<f32> = (0..weight.len()).into_par_iter().map(|n| weight[n] * f(n)).collect();
-        window_sums(data, dims)
-    };
-    let count = product(&|_| 1.0);
-    let (sum_f, sum_m) = (product(&|n| fixed[n]), product(&|n| moving[n]));
-    let (sum_ff, sum_mm) = (product(&|n| fixed[n] * fixed[n]), product(&|n| moving[n] * moving[n]));
-    let sum_fm = product(&|n| fixed[n] * moving[n]);
+    let sums = |data: Vec<f32>| window_sums(data, dims);
+    let weighted = |a: &[f32]| weight.par_iter().zip(a).map(|(w, a)| w * a).collect::<Vec<f32>>();
+    let count = sums(weight.to_vec());
+    let (known_f, known_m) = (weighted(fixed), weighted(moving));
+    let product = |a: &[f32], b: &[f32]| sums(a.par_iter().zip(b).map(|(a, b)| a * b).collect());
+    let (sum_ff, sum_mm) = (product(&known_f, fixed), product(&known_m, moving));
+    let sum_fm = product(&known_f, moving);
+    let (sum_f, sum_m) = (sums(known_f), sums(known_m));
 
     let full = ((2 * REACH + 1) * (2 * REACH + 1) * (2 * REACH + 1)) as f32;
     let mut out = VectorField::zeros(grid);

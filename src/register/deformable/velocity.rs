@@ -51,17 +51,24 @@ impl Cell {
     }
 }
 
+impl Cell {
+    /// [`Self::of`] for components side by side.
+    #[inline(always)]
+    fn of_all(&self, data: &[[f32; 4]]) -> [f32; 4] {
+        let [sx, sy, sz] = self.step;
+        let [fx, fy, fz] = self.fraction;
+        let between =
+            |a: [f32; 4], b: [f32; 4], f: f32| -> [f32; 4] { std::array::from_fn(|n| a[n] + f * (b[n] - a[n])) };
+        let line = |o: usize| between(data[o], data[o + sx], fx);
+        let plane = |o: usize| between(line(o), line(o + sy), fy);
+        between(plane(self.corner), plane(self.corner + sz), fz)
+    }
+}
+
 impl VectorField {
     pub(super) fn zeros(grid: &Grid<Native>) -> Self {
         let component = || vec![0f32; grid.len()];
         Self { grid: *grid, components: [component(), component(), component()] }
-    }
-
-    /// The field at a point, in voxels.
-    #[inline(always)]
-    pub(super) fn at(&self, p: [f32; 3]) -> [f32; 3] {
-        let cell = Cell::at(self.grid.dims, p);
-        std::array::from_fn(|a| cell.of(&self.components[a]))
     }
 
     /// Every component smoothed by a Gaussian of `sigma_mm`.
@@ -91,37 +98,23 @@ impl VectorField {
         squares.reduce(|| 0.0, f32::max).sqrt()
     }
 
-    /// `x -> self(x) + outer(x + self(x))`: the displacement of first `self`, then `outer`.
-    pub(super) fn then(&self, outer: &Self) -> Self {
-        let [nx, ny, nz] = self.grid.dims;
-        let mut out = Self::zeros(&self.grid);
-        let [ox, oy, oz] = &mut out.components;
-        let plane = nx * ny;
-        ox.par_chunks_mut(plane).zip(oy.par_chunks_mut(plane)).zip(oz.par_chunks_mut(plane)).enumerate().for_each(
-            |(k, ((ox, oy), oz))| {
-                debug_assert!(k < nz);
-                for j in 0..ny {
-                    for i in 0..nx {
-                        let (o, n) = (i + nx * j, i + nx * (j + ny * k));
-                        let d: [f32; 3] = std::array::from_fn(|a| self.components[a][n]);
-                        let more = outer.at([i as f32 + d[0], j as f32 + d[1], k as f32 + d[2]]);
-                        (ox[o], oy[o], oz[o]) = (d[0] + more[0], d[1] + more[1], d[2] + more[2]);
-                    }
-                }
-            },
-        );
-        out
-    }
-
     /// Displacement of the flow of this velocity at time one; the first of its steps, a straight one, is at most
     /// `first_step` voxels long.
     pub(super) fn exponential(&self, first_step: f32) -> Self {
         let halvings = (self.longest() / first_step).log2().ceil().clamp(0.0, 12.0) as i32;
-        let mut flow = self.clone().scaled(0.5f32.powi(halvings));
-        for _ in 0..halvings {
-            flow = flow.then(&flow);
+        if halvings == 0 {
+            return self.clone();
         }
-        flow
+        // The components side by side: each of the eight corners is then one read.
+        let scale = 0.5f32.powi(halvings);
+        let [x, y, z] = &self.components;
+        let mut flow: Vec<[f32; 4]> =
+            x.par_iter().zip(y).zip(z).map(|((x, y), z)| [x * scale, y * scale, z * scale, 0.0]).collect();
+        for _ in 0..halvings {
+            flow = twice(self.grid.dims, &flow);
+        }
+        let component = |a: usize| flow.par_iter().map(|d| d[a]).collect();
+        Self { grid: self.grid, components: [component(0), component(1), component(2)] }
     }
 
     /// The same field on another grid over the same place.
@@ -141,9 +134,38 @@ impl VectorField {
     }
 }
 
+/// The displacement of a flow followed by itself.
+fn twice(dims: [usize; 3], flow: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    let [nx, ny, _] = dims;
+    let mut out = vec![[0f32; 4]; flow.len()];
+    out.par_chunks_mut(nx * ny).enumerate().for_each(|(k, plane)| {
+        for (o, out) in plane.iter_mut().enumerate() {
+            let d = flow[o + nx * ny * k];
+            let (i, j) = (o % nx, o / nx);
+            let more = Cell::at(dims, [i as f32 + d[0], j as f32 + d[1], k as f32 + d[2]]).of_all(flow);
+            *out = std::array::from_fn(|a| d[a] + more[a]);
+        }
+    });
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// `x -> first(x) + outer(x + first(x))`: the displacement of first `first`, then `outer`.
+    fn then(first: &VectorField, outer: &VectorField) -> VectorField {
+        let mut out = VectorField::zeros(&first.grid);
+        for n in 0..first.grid.len() {
+            let d: [f32; 3] = std::array::from_fn(|a| first.components[a][n]);
+            let x = first.grid.voxel(n);
+            let cell = Cell::at(first.grid.dims, std::array::from_fn(|a| x[a] as f32 + d[a]));
+            for a in 0..3 {
+                out.components[a][n] = d[a] + cell.of(&outer.components[a]);
+            }
+        }
+        out
+    }
 
     /// A turn about the z axis that fades with the distance from the centre of the grid: 0.4 rad at the centre.
     fn angle(r2: f32) -> f32 {
@@ -181,7 +203,7 @@ mod tests {
     #[test]
     fn the_flow_of_the_negative_velocity_is_the_inverse() {
         let v = swirl();
-        let round = v.exponential(0.1).then(&v.clone().scaled(-1.0).exponential(0.1));
+        let round = then(&v.exponential(0.1), &v.clone().scaled(-1.0).exponential(0.1));
         assert!(v.longest() > 1.0 && round.longest() < 2.0 * INTERPOLATION_VOXELS, "{}", round.longest());
     }
 }

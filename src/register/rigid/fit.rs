@@ -10,7 +10,7 @@ use crate::register::head;
 use crate::register::mutual_information::{Bins, Interpolated, Pose};
 use crate::register::pyramid::{on_grid_of, reduced_to};
 use crate::register::sample::{Draw, draw};
-use crate::register::search::{Freedom, Level, Optimum, Reach, coarse, optimise, rank, turns_about_axes};
+use crate::register::search::{Freedom, Level, Measure, Optimum, Reach, coarse, optimise, rank, turns_about_axes};
 use nalgebra::Matrix3;
 
 /// An image and its foreground at one resolution.
@@ -68,6 +68,7 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
             seed: settings.seed + n as u64,
         };
         Level {
+            measure: Measure::Information,
             samples: draw(&s.image, &sampled_head, &request),
             other: Interpolated {
                 image: &o.coefficients,
@@ -90,6 +91,8 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
     let reach = Reach {
         turns: turns.clone(),
         shifts_mm: [vec![-20.0, 0.0, 20.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
+        scales: vec![1.0],
+        freedom: Freedom::Rigid,
     };
     let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], &reach, 4);
     if starts.is_empty() || ordinary <= 0.0 {
@@ -107,7 +110,7 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
         mirror[(0, 0)] = -1.0;
         let mirrored = Pose { linear: pose.linear * mirror, ..pose };
         let shifts_mm = [vec![-10.0, 0.0, 10.0], vec![0.0], vec![0.0]];
-        let narrow = Reach { turns: turns.clone(), shifts_mm };
+        let narrow = Reach { turns: turns.clone(), shifts_mm, ..reach };
         let (starts, _) = coarse(&start_level, &[mirrored], &narrow, 2);
         let best = rank(&first, refine_all(&first, &starts)).first().map_or(0.0, |r| r.0);
         best / rank(&first, vec![pose])[0].0.max(1e-12)

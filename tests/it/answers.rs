@@ -1,0 +1,53 @@
+//! Pairs that no operation can be followed in: the scans' answer in exit code, JSON, outcome, page and picture.
+
+use crate::job::{CHEAP, output, sample};
+use crate::made::synthetic_patient;
+use hgm::image::Volume;
+use hgm::image::nifti::{ReadOptions, decode, encode_f32};
+use std::path::Path;
+
+/// A head again from another receive coil: another gain, bias and noise, nothing taken out.
+fn again(scan: &Path, copy: &Path) {
+    let bytes = std::fs::read(scan).unwrap();
+    let before = decode(&bytes, "scan", &ReadOptions::default()).unwrap().volume;
+    let grid = before.grid;
+    let after = Volume::from_fn(grid, |n| {
+        let [i, _, k] = grid.voxel(n).map(|v| v as f32);
+        let noise = ((n as u32).wrapping_mul(2_654_435_761) >> 16) as f32 / 65_536.0 - 0.5;
+        (1.7 * before.data[n] * (1.0 + 0.004 * i - 0.003 * k) + 12.0 * noise).max(0.0)
+    });
+    std::fs::write(copy, encode_f32(&after)).unwrap();
+}
+
+fn answered(pre: &Path, post: &Path, answer: &str, sentence: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let [pre, post, out] = [pre, post, &case].map(|path| path.to_str().unwrap());
+    let ended = output(&[&["run", "--json", pre, post, "-o", out], &CHEAP[..]].concat());
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(4), "{said}");
+    assert!(said.contains("refused.png") && said.contains("--cavity-mask"), "{said}");
+    let printed: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(printed["error"]["answer"], answer);
+    let text = |name: &str| std::fs::read_to_string(case.join(name)).unwrap();
+    let outcome: serde_json::Value = serde_json::from_str(&text("sim/outcome.json")).unwrap();
+    assert_eq!((&outcome["answer"], outcome["samples"].as_array().map(Vec::len)), (&answer.into(), Some(0)));
+    assert!(text("report.html").contains(sentence), "the page says it");
+    assert!(std::fs::read(case.join("refused.png")).unwrap().starts_with(b"\x89PNG"));
+    assert!(!case.join("mesh/rest.vtu").exists());
+}
+
+#[test]
+fn slow_one_head_twice_is_no_operation_and_claims_no_stiffness() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("again.nii.gz");
+    let [pre, _] = synthetic_patient();
+    again(&pre, &copy);
+    answered(&pre, &copy, "no-operation", "No operation is seen");
+}
+
+#[test]
+fn slow_two_heads_are_not_one_person() {
+    let [pre, _] = synthetic_patient();
+    answered(&pre, &sample("post.nii.gz"), "not-one-person", "do not show one person");
+}
