@@ -22,9 +22,9 @@ observed = \"surfaces\"
 iterations = 2
 ";
 
-/// Settings that are changed under way.
+/// Settings that are changed under way. Both name the same keys: what a file leaves out is the case's own, by design.
 const SETTINGS: [&str; 2] = [
-    "[resection]\nsd_levels = [0.0]\n[prior]\nstudy = \"hyperelastic\"\n",
+    "[resection]\nsd_levels = [0.0]\ndensity_kg_per_m3 = 100.0\n[prior]\nstudy = \"hyperelastic\"\n",
     "[resection]\nsd_levels = [-1.0, 1.0]\ndensity_kg_per_m3 = 60.0\n[prior]\nstudy = \"linear\"\n",
 ];
 
