@@ -3,7 +3,7 @@
 use super::bfgs::Stopping;
 use super::mutual_information::Pose;
 use super::search::{Freedom, TETHER, optimise};
-use super::whole_head::{MeanHead, Subject, level, likelier, search_level};
+use super::whole_head::{MeanHead, Subject, level, likelier};
 use crate::geometry::{AffineTransform, Frame, Native};
 use crate::image::{Mask, Volume};
 use nalgebra::Matrix3;
@@ -11,8 +11,7 @@ use nalgebra::Matrix3;
 /// The affine map from the mean head to a head that lies rigidly aligned with it.
 ///
 /// Mutual information over the head with its skull (without, where the scan has none) at 4 and 2 mm, from the identity,
-/// with a Gaussian prior of stretches and shears; then the local agreement of the brain alone, for its own size. Points
-/// outside `known` are left out.
+/// with a Gaussian prior of stretches and shears. Points outside `known` are left out.
 #[must_use]
 pub fn subject_from_mean_head<F: Frame>(
     subject: &Volume<f32, F>,
@@ -32,10 +31,5 @@ pub fn subject_from_mean_head<F: Frame>(
         };
         pose = optimise(&level, &pose, Freedom::Affine(TETHER), None, stopping).pose;
     }
-    // A head's size says little of its brain's: skulls differ in thickness.
-    let brain = head.brain_alone();
-    let level = search_level(&brain, &subject, 1, 30_000);
-    let stopping = Stopping { longest_step_mm: 2.0, shortest_step_mm: 0.08, evaluations: 40 };
-    pose = optimise(&level, &pose, Freedom::Affine(TETHER), None, stopping).pose;
     AffineTransform::from_parts(pose.linear, pose.target - pose.linear * pose.centre)
 }

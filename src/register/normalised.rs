@@ -42,6 +42,9 @@ pub(super) fn normalised(
     })
 }
 
+/// Value and gradient of the other image at a sample, where it is known.
+type Seen = Option<(f64, [f32; 3])>;
+
 /// Sums over the samples that are known.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -67,28 +70,28 @@ pub(super) fn agreement(
     let linear = voxel_linear * pose.linear;
     let origin = voxel_linear * pose.target + to_voxel.fixed_view::<3, 1>(0, 3);
     let value_of = |bin: u8| f64::from(range[0] + (f32::from(bin) + 0.5) * (range[1] - range[0]) / bins as f32);
-    // Value and gradient at a sample: `None` outside the other image, `Some(None)` outside its mask.
-    let look = |n: usize| -> Option<Option<(f64, [f32; 3])>> {
+    // What is seen at a sample, and whether it lies in the other image's field of view.
+    let look = |n: usize| -> (Seen, bool) {
         let x = samples.offsets_mm[n];
         let v = linear * Vector3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2])) + origin;
         let inside =
             |m: &Mask<Native>| m.get(v.x.round() as isize, v.y.round() as isize, v.z.round() as isize).unwrap_or(false);
         if other.mask.is_some_and(|m| !inside(m)) {
-            return Some(None);
+            return (None, true);
         }
-        bspline::value_and_gradient(other.image, [v.x, v.y, v.z]).map(|(f, g)| Some((f64::from(f), g)))
+        let found = bspline::value_and_gradient(other.image, [v.x, v.y, v.z]).map(|(f, g)| (f64::from(f), g));
+        (found, found.is_some())
     };
     let chunks = samples.len().div_ceil(CHUNK);
     let range_of = |c: usize| c * CHUNK..((c + 1) * CHUNK).min(samples.len());
-    let parts: Vec<(Vec<Option<(f64, [f32; 3])>>, Sums)> = (0..chunks)
+    let parts: Vec<(Vec<Seen>, Sums)> = (0..chunks)
         .into_par_iter()
         .map(|c| {
             let mut sums = Sums::default();
             let mut seen = Vec::with_capacity(if with_gradient { CHUNK } else { 0 });
             for n in range_of(c) {
-                let found = look(n);
-                sums.unknown += f64::from(u8::from(found.is_none()));
-                let found = found.flatten();
+                let (found, in_view) = look(n);
+                sums.unknown += f64::from(u8::from(!in_view));
                 if let Some((b, _)) = found {
                     let a = value_of(samples.bins[n]);
                     sums.known += 1.0;

@@ -26,8 +26,6 @@ const LEVELS_MM: [f64; 3] = [8.0, 4.0, 2.0];
 /// The head is compared over its brain widened by this much: scalp and skull, not the face (cut off in shared scans), not
 /// the neck (which bends).
 const AROUND_MM: f64 = 20.0;
-/// A brain is compared over itself and this much: the dark gap to marrow and scalp.
-const EDGE_MM: f64 = 5.0;
 const BINS: usize = 40;
 /// The neighbourhood that a voxel is compared with, in voxels of its level (standard deviation).
 const WINDOW_VOXELS: f64 = 1.5;
@@ -72,25 +70,20 @@ impl<F: Frame> MeanHead<'_, F> {
     }
 
     pub(super) fn prepared(&self) -> Prepared {
-        self.prepared_as(without_gain(&self.t1.clone().relabelled()), AROUND_MM)
+        self.prepared_as(&without_gain(&self.t1.clone().relabelled()))
     }
 
     /// As scans are shared whose scalp and skull have been taken away.
     pub(super) fn stripped(&self) -> Prepared {
-        self.prepared_as(self.bare.clone().relabelled(), AROUND_MM)
+        self.prepared_as(&self.bare.clone().relabelled())
     }
 
-    /// The brain alone, for its own size: beyond its edge nothing is compared.
-    pub(super) fn brain_alone(&self) -> Prepared {
-        self.prepared_as(self.bare.clone().relabelled(), EDGE_MM)
-    }
-
-    fn prepared_as(&self, t1: Volume<f32, Native>, around_mm: f64) -> Prepared {
+    fn prepared_as(&self, t1: &Volume<f32, Native>) -> Prepared {
         let brain: Mask<Native> = self.brain.clone().relabelled();
-        let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(&t1, mm)).collect();
+        let levels: Vec<_> = LEVELS_MM.iter().map(|&mm| reduced_to(t1, mm)).collect();
         let near_brain = on_grid_of(&morphology::dilate(&brain, 6.0), &levels[1]);
         let centre_mm = head::centre_mm(&brain);
-        let region = morphology::dilate(&brain, around_mm);
+        let region = morphology::dilate(&brain, AROUND_MM);
         let normalised = (0..SEARCHED).map(|n| over_neighbourhood(&levels[n], &region, None, n)).collect();
         Prepared { region, levels, normalised, near_brain, centre_mm }
     }
@@ -168,7 +161,7 @@ pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: u
 }
 
 /// One resolution of the search for poses.
-pub(super) fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
+fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
     let range = [-LARGEST, LARGEST];
     let request =
         Draw { most, other_spacing_mm: LEVELS_MM[n], bins: BINS, range, centre_mm: head.centre_mm, seed: 1 + n as u64 };

@@ -39,20 +39,18 @@ pub fn bars() -> Vec<Bar> {
             let mishap = Mishap::drawn(&t1, seed);
             let file = folder.path().join("hurt.nii.gz");
             std::fs::write(&file, encode_f32(&mishap.scan)).unwrap();
-            let said = match segmented(&file, &folder.path().join("hurt_dseg.nii.gz")).labels {
-                None => {
-                    refused += 1;
-                    "refused".to_owned()
+            let found = segmented(&file, &folder.path().join("hurt_dseg.nii.gz"));
+            let said = if let Some(labels) = found.labels {
+                let dice = mishap.agreement(&labels, &unhurt);
+                if dice >= RIGHT {
+                    right += 1;
+                } else {
+                    wrong.push(format!("{head} {seed}: {dice:.3}"));
                 }
-                Some(labels) => {
-                    let dice = mishap.agreement(&labels, &unhurt);
-                    if dice >= RIGHT {
-                        right += 1;
-                    } else {
-                        wrong.push(format!("{head} {seed}: {dice:.3}"));
-                    }
-                    format!("{dice:.3}")
-                }
+                format!("{dice:.3}")
+            } else {
+                refused += 1;
+                "refused".to_owned()
             };
             println!("{head} {seed:<3} {said:<8} {}", mishap.words);
         }
