@@ -35,6 +35,7 @@
 //! - [`segment`], [`resect`]: tissue labels of a T1, the cavity and what filled it.
 //! - [`mesh`], [`tag`]: a label map to tetrahedra with boundary sets; formats and quality.
 //! - [`material`]: hyperelastic laws, 73 literature models and the Gaussian process over them.
+//! - [`overlay`]: what other tools draw on a scan: points, streamlines, surfaces.
 //! - [`fem`]: [`fem::simulate`] deforms a mesh by a [`fem::Scenario`].
 //! - [`experiment`]: samples against a target, the estimate with its intervals.
 //!
@@ -68,6 +69,7 @@ pub mod image;
 pub mod layout;
 pub mod material;
 pub mod mesh;
+pub mod overlay;
 pub mod register;
 pub mod report;
 pub mod resect;

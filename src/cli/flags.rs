@@ -6,6 +6,7 @@ use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
 use crate::segment::label;
 use crate::workflow::{Goal, Inputs};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
 /// The settings that were given as options: the last layer.
@@ -36,6 +37,11 @@ impl Flags {
     pub fn list(&mut self, path: &str, values: &[impl Serialize]) {
         self.set(path, (!values.is_empty()).then_some(values));
     }
+}
+
+/// A word that stands for a value of a type, by the names that the settings file has for them.
+pub fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    serde_json::from_value(text.into()).map_err(|e| e.to_string())
 }
 
 /// Engine and size of a mesh.

@@ -10,6 +10,7 @@ mod completions;
 mod demo;
 mod doctor;
 mod estimate;
+mod evaluate;
 mod failure;
 mod flags;
 mod gp;
@@ -31,6 +32,7 @@ mod session;
 mod simulate;
 mod sweep;
 mod synth;
+mod warp;
 mod why;
 
 pub use failure::{Failure, Reject};
@@ -58,6 +60,8 @@ enum Command {
     Sweep(sweep::Args),
     Reduce(reduce::Args),
     Estimate(estimate::Args),
+    Warp(warp::Args),
+    Evaluate(evaluate::Args),
     Compare(compare::Args),
     Simulate(simulate::Args),
     Synth(synth::Args),
@@ -88,6 +92,8 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args, &session),
         Command::Reduce(args) => reduce::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),
+        Command::Warp(args) => warp::run(&args, &session),
+        Command::Evaluate(args) => evaluate::run(&args, &session),
         Command::Compare(args) => compare::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),

@@ -4,12 +4,12 @@ use super::flags::Flags;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
 use crate::geometry::{Frame, Native, RigidTransform};
+use crate::image::Volume;
 use crate::image::nifti::{self, NiftiImage};
-use crate::image::{Mask, Volume};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
 use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid};
 use crate::segment::pose_of_head;
-use crate::workflow::{Settings, read_input};
+use crate::workflow::{Settings, read_input, read_mask_of};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -60,7 +60,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let mut warnings = Vec::new();
     let (moving, moving_bytes) = image(&args.moving, &whole, &mut warnings)?;
-    let moving_mask = args.moving_mask.as_deref().map(|path| mask(path, &moving, &whole, &mut warnings)).transpose()?;
+    let moving_mask = args.moving_mask.as_deref();
+    let moving_mask =
+        moving_mask.map(|path| read_mask_of(path, &moving.grid, &whole.image, &mut warnings)).transpose()?;
     let names = || format!("{} onto {}", args.moving.display(), args.fixed.display());
 
     let to_template = args.fixed.as_os_str().eq_ignore_ascii_case("mni") && !args.fixed.exists();
@@ -76,8 +78,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         if fixed_bytes == moving_bytes {
             warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
         }
+        let fixed_mask = args.fixed_mask.as_deref();
         let fixed_mask =
-            args.fixed_mask.as_deref().map(|path| mask(path, &fixed, &whole, &mut warnings)).transpose()?;
+            fixed_mask.map(|path| read_mask_of(path, &fixed.grid, &whole.image, &mut warnings)).transpose()?;
         let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
         parts(register_rigid(&moving, &fixed, masks, settings).with_context(names).reject()?)
     };
@@ -112,25 +115,4 @@ fn image(
     let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &settings.image).reject()?;
     warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
     Ok((volume, bytes))
-}
-
-fn mask(
-    path: &Path,
-    image: &Volume<f32, Native>,
-    settings: &Settings,
-    warnings: &mut Vec<String>,
-) -> Result<Mask<Native>, Failure> {
-    let bytes = read_input(path)?;
-    let name = path.display().to_string();
-    let (mask, odd) = nifti::decode_mask(&bytes, &name, &settings.image).reject()?;
-    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
-    if !mask.grid.coincides(&image.grid, 1e-2) {
-        let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
-        return Err(Failure::Rejected(anyhow!(
-            "{name}: the mask's grid ({} voxels) is not its image's ({}) or lies elsewhere; resample it onto the image",
-            dims(mask.grid.dims),
-            dims(image.grid.dims)
-        )));
-    }
-    Ok(mask)
 }

@@ -2,6 +2,7 @@
 
 use super::{Failure, Session};
 use crate::experiment::compare::Comparison;
+use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::material::meta_model::MetaModel;
 use crate::report::cohort::Cohort;
@@ -27,6 +28,7 @@ fn schema() -> serde_json::Result<Value> {
     let mut generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
     generator.subschema_for::<ExperimentOutcome>();
     generator.subschema_for::<Cohort>();
+    generator.subschema_for::<Evaluation>();
     generator.subschema_for::<Comparison>();
     let mut schema: Value = serde_json::from_str(&with_names(COMMANDS))?;
     for (name, mut definition) in generator.take_definitions(true) {

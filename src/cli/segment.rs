@@ -3,14 +3,12 @@
 use super::flags::Flags;
 use super::{Failure, Reject, Session};
 use crate::artefact::write_whole;
-use crate::geometry::Native;
 use crate::image::nifti::{self, encode_mask, encode_u8};
-use crate::image::{Mask, Volume};
 use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
-use crate::workflow::{Settings, read_input};
+use crate::workflow::{read_input, read_mask_of};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A T1 to labels in its own grid: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle
 ///
@@ -55,7 +53,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let name = args.t1.display().to_string();
     let read = nifti::decode(&read_input(&args.t1)?, &name, &settings.image).reject()?;
     let t1 = read.volume;
-    let brain = args.brain_mask.as_deref().map(|path| brain_mask(path, &t1, &settings)).transpose()?;
+    let mut warnings = read.warnings;
+    let mut mask_of = |path: &PathBuf| read_mask_of(path, &t1.grid, &settings.image, &mut warnings);
+    let brain = args.brain_mask.as_ref().map(&mut mask_of).transpose()?;
 
     let bar = session.progress(2, "segment");
     bar.set_message("to MNI");
@@ -77,10 +77,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(path) = &args.write_brain_mask {
         write_whole(path, &mask)?;
     }
-    let warnings: Vec<String> = (read.warnings.iter().map(ToString::to_string))
-        .chain(fit.warnings.iter().map(ToString::to_string))
-        .chain(found.warnings.iter().map(ToString::to_string))
-        .collect();
+    warnings.extend(fit.warnings.iter().map(ToString::to_string));
+    warnings.extend(found.warnings.iter().map(ToString::to_string));
     for warning in &warnings {
         tracing::warn!("{warning}");
     }
@@ -96,21 +94,4 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     );
     let labels = args.output.clone();
     session.emit(&Summary { labels, volumes: v, tissue_means: found.tissue_means, warnings }, &text)
-}
-
-fn brain_mask(path: &Path, t1: &Volume<f32, Native>, settings: &Settings) -> Result<Mask<Native>, Failure> {
-    let name = path.display().to_string();
-    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, &settings.image).reject()?;
-    if !mask.grid.coincides(&t1.grid, 0.1) {
-        let dims = |d: [usize; 3]| format!("{} x {} x {}", d[0], d[1], d[2]);
-        return Err(Failure::Rejected(anyhow!(
-            "{name}: the mask's grid ({} voxels) is not the scan's ({}) or lies elsewhere; resample it onto the scan",
-            dims(mask.grid.dims),
-            dims(t1.grid.dims)
-        )));
-    }
-    for warning in odd {
-        tracing::warn!("{name}: {warning}");
-    }
-    Ok(mask)
 }

@@ -1,7 +1,7 @@
 //! What every subcommand shares: global options, settings from a file, output, progress, input files.
 
 use super::failure::Failure;
-use super::flags::Flags;
+use super::flags::{Flags, word};
 use super::listener::{Listener, bar};
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
@@ -42,7 +42,7 @@ pub struct GlobalOptions {
     #[arg(long, global = true, value_name = "N")]
     pub volume: Option<usize>,
     /// Which affine to believe where a NIfTI file's two disagree: sform or qform [default: such a file is refused]
-    #[arg(long, global = true, value_name = "FORM", value_parser = orientation)]
+    #[arg(long, global = true, value_name = "FORM", value_parser = word::<Orientation>)]
     pub prefer: Option<Orientation>,
     /// Compute again what is already there
     #[arg(long, global = true)]
@@ -53,10 +53,6 @@ pub struct GlobalOptions {
     /// Only errors
     #[arg(short, long, global = true)]
     pub quiet: bool,
-}
-
-fn orientation(name: &str) -> Result<Orientation, String> {
-    serde_json::from_value(name.into()).map_err(|_| format!("`{name}` is neither sform nor qform"))
 }
 
 /// The global options, resolved: thread pool built, settings file parsed, logging on.

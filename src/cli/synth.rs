@@ -1,6 +1,6 @@
 //! `hgm synth -o DIR`: a synthetic patient.
 
-use super::flags::Flags;
+use super::flags::{Flags, word};
 use super::{Failure, Session};
 use crate::experiment::synth::{Contrast, Lobe, SagKind};
 use crate::segment::atlas::Side;
@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long, value_parser = lobe, value_name = "temporal|frontal|parietal|occipital|insular")]
     pub lobe: Option<Lobe>,
     /// Operated side [default: left]
-    #[arg(long, value_parser = side, value_name = "left|right")]
+    #[arg(long, value_parser = word::<Side>, value_name = "left|right")]
     pub side: Option<Side>,
     /// Volume to resect [default: 35]
     #[arg(long, value_name = "CC")]
@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, value_name = "DEG")]
     pub oblique_deg: Option<f64>,
     /// How the brain sags: none, smooth (analytic) or fem (finite elements) [default: smooth]
-    #[arg(long, value_parser = sag, value_name = "none|smooth|fem")]
+    #[arg(long, value_parser = word::<SagKind>, value_name = "none|smooth|fem")]
     pub sag: Option<SagKind>,
     /// Blood in the cavity
     #[arg(long)]
@@ -56,39 +56,12 @@ pub struct Args {
     #[arg(long)]
     pub air: bool,
     /// Scans taken after gadolinium [default: none]
-    #[arg(long, value_parser = contrast, value_name = "none|pre|post|both")]
+    #[arg(long, value_parser = word::<Contrast>, value_name = "none|pre|post|both")]
     pub contrast: Option<Contrast>,
-}
-
-fn side(text: &str) -> Result<Side, String> {
-    match text {
-        "left" => Ok(Side::Left),
-        "right" => Ok(Side::Right),
-        _ => Err("say left or right".to_owned()),
-    }
 }
 
 fn lobe(text: &str) -> Result<Lobe, String> {
     Lobe::of_name(text).ok_or_else(|| "say temporal, frontal, parietal, occipital or insular".to_owned())
-}
-
-fn sag(text: &str) -> Result<SagKind, String> {
-    match text {
-        "none" => Ok(SagKind::None),
-        "smooth" => Ok(SagKind::Smooth),
-        "fem" => Ok(SagKind::Fem),
-        _ => Err("say none, smooth or fem".to_owned()),
-    }
-}
-
-fn contrast(text: &str) -> Result<Contrast, String> {
-    match text {
-        "none" => Ok(Contrast::None),
-        "pre" => Ok(Contrast::Pre),
-        "post" => Ok(Contrast::Post),
-        "both" => Ok(Contrast::Both),
-        _ => Err("say none, pre, post or both".to_owned()),
-    }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {

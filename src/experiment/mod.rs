@@ -2,6 +2,8 @@
 
 pub mod compare;
 pub mod estimate;
+pub mod field;
+pub mod landmarks;
 mod law_outcome;
 pub mod nodal_field;
 pub mod observed;

@@ -40,4 +40,10 @@ impl BidsName {
     pub fn spelt(&self) -> String {
         self.name.replace("-T_", &format!("-{TEMPLATE}_"))
     }
+
+    /// The same of one member of a family; BIDS takes letters and digits alone.
+    pub fn spelt_of(&self, member: &str) -> String {
+        let plain: String = member.chars().filter(char::is_ascii_alphanumeric).collect();
+        self.spelt().replace("{state}", &plain)
+    }
 }

@@ -51,6 +51,8 @@ pub enum Maker {
     Sample,
     /// The most probable moduli.
     Estimate,
+    /// Displacement fields, and what they carry.
+    Fields,
     /// Models beside each other.
     Compare,
     /// The numbers gathered, with the settings and the provenance.

@@ -78,6 +78,31 @@ pub const BEST_SURFACE: Family = Family("sim/best_{set}.surf.gii");
 /// Its error in mm.
 pub const BEST_ERRORS: Family = Family("sim/best_{set}.shape.gii");
 
+/// Brain shift alone, in the pre-operative scan's frame: where its points go.
+pub const SHIFT: Family = Family("xfm/from-pre_to-deformed_desc-{state}_displacement.nii.gz");
+/// The same back.
+pub const SHIFT_BACK: Family = Family("xfm/from-deformed_to-pre_desc-{state}_displacement.nii.gz");
+/// Brain shift with the rigid part: from the pre-operative scanner's frame to the post-operative one's.
+pub const POST_FROM_PRE_FIELD: Family = Family("xfm/from-pre_to-post_desc-{state}_displacement.nii.gz");
+/// The same back.
+pub const PRE_FROM_POST_FIELD: Family = Family("xfm/from-post_to-pre_desc-{state}_displacement.nii.gz");
+/// Standard deviation of the brain shift, mm.
+pub const SHIFT_SD: Family = Family("xfm/from-pre_to-deformed_desc-{state}_sd.nii.gz");
+/// Its 95 % reach, mm.
+pub const SHIFT_REACH: Family = Family("xfm/from-pre_to-deformed_desc-{state}_reach95.nii.gz");
+/// Where it is believed.
+pub const SHIFT_MASK: Family = Family("xfm/from-pre_to-deformed_desc-{state}_mask.nii.gz");
+/// The numbers of the fields.
+pub const SHIFT_JSON: &str = "sim/brain_shift.json";
+/// Landmarks against the fields.
+pub const LANDMARKS_JSON: &str = "sim/landmarks.json";
+/// The pre-operative scan as it was given, header blanked.
+pub const PRE_NATIVE_T1: &str = "anat/pre_space-native_T1w.nii.gz";
+/// The pre-operative scan carried to the deformed state.
+pub const WARPED_T1: &str = "anat/pre_space-native_desc-warped_T1w.nii.gz";
+/// Its labels carried along.
+pub const WARPED_LABELS: &str = "anat/pre_space-native_desc-warped_dseg.nii.gz";
+
 /// Every setting that was used, by room.
 pub const SETTINGS: &str = "settings.toml";
 /// Program, stages, checksums of inputs and outputs.
@@ -109,6 +134,14 @@ const fn transform(
     Entry { path, what, space: Space::Transform, maker: Maker::Registration, bids }
 }
 
+const fn field(
+    (path, what, space): (&'static str, &'static str, Space),
+    (of, name, description): (Scan, &'static str, &'static str),
+    mask: Option<&'static str>,
+) -> Entry {
+    Entry { path, what, space, maker: Maker::Fields, bids: Some(BidsName { of, name, description, mask }) }
+}
+
 const BRAIN: Option<&str> = Some("Brain");
 const ROI: Option<&str> = Some("ROI");
 const ON_TEMPLATE: &str = "The scan on the template's grid, moved rigidly";
@@ -134,6 +167,7 @@ pub const TABLE: &[Entry] = &[
     ),
     image((PRE_T1, "pre-operative scan", Space::Mni), (Scan::Pre, "space-T_T1w.nii.gz", ON_TEMPLATE), None),
     image((POST_T1, "post-operative scan", Space::Mni), (Scan::Post, "space-T_T1w.nii.gz", ON_TEMPLATE), None),
+    file(PRE_NATIVE_T1, "pre-operative scan, header blanked", Space::Pre, Maker::Anat),
     image((PRE_LABELS, "tissue labels", Space::Mni), (Scan::Pre, "space-T_dseg.nii.gz", "Tissue labels"), None),
     image((PRE_NATIVE_LABELS, "tissue labels", Space::Pre), (Scan::Pre, "dseg.nii.gz", "Tissue labels"), None),
     image(
@@ -191,6 +225,54 @@ pub const TABLE: &[Entry] = &[
     file(SAMPLE_STATE.0, "state of one sample", Space::Mni, Maker::Sample),
     file(ESTIMATE_STATE, "state that the estimate leads to", Space::Mni, Maker::Estimate),
     file(ESTIMATE_JSON, "the estimate's numbers", Space::None, Maker::Estimate),
+    field(
+        (SHIFT.0, "brain shift alone: moves points of the pre-operative scan, mm", Space::Transform),
+        (Scan::Pre, "from-T1w_to-deformed_desc-{state}_mode-points_xfm.nii.gz", "Brain shift, mm, moves points"),
+        None,
+    ),
+    field(
+        (SHIFT_BACK.0, "its inverse", Space::Transform),
+        (Scan::Pre, "from-deformed_to-T1w_desc-{state}_mode-points_xfm.nii.gz", "Brain shift undone, mm"),
+        None,
+    ),
+    field(
+        (
+            POST_FROM_PRE_FIELD.0,
+            "brain shift with the rigid part: pre-operative scanner to post-operative one",
+            Space::Transform,
+        ),
+        (Scan::Pre, "from-T1w_to-postop_desc-{state}_mode-points_xfm.nii.gz", "Rigid motion and brain shift, mm"),
+        None,
+    ),
+    field(
+        (PRE_FROM_POST_FIELD.0, "its inverse", Space::Transform),
+        (
+            Scan::Post,
+            "from-T1w_to-preop_desc-{state}_mode-points_xfm.nii.gz",
+            "Rigid motion and brain shift undone, mm",
+        ),
+        None,
+    ),
+    file(SHIFT_SD.0, "standard deviation of the brain shift, mm", Space::Pre, Maker::Fields),
+    file(SHIFT_REACH.0, "its 95 % reach, mm", Space::Pre, Maker::Fields),
+    file(SHIFT_MASK.0, "where it is believed", Space::Pre, Maker::Fields),
+    file(SHIFT_JSON, "the brain shift in numbers", Space::None, Maker::Fields),
+    file(
+        LANDMARKS_JSON,
+        "landmarks against rigid motion, images and model, of `hgm evaluate`",
+        Space::None,
+        Maker::Report,
+    ),
+    field(
+        (WARPED_T1, "pre-operative scan carried to the deformed state", Space::Pre),
+        (Scan::Pre, "desc-warped_T1w.nii.gz", "The scan carried by the brain shift"),
+        None,
+    ),
+    field(
+        (WARPED_LABELS, "its labels carried along", Space::Pre),
+        (Scan::Pre, "desc-warped_dseg.nii.gz", "Tissue labels carried by the brain shift"),
+        None,
+    ),
     file(COMPARISON, "models beside each other, by their evidence", Space::None, Maker::Compare),
     file(OUTCOME, "the experiment's numbers", Space::None, Maker::Outcome),
     file(SAMPLES_TABLE, "a line per sample", Space::None, Maker::Outcome),

@@ -5,16 +5,19 @@ use super::figure::CaseImages;
 use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
 use super::page::{CaptionedPicture, CasePage, ErrorMap, title_of};
+use super::shift_figure::{ShiftFigure, shift_figure};
 use super::viewer::{ViewedSurface, Viewer};
 use crate::artefact::{WriteError, write_whole};
+use crate::experiment::field::BrainShift;
 use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, NiftiError, ReadOptions};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::layout;
-use crate::mesh::format::{MeshWithFields, ReadError, WriteError as FieldError, gifti, vtu};
+use crate::mesh::format::{Field, MeshWithFields, ReadError, WriteError as FieldError, gifti, vtu};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::transform_text::{self, TransformTextError};
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -85,6 +88,11 @@ impl Case<'_> {
         String::from_utf8(bytes).map(Some).map_err(|_| ReportError::Text { file: file.to_owned() })
     }
 
+    /// Numbers of ours; `None` when they are not there or another version's.
+    fn numbers<T: DeserializeOwned>(&self, file: &str) -> Result<Option<T>, ReportError> {
+        Ok(self.text(file)?.and_then(|text| serde_json::from_str(&text).ok()))
+    }
+
     fn mesh(&self, file: &str) -> Result<Option<MeshWithFields>, ReportError> {
         Ok(self.bytes(file)?.map(|bytes| vtu::decode(&bytes, file)).transpose()?)
     }
@@ -107,6 +115,21 @@ impl Case<'_> {
         }
         Ok(surfaces)
     }
+}
+
+/// The brain shift of the model's state on a slice.
+fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftFigure>, ReportError> {
+    let Some(model) = shift.and_then(|shift| shift.model.as_deref()) else { return Ok(None) };
+    let file = layout::SAMPLE_STATE.of(model);
+    let (Some(state), Some(t1), Some(seen)) =
+        (case.mesh(&file)?, case.bytes(layout::PRE_T1)?, case.bytes(layout::SAG)?)
+    else {
+        return Ok(None);
+    };
+    let t1: Volume<f32, Mni> = nifti::decode(&t1, layout::PRE_T1, &ReadOptions::default())?.volume.relabelled();
+    let seen: Volume<[f32; 3], Mni> = nifti::decode_displacement(&seen, layout::SAG)?.relabelled();
+    let displacement = state.point_field("displacement").and_then(Field::vectors);
+    Ok(displacement.and_then(|u| shift_figure(&t1, &seen, &state.mesh, &u)))
 }
 
 /// The page of a case directory.
@@ -150,6 +173,9 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         Some(outcome) => add_results(&case, outcome, rest.as_ref(), &mut page)?,
         None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
     }
+    page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
+    page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
+    page.shift_figure = shift_of(&case, page.brain_shift.as_ref())?;
     page.outcome = outcome;
     Ok(page)
 }

@@ -3,7 +3,7 @@
 
 use super::hand_off::CaseFile;
 use crate::artefact::Manifest;
-use crate::layout::{self, BidsName, Scan, TEMPLATE};
+use crate::layout::{self, BidsName, Family, Maker, Scan, TEMPLATE};
 use crate::segment::label;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -76,11 +76,28 @@ pub fn subject_files(case: &Path, pre: &RawScan, post: &RawScan) -> Result<Vec<C
         } else {
             sidecar_of_image(&bids, scan, &both)
         };
-        add(scan, &bids.spelt(), read(file.path.to_owned())?, &made_by(own));
+        let family = Family(file.path);
+        if file.path.contains('{') {
+            for (member, path) in members(case, family) {
+                add(scan, &bids.spelt_of(&member), read(path)?, &made_by(own.clone()));
+            }
+        // What only a simulated case has.
+        } else if file.maker != Maker::Fields || case.join(file.path).exists() {
+            add(scan, &bids.spelt(), read(file.path.to_owned())?, &made_by(own));
+        }
     }
     let subject = pre.0.split('/').next().unwrap_or_default();
     files.push((format!("{subject}.html"), read(layout::PAGE.to_owned())?));
     Ok(files)
+}
+
+/// The files of a family that are there, by member, in order.
+fn members(case: &Path, family: Family) -> Vec<(String, String)> {
+    let entries = std::fs::read_dir(case.join(family.folder())).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| format!("{}/{}", family.folder(), entry.file_name().to_string_lossy()));
+    let mut found: Vec<_> = paths.filter_map(|path| Some((family.member(&path)?.to_owned(), path))).collect();
+    found.sort();
+    found
 }
 
 /// What a sidecar says of its image alone.

@@ -2,10 +2,41 @@
 
 use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
 use crate::experiment::resection::improvement;
 use crate::material::law::StabilityRange;
 use crate::material::meta_model::Fit;
+use std::path::Path;
+
+/// What was carried; `points`: all, in removed tissue, beyond the field.
+pub fn warped(output: &Path, kind: &str, state: &str, points: Option<[usize; 3]>) -> String {
+    let text = format!("{}: {kind}, carried by {state}", output.display());
+    let Some([all, removed, outside]) = points else { return text };
+    let rigidly = |count: usize, place: &str| match count {
+        0 => String::new(),
+        n => format!("; {n} of them {place}: moved rigidly alone"),
+    };
+    text + &format!(", {all} points{}{}", rigidly(removed, "in removed tissue"), rigidly(outside, "beyond the field"))
+}
+
+/// A row for each way of carrying landmarks, then one for each landmark.
+pub fn landmark_table(found: &Evaluation) -> String {
+    let mut text = String::from("carried by     landmarks  mean (mm)  median  95 %   inside 95 % ellipsoid\n");
+    for s in &found.summary {
+        let inside = s.inside_95_share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        text += &format!(
+            "{:<14} {:>9}  {:>9.2}  {:>6.2}  {:>5.2}  {inside}\n",
+            s.state, s.landmarks, s.mean_mm, s.median_mm, s.percentile_95_mm
+        );
+    }
+    text += "\nlandmark       place      error (mm) of each, in that order\n";
+    for l in &found.landmarks {
+        let errors: Vec<String> = l.error_mm.iter().map(|e| format!("{e:>7.2}")).collect();
+        text += &format!("{:<14} {:<9} {}\n", l.name, l.place, errors.join(" "));
+    }
+    text
+}
 
 /// Best sample, errors and verdicts.
 pub fn summary(outcome: &ExperimentOutcome) -> String {

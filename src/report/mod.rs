@@ -19,5 +19,6 @@ pub mod page;
 pub mod picture;
 pub mod refusal;
 pub mod render;
+pub mod shift_figure;
 pub mod slice;
 pub mod viewer;

@@ -53,6 +53,28 @@ pub fn read_input(path: &Path) -> Result<Vec<u8>, InputError> {
     std::fs::read(path).map_err(|source| InputError::Unreadable { path: path.to_path_buf(), source })
 }
 
+/// A mask on the grid of an image; what is odd about it is added to the warnings.
+///
+/// # Errors
+/// A file that is no mask, or one on another grid.
+pub fn read_mask_of(
+    path: &Path,
+    grid: &Grid<Native>,
+    options: &ReadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Mask<Native>, WorkflowError> {
+    // What two programs may disagree about an origin.
+    const TOLERANCE_MM: f64 = 0.1;
+    let name = path.display().to_string();
+    let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, options)?;
+    if !mask.grid.coincides(grid, TOLERANCE_MM) {
+        let (path, found, image) = (path.to_path_buf(), mask.grid.dims, grid.dims);
+        return Err(InputError::ImageGrid { path, found, image }.into());
+    }
+    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    Ok(mask)
+}
+
 /// A text file the user named.
 ///
 /// # Errors

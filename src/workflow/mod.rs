@@ -23,12 +23,14 @@
 mod case;
 mod error;
 mod estimate_options;
+mod evaluate;
 mod facts;
 mod fresh;
 mod generative;
 mod inputs;
 mod labels;
 mod lock;
+mod maps;
 mod meshing;
 mod outcome;
 mod patient;
@@ -42,6 +44,7 @@ mod simulation;
 mod stage_name;
 mod stages;
 mod synthetic;
+mod warp;
 mod why;
 mod work;
 
@@ -49,13 +52,16 @@ pub mod cohort;
 
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, InputError, LabelMapError, MaskRole, MeshFileError, SimulationError, WorkflowError,
+    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, SimulationError,
+    WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
+pub use evaluate::{Landmarks, evaluate_landmarks};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
-pub use inputs::{Inputs, ScanSums, read_input, read_text, shown};
+pub use inputs::{Inputs, ScanSums, read_input, read_mask_of, read_text, shown};
 pub use labels::{any_labels, labels_of_tool};
+pub use maps::WarpTo;
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
@@ -66,6 +72,7 @@ pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
 pub use synthetic::{SyntheticFiles, synthetic_patient};
+pub use warp::{PointCounts, Through, Warp, Warped, warp};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 

@@ -8,7 +8,7 @@ use super::plan;
 use super::refusal;
 use super::stage_name::StageName;
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, EstimateInput, FieldsInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
@@ -313,7 +313,14 @@ impl<'w, 'a> Patient<'w, 'a> {
         if let Some(facts) = stages::present_estimate(work, &mut made, &self.asked(&tissues))? {
             with_estimate(&mut outcome, &facts);
         }
-        let own = made.get(&StageName::Estimate);
+        let best = outcome
+            .best_sample
+            .as_ref()
+            .filter(|best| outcome.samples.iter().any(|s| s.id == **best && s.file.is_some()));
+        let model = if outcome.estimate.is_some() { Some("estimate".to_owned()) } else { best.cloned() };
+        stages::fields(work, &mut made, &FieldsInput { model, samples: &manifests })?;
+        let own = [StageName::Estimate, StageName::Fields];
+        let own = own.iter().filter_map(|stage| made.get(stage));
         let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&manifests).chain(own).collect();
         finish(work, &outcome, &all)
     }

@@ -49,6 +49,9 @@ pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Ste
         Goal::Estimate => stages.push(StageName::Estimate),
         Goal::Images | Goal::Mesh => {}
     }
+    if subject == Subject::Patient && matches!(goal, Goal::Sweep | Goal::Estimate) {
+        stages.push(StageName::Fields);
+    }
     Ok(stages.into_iter().map(|stage| Step { after: stage.after(subject), stage }).collect())
 }
 

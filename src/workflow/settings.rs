@@ -2,6 +2,7 @@
 //! a settings file, over that the command line.
 
 use super::estimate_options::EstimateOptions;
+use crate::experiment::field::FieldSettings;
 use crate::experiment::phantom::PhantomSettings;
 use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;
@@ -32,6 +33,8 @@ pub struct Settings {
     pub deformable: DeformableSettings,
     /// The most probable moduli.
     pub estimate: EstimateOptions,
+    /// Displacement fields.
+    pub fields: FieldSettings,
     /// Hyperparameters of the generative model.
     pub gp: FitSettings,
     /// How files that leave a choice open are read.
@@ -94,10 +97,11 @@ fn kept<E: Display>(checked: Result<(), E>) -> Checked {
     checked.map_err(|e| e.to_string())
 }
 
-const ROOMS: [Room; 14] = [
+const ROOMS: [Room; 15] = [
     ("anat", read::<PairSettings>, |s| s.anat.check()),
     ("deformable", read::<DeformableSettings>, |s| kept(s.deformable.check())),
     ("estimate", read::<EstimateOptions>, |s| s.estimate.check()),
+    ("fields", read::<FieldSettings>, |s| kept(s.fields.check())),
     ("gp", read::<FitSettings>, |_| Ok(())),
     ("image", read::<ReadOptions>, |_| Ok(())),
     ("law", read::<MetaModelSettings>, |s| s.law.check()),

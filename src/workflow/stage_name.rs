@@ -36,6 +36,8 @@ pub enum StageName {
     Estimate,
     /// Models beside each other.
     Compare,
+    /// Displacement fields of a patient.
+    Fields,
 }
 
 impl StageName {
@@ -45,6 +47,8 @@ impl StageName {
         match (self, subject) {
             (Self::Registration | Self::Labels, _) => &[],
             (Self::Anat, _) => &[Registration],
+            // With the samples or the estimate whose state it is.
+            (Self::Fields, _) => &[Registration, Anat],
             (Self::Mesh | Self::Reference, Subject::Patient) => &[Anat],
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
@@ -64,6 +68,7 @@ impl StageName {
             Self::Sample(_) => Maker::Sample,
             Self::Estimate => Maker::Estimate,
             Self::Compare => Maker::Compare,
+            Self::Fields => Maker::Fields,
         })
     }
 
@@ -85,6 +90,7 @@ impl StageName {
             "reference" => Self::Reference,
             "estimate" => Self::Estimate,
             "compare" => Self::Compare,
+            "fields" => Self::Fields,
             other => Self::Sample(other.strip_prefix("sim-")?.to_owned()),
         })
     }
@@ -101,6 +107,7 @@ impl fmt::Display for StageName {
             Self::Sample(id) => write!(f, "sim-{id}"),
             Self::Estimate => f.write_str("estimate"),
             Self::Compare => f.write_str("compare"),
+            Self::Fields => f.write_str("fields"),
         }
     }
 }

@@ -110,7 +110,7 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
                 let sample = samples.iter().find(|sample| sample.id == *id)?;
                 Some(stages::sample_stage(work, &made, &scenario, &tissues, sample))
             }
-            StageName::Labels | StageName::Estimate | StageName::Compare => None,
+            StageName::Labels | StageName::Estimate | StageName::Compare | StageName::Fields => None,
         }
     };
     Ok(steps.iter().filter_map(pose).collect())

@@ -11,6 +11,7 @@ mod dependencies;
 mod doubtful_inputs;
 mod examples;
 mod fem;
+mod fields;
 mod job;
 mod label_maps;
 mod made;

@@ -11,6 +11,7 @@ impl SyntheticPatient {
     /// Never: the truth is plain data.
     pub fn files(&self) -> Vec<(String, Vec<u8>)> {
         let json = serde_json::to_string_pretty(&self.truth).expect("the truth is plain data") + "\n";
+        let [before, after] = self.landmark_tables();
         let transform = transform_text::to_matrix_text(&self.post_from_pre);
         [
             ("pre.nii.gz", encode_i16(&self.pre)),
@@ -24,6 +25,8 @@ impl SyntheticPatient {
             ("truth/resected_pre.nii.gz", encode_mask(&self.resected_pre)),
             ("truth/cavity_post.nii.gz", encode_mask(&self.cavity_post)),
             ("truth/displacement_pre.nii.gz", encode_vectors(&self.displacement_pre)),
+            ("truth/landmarks_pre.csv", before),
+            ("truth/landmarks_post.csv", after),
             ("truth/truth.json", json.into_bytes()),
         ]
         .map(|(name, bytes)| (name.to_owned(), bytes))

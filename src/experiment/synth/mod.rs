@@ -8,6 +8,7 @@ mod field;
 mod files;
 mod frame;
 mod head;
+mod landmarks;
 mod lobe;
 mod resection;
 mod sag;

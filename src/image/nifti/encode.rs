@@ -5,6 +5,7 @@ use super::orientation::shear;
 use crate::geometry::Frame;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use rayon::prelude::*;
 
 /// 32-bit floats as `.nii.gz` bytes.
 pub fn encode_f32<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
@@ -19,6 +20,19 @@ pub fn encode_u8<F: Frame>(volume: &Volume<u8, F>) -> Vec<u8> {
 /// 16-bit integers as `.nii.gz` bytes.
 pub fn encode_i16<F: Frame>(volume: &Volume<i16, F>) -> Vec<u8> {
     encode(&volume.grid, 4, 16, volume.data.iter().flat_map(|x| x.to_le_bytes()))
+}
+
+/// Intensities as `.nii.gz` bytes: whole numbers in 8 or 16 bits where all are and fit, else 32-bit floats.
+pub fn encode_intensities<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
+    let whole = volume.data.par_iter().all(|x| *x == x.round());
+    let within = |low: f32, high: f32| whole && volume.data.par_iter().all(|x| (low..=high).contains(x));
+    if within(0.0, 255.0) {
+        encode_u8(&volume.map(|x| x as u8))
+    } else if within(f32::from(i16::MIN), f32::from(i16::MAX)) {
+        encode_i16(&volume.map(|x| x as i16))
+    } else {
+        encode_f32(volume)
+    }
 }
 
 /// A mask as `.nii.gz` bytes: 1 inside, 0 outside, 8 bits.
@@ -92,7 +106,7 @@ fn form<F: Frame>(grid: &Grid<F>) -> Form {
 const UNITS: u8 = 2 | 8;
 
 /// 348 bytes of header and the four that say that no extension follows. Text fields stay zero.
-fn header_1<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16) -> Vec<u8> {
+pub(super) fn header_1<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16) -> Vec<u8> {
     let form = form(grid);
     let mut h = vec![0u8; 352];
     let mut put = |at: usize, bytes: &[u8]| h[at..at + bytes.len()].copy_from_slice(bytes);

@@ -17,6 +17,7 @@ const MOST_VOXELS: u64 = 1 << 28;
 pub(super) struct Header {
     pub endianness: Endianness,
     pub dim: [i64; 8],
+    pub intent: i32,
     pub datatype: i32,
     pub bitpix: i32,
     pub pixdim: [f64; 8],
@@ -106,6 +107,7 @@ impl Header {
         Ok(Self {
             endianness,
             dim: std::array::from_fn(|n| i64::from(f.i16(40 + 2 * n))),
+            intent: i32::from(f.i16(68)),
             datatype: i32::from(f.i16(70)),
             bitpix: i32::from(f.i16(72)),
             pixdim: std::array::from_fn(|n| f.f32(76 + 4 * n)),
@@ -137,6 +139,7 @@ impl Header {
         Ok(Self {
             endianness,
             dim: std::array::from_fn(|n| f.i64(16 + 8 * n)),
+            intent: f.i32(504),
             datatype: i32::from(f.i16(12)),
             bitpix: i32::from(f.i16(14)),
             pixdim: std::array::from_fn(|n| f.f64(104 + 8 * n)),

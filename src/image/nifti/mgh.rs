@@ -59,6 +59,7 @@ pub(super) fn header(bytes: &[u8]) -> Result<Header, NiftiProblem> {
     Ok(Header {
         endianness: Endianness::Big,
         dim: [4, width, height, depth, frames, 1, 1, 1],
+        intent: 0,
         datatype,
         bitpix,
         pixdim: [1.0, spacing.x, spacing.y, spacing.z, 1.0, 1.0, 1.0, 1.0],

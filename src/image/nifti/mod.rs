@@ -4,6 +4,7 @@
 //! patient's left and right is worse than none: gzip CRC and length, header against real size before anything is reserved,
 //! data type, scaling, orientation (none, two that disagree, singular), voxel size. NaN voxels become 0 and are counted.
 
+mod displacement;
 mod encode;
 mod error;
 mod gzip;
@@ -12,7 +13,8 @@ mod mgh;
 mod orientation;
 mod which;
 
-pub use encode::{encode_f32, encode_i16, encode_mask, encode_u8, encode_vectors};
+pub use displacement::{decode_displacement, encode_displacement};
+pub use encode::{encode_f32, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
 pub use error::{NiftiError, NiftiProblem};
 pub use which::Orientation;
 
@@ -57,6 +59,14 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
         return Err(refused(name, NiftiProblem::Constant { value: first }));
     }
     Ok(image)
+}
+
+/// Reads numbers or labels of any kind: a scan, a label map, a map of one value.
+///
+/// # Errors
+/// [`NiftiError`] as [`decode`], but for an image of one value.
+pub fn decode_intensities(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Volume<f32, Native>, NiftiError> {
+    read(bytes, name, options).map(|image| image.volume)
 }
 
 /// Reads a label map: whole numbers from 0 to 255. Returns the warnings beside it.

@@ -1,5 +1,6 @@
 //! The report as one HTML file that opens from disk and asks nothing of any other place.
 
+mod brain_shift;
 mod cohort;
 mod estimate;
 mod methods;
@@ -13,7 +14,10 @@ use super::chart;
 use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
 use super::html::{png_address, without_control_characters};
+use super::shift_figure::ShiftFigure;
 use super::viewer::Viewer;
+use crate::experiment::field::BrainShift;
+use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -57,6 +61,12 @@ pub struct CasePage {
     pub absent: Vec<String>,
     /// What the experiment found.
     pub outcome: Option<ExperimentOutcome>,
+    /// The brain shift in numbers.
+    pub brain_shift: Option<BrainShift>,
+    /// The same on a slice.
+    pub shift_figure: Option<ShiftFigure>,
+    /// Landmarks against it.
+    pub landmarks: Option<Evaluation>,
     /// Before and after registration.
     pub registration: Option<RegistrationFigure>,
     /// Both scans when a step gave up.
@@ -189,6 +199,9 @@ impl CasePage {
             sections.extend(body.map(|body| Section { id, heading, body }));
         };
         let outcome = self.outcome.as_ref();
+        let shift = self.brain_shift.as_ref().filter(|shift| !shift.states.is_empty());
+        let (figure, landmarks) = (self.shift_figure.as_ref(), self.landmarks.as_ref());
+        add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("summary", "Summary", outcome.map(results::summary));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());

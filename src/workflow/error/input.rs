@@ -61,6 +61,11 @@ pub enum InputError {
         if [pre, post].contains(&found) { ": it lies elsewhere" } else { "" }
     )]
     MaskGrid { role: MaskRole, name: String, found: [usize; 3], pre: [usize; 3], post: [usize; 3] },
+    #[error(
+        "{}: the mask's grid ({} voxels) is not its image's ({}) or lies elsewhere; resample it onto the image",
+        path.display(), size(*found), size(*image)
+    )]
+    ImageGrid { path: PathBuf, found: [usize; 3], image: [usize; 3] },
 }
 
 fn size([x, y, z]: [usize; 3]) -> String {

@@ -3,14 +3,18 @@
 mod case;
 mod input;
 mod label_map;
+mod landmarks;
 mod mesh_file;
 mod simulation;
+mod warp;
 
 pub use case::CaseError;
 pub use input::{InputError, MaskRole};
 pub use label_map::LabelMapError;
+pub use landmarks::LandmarkError;
 pub use mesh_file::MeshFileError;
 pub use simulation::SimulationError;
+pub use warp::WarpError;
 
 use super::settings::SettingsError;
 use crate::artefact::WriteError;
@@ -28,6 +32,7 @@ use crate::material::literature::StudyError;
 use crate::material::meta_model::FitError;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
+use crate::overlay::OverlayError;
 use crate::register::RegisterError;
 use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
@@ -119,6 +124,12 @@ pub enum WorkflowError {
     Mesh(#[from] MeshFileError),
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
+    #[error(transparent)]
+    Warp(#[from] WarpError),
+    #[error(transparent)]
+    Landmark(#[from] LandmarkError),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
     #[error(transparent)]

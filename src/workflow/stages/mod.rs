@@ -7,12 +7,14 @@ mod anat;
 mod brain_shift;
 mod compare;
 mod estimate;
+mod fields;
 mod labels;
 mod mesh;
 mod reading;
 mod reference;
 mod registration;
 mod samples;
+mod shift;
 
 pub use anat::AnatFacts;
 pub use mesh::mesh_outcome;
@@ -22,6 +24,7 @@ pub(crate) use anat::{Anatomy, anat, anat_stage};
 pub(crate) use brain_shift::SeenShift;
 pub(crate) use compare::compare;
 pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
+pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
 pub(crate) use reference::{
@@ -30,3 +33,4 @@ pub(crate) use reference::{
 };
 pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
+pub(crate) use shift::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};

@@ -1,0 +1,149 @@
+//! Whether a field can be inverted: the smallest determinant of its gradient, and a field mended where it folds.
+
+use crate::geometry::Frame;
+use crate::image::Volume;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// A field without folds.
+#[derive(Clone, Debug)]
+pub struct Mended<F: Frame> {
+    /// The field.
+    pub field: Volume<[f32; 3], F>,
+    /// Voxels whose vector was changed.
+    pub changed: Vec<bool>,
+    /// Smallest determinant, over every corner of every cell.
+    pub jacobian_min: f64,
+}
+
+/// Rounds of smoothing before a field is given up; each reaches a voxel further.
+const ROUNDS: usize = 60;
+
+/// The smallest determinant of `x -> x + d(x)`, linear between voxels, over every corner of every cell: there the
+/// determinant of a cell is smallest or within the variation along its edges.
+pub fn jacobian_min<F: Frame>(field: &Volume<[f32; 3], F>) -> f64 {
+    let slope = slope(field);
+    (0..cells(field.grid.dims)).into_par_iter().map(|c| lowest(field, &slope, c)).reduce(|| f64::INFINITY, f64::min)
+}
+
+/// The field smoothed, as little as it takes, where a determinant is below `least`.
+pub fn mended<F: Frame>(mut field: Volume<[f32; 3], F>, least: f64) -> Mended<F> {
+    let dims = field.grid.dims;
+    let stride = [1, dims[0], dims[0] * dims[1]];
+    let slope = slope(&field);
+    let mut changed = vec![false; field.data.len()];
+    for round in 0..ROUNDS {
+        let folded: Vec<u32> = (0..cells(dims))
+            .into_par_iter()
+            .filter(|&c| lowest(&field, &slope, c) < least)
+            .map(|c| first_of(dims, c) as u32)
+            .collect();
+        if folded.is_empty() {
+            break;
+        }
+        let reach = 1 + round / 4;
+        let mut around: Vec<u32> = Vec::new();
+        for &n in &folded {
+            let n = n as usize;
+            let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
+            let range = |a: usize| v[a].saturating_sub(reach - 1)..(v[a] + 1 + reach).min(dims[a]);
+            for k in range(2) {
+                for j in range(1) {
+                    around.extend(range(0).map(|i| (i + stride[1] * j + stride[2] * k) as u32));
+                }
+            }
+        }
+        around.sort_unstable();
+        around.dedup();
+        let smooth: Vec<[f32; 3]> = around
+            .par_iter()
+            .map(|&n| {
+                let n = n as usize;
+                let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
+                let (mut sum, mut count) = ([0f32; 3], 0f32);
+                for a in 0..3 {
+                    for m in [(v[a] > 0).then(|| n - stride[a]), (v[a] + 1 < dims[a]).then(|| n + stride[a])] {
+                        let Some(m) = m else { continue };
+                        (0..3).for_each(|c| sum[c] += field.data[m][c]);
+                        count += 1.0;
+                    }
+                }
+                std::array::from_fn(|c| 0.5 * field.data[n][c] + 0.5 * sum[c] / count)
+            })
+            .collect();
+        for (&n, value) in around.iter().zip(smooth) {
+            field.data[n as usize] = value;
+            changed[n as usize] = true;
+        }
+    }
+    let jacobian_min = jacobian_min(&field);
+    Mended { field, changed, jacobian_min }
+}
+
+fn cells(dims: [usize; 3]) -> usize {
+    dims.iter().map(|n| n.saturating_sub(1)).product()
+}
+
+/// The voxel that a cell begins at.
+fn first_of(dims: [usize; 3], cell: usize) -> usize {
+    let [cx, cy] = [dims[0] - 1, dims[1] - 1];
+    cell % cx + dims[0] * (cell / cx % cy + dims[1] * (cell / (cx * cy)))
+}
+
+fn slope<F: Frame>(field: &Volume<[f32; 3], F>) -> Matrix3<f64> {
+    field.grid.voxel_from_mm().fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+/// The smallest determinant at the corners of a cell.
+fn lowest<F: Frame>(field: &Volume<[f32; 3], F>, voxel_from_mm: &Matrix3<f64>, cell: usize) -> f64 {
+    let dims = field.grid.dims;
+    let first = first_of(dims, cell);
+    let corner = |c: usize| {
+        let at = first + (c & 1) + (c >> 1 & 1) * dims[0] + (c >> 2 & 1) * dims[0] * dims[1];
+        let [x, y, z] = field.data[at];
+        Vector3::new(f64::from(x), f64::from(y), f64::from(z))
+    };
+    let v: [Vector3<f64>; 8] = std::array::from_fn(corner);
+    if v[1..].iter().all(|x| *x == v[0]) {
+        return 1.0;
+    }
+    let mut least = f64::INFINITY;
+    for c in 0..8usize {
+        let along = |a: usize| v[c | 1 << a] - v[c & !(1 << a)];
+        let gradient = Matrix3::from_columns(&[along(0), along(1), along(2)]) * voxel_from_mm;
+        least = least.min((Matrix3::identity() + gradient).determinant());
+    }
+    least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pre;
+    use crate::image::Grid;
+
+    #[test]
+    fn a_stretch_has_its_own_determinant_on_any_grid() {
+        let grid = Grid::<Pre>::axis_aligned([6, 7, 5], [1.0, 2.0, 3.0], [-3.0; 3]);
+        let at = |n: usize| grid.position(nalgebra::Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+        let field = Volume::from_fn(grid, |n| [0.1 * at(n).x as f32, -0.2 * at(n).y as f32, 0.3 * at(n).z as f32]);
+        assert!((jacobian_min(&field) - 1.1 * 0.8 * 1.3).abs() < 1e-5);
+        let mended = mended(field.clone(), 0.1);
+        assert!(mended.field == field && !mended.changed.contains(&true), "what does not fold is left alone");
+    }
+
+    #[test]
+    fn a_fold_is_mended_and_what_lies_far_from_it_stays() {
+        let grid = Grid::<Pre>::axis_aligned([40, 20, 20], [1.0; 3], [0.0; 3]);
+        // Tissue pushed 4 mm into a wall a voxel away.
+        let field = Volume::from_fn(grid, |n| [if grid.voxel(n)[0] < 20 { 4.0f32 } else { 0.0 }, 0.0, 0.0]);
+        assert!(jacobian_min(&field) < -2.0);
+        let mended = mended(field.clone(), 0.05);
+        assert!(mended.jacobian_min >= 0.05, "{}", mended.jacobian_min);
+        assert!((jacobian_min(&mended.field) - mended.jacobian_min).abs() < 1e-12);
+        for n in 0..grid.len() {
+            assert!(mended.changed[n] || mended.field.data[n] == field.data[n]);
+            assert!(grid.voxel(n)[0] > 1 || !mended.changed[n]);
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! From what is known of tissue to a field over the head.
+
+use super::harmonic::{Place, continued};
+use super::inverse::inverse;
+use super::jacobian::mended;
+use super::raster::in_tetrahedra;
+use super::settings::FieldSettings;
+use super::vectors::at;
+use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
+use crate::image::morphology::dilate;
+use crate::image::{Grid, Mask, Volume};
+use nalgebra::{Matrix4, Point3, Vector3};
+
+/// Steps of a vector's components, mm: far below what any of it is worth, so that files pack well.
+const STEP_MM: f64 = 1.0 / 512.0;
+
+/// A state of a mesh in the MNI frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved<'a> {
+    /// Tetrahedra.
+    pub tets: &'a [[u32; 4]],
+    /// Where the nodes were, mm.
+    pub nodes_mm: &'a [[f64; 3]],
+    /// How far each has moved, mm.
+    pub displacement_mm: &'a [[f64; 3]],
+    /// Standard deviation of each (root of the trace of its covariance), mm.
+    pub sd_mm: &'a [f64],
+    /// The 95 % reach of each, mm.
+    pub reach95_mm: &'a [f64],
+}
+
+/// Brain shift as a field of the pre-operative scan, and its inverse. Both lie on the part of the scan's grid that holds
+/// the brain; beyond it nothing moves.
+#[derive(Clone, Debug)]
+pub struct ShiftField {
+    /// The whole grid that the field's is cut from.
+    pub whole: Grid<Pre>,
+    /// First voxel of the part.
+    pub first: [usize; 3],
+    /// How far a point moves, mm.
+    pub forward: Volume<[f32; 3], Pre>,
+    /// From a moved point back, mm.
+    pub inverse: Volume<[f32; 3], Pre>,
+    /// Standard deviation (root of the trace of the covariance), mm.
+    pub sd_mm: Vec<f32>,
+    /// The 95 % reach, mm.
+    pub reach95_mm: Vec<f32>,
+    /// Where the field is that of tissue that is still there.
+    pub believed: Vec<bool>,
+    /// Smallest determinant of the field's gradient.
+    pub jacobian_min: f64,
+    /// Voxels of tissue whose vector was changed because the state folds there.
+    pub changed: usize,
+}
+
+/// What a case's images say of the head, on the grid of the fields.
+#[derive(Clone, Debug)]
+pub struct Surroundings {
+    /// The brain with its fluid.
+    pub brain: Mask<Pre>,
+    /// The tissue that was taken.
+    pub resected: Mask<Pre>,
+}
+
+/// The field of a state. `seen` overrides the displacement inside the tetrahedra: a point (mm, MNI) to its vector.
+pub fn shift_field(
+    state: &Moved<'_>,
+    seen: Option<&(dyn Fn([f64; 3]) -> [f64; 3] + Sync)>,
+    pre_from_mni: &RigidTransform<Mni, Pre>,
+    around: &Surroundings,
+    settings: &FieldSettings,
+) -> ShiftField {
+    let in_pre = |x: &[f64; 3]| pre_from_mni.apply(Position::new(x[0], x[1], x[2])).mm;
+    let nodes: Vec<[f64; 3]> = state.nodes_mm.iter().map(|x| in_pre(x).into()).collect();
+    let turned = |u: [f64; 3]| -> [f64; 3] { (pre_from_mni.rotation * Vector3::from(u)).into() };
+    let length = |u: &[f64; 3]| Vector3::from(*u).norm();
+    let largest = state.displacement_mm.iter().map(length).fold(0.0, f64::max);
+    let (first, grid) = part(&around.brain, &nodes, settings.fall_mm + largest + 2.0);
+    let values: Vec<[f64; 5]> = (0..nodes.len())
+        .map(|n| {
+            let [x, y, z] = turned(state.displacement_mm[n]);
+            [x, y, z, state.sd_mm[n], state.reach95_mm[n]]
+        })
+        .collect();
+    let mut known = in_tetrahedra(state.tets, &nodes, &values, &grid);
+    if let Some(seen) = seen {
+        use rayon::prelude::*;
+        let mni_from_pre = pre_from_mni.inverse();
+        known.par_iter_mut().enumerate().for_each(|(n, value)| {
+            let Some(value) = value else { return };
+            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+            let u = turned(seen(mni_from_pre.apply(p).mm.into()));
+            (0..3).for_each(|a| value[a] = u[a] as f32);
+            value[4] = (length(&u) + 1.96 / 3f64.sqrt() * f64::from(value[3])) as f32;
+        });
+    }
+    let brain = cut(&around.brain, first, &grid);
+    let resected = cut(&around.resected, first, &grid);
+    from_tissue(&known, &brain, &resected, (around.brain.grid, first), settings)
+}
+
+/// The field of what is known at voxels of tissue: displacement, standard deviation and reach.
+fn from_tissue(
+    known: &[Option<[f32; 5]>],
+    brain: &Mask<Pre>,
+    resected: &Mask<Pre>,
+    (whole, first): (Grid<Pre>, [usize; 3]),
+    settings: &FieldSettings,
+) -> ShiftField {
+    let grid = brain.grid;
+    let tissue = |n: usize| known[n].is_some() && !resected.data[n];
+    let head = Mask::from_fn(grid, |n| brain.data[n] || known[n].is_some());
+    let reached = dilate(&head, settings.fall_mm);
+    let place: Vec<Place> =
+        (0..grid.len()).map(|n| if tissue(n) || !reached.data[n] { Place::Known } else { Place::Free }).collect();
+    let values: Vec<[f32; 5]> =
+        (0..grid.len()).map(|n| if tissue(n) { known[n].unwrap_or_default() } else { [0.0; 5] }).collect();
+    let values = continued(grid.dims, grid.spacing_mm(), &place, values);
+    let field = Volume::from_data(grid, values.iter().map(|v| [v[0], v[1], v[2]]).collect());
+    let mut mended = mended(field, settings.jacobian_least);
+    for v in &mut mended.field.data {
+        *v = v.map(rounded);
+    }
+    let changed = (0..grid.len()).filter(|&n| tissue(n) && mended.changed[n]).count();
+    let inside = |n: usize, v: f32| if resected.data[n] { 0.0 } else { rounded(v) };
+    let mut inverse = inverse(&mended.field);
+    for v in &mut inverse.data {
+        *v = v.map(rounded);
+    }
+    ShiftField {
+        whole,
+        first,
+        inverse,
+        sd_mm: values.iter().enumerate().map(|(n, v)| inside(n, v[3].max(0.0))).collect(),
+        reach95_mm: values.iter().enumerate().map(|(n, v)| inside(n, v[4].max(0.0))).collect(),
+        believed: (0..grid.len()).map(|n| tissue(n) && !mended.changed[n]).collect(),
+        jacobian_min: mended.jacobian_min,
+        changed,
+        forward: mended.field,
+    }
+}
+
+fn rounded(x: f32) -> f32 {
+    // Plus zero: no -0 in a file.
+    ((f64::from(x) / STEP_MM).round() * STEP_MM) as f32 + 0.0
+}
+
+/// The part of a mask's grid that holds its inside and some points, with room around.
+fn part(mask: &Mask<Pre>, points: &[[f64; 3]], room_mm: f64) -> ([usize; 3], Grid<Pre>) {
+    let grid = &mask.grid;
+    let (mut low, mut high) = (grid.dims.map(|n| n as f64), [0.0f64; 3]);
+    let mut hold = |v: [f64; 3]| {
+        for a in 0..3 {
+            (low[a], high[a]) = (low[a].min(v[a]), high[a].max(v[a]));
+        }
+    };
+    for (n, _) in mask.data.iter().enumerate().filter(|(_, inside)| **inside) {
+        hold(grid.voxel(n).map(|v| v as f64));
+    }
+    for p in points {
+        hold(grid.voxel_at(Position::new(p[0], p[1], p[2])).into());
+    }
+    let spacing = grid.spacing_mm();
+    let mut first = [0; 3];
+    let mut dims = [2; 3];
+    for a in 0..3 {
+        let room = room_mm / spacing[a] + 2.0;
+        let end = grid.dims[a] - 1;
+        first[a] = ((low[a] - room).floor().max(0.0) as usize).min(end - 1);
+        let last = ((high[a] + room).ceil().max(0.0) as usize).min(end);
+        dims[a] = last.max(first[a] + 1) - first[a] + 1;
+    }
+    let shift = Matrix4::new_translation(&Vector3::from(first.map(|v| v as f64)));
+    // A part of a grid that can be inverted can be.
+    let part = Grid::new(dims, grid.mm_from_voxel * shift).unwrap_or(*grid);
+    (first, part)
+}
+
+fn cut(mask: &Mask<Pre>, first: [usize; 3], grid: &Grid<Pre>) -> Mask<Pre> {
+    Mask::from_fn(*grid, |n| {
+        let v = grid.voxel(n);
+        mask.at(v[0] + first[0], v[1] + first[1], v[2] + first[2])
+    })
+}
+
+impl ShiftField {
+    /// From a point of the pre-operative scan to the post-operative one, by voxel of the whole grid, mm.
+    pub fn to_post(&self, post_from_pre: &RigidTransform<Pre, Post>) -> impl Fn(usize) -> [f32; 3] + Sync + use<'_> {
+        let (turn, shift) = (post_from_pre.rotation.to_rotation_matrix(), post_from_pre.translation_mm);
+        move |n| {
+            let x = self.whole.position(Point3::from(self.whole.voxel(n).map(|v| v as f64))).mm.coords;
+            let u = self.forward_at(n).map(f64::from);
+            let d = turn * (x + Vector3::from(u)) + shift - x;
+            [d.x as f32, d.y as f32, d.z as f32].map(rounded)
+        }
+    }
+
+    /// Back from a point of the post-operative scan, by voxel of its grid, mm.
+    pub fn to_pre(
+        &self,
+        grid: &Grid<Post>,
+        pre_from_post: &RigidTransform<Post, Pre>,
+    ) -> impl Fn(usize) -> [f32; 3] + Sync + use<'_> {
+        let (grid, pre_from_post) = (*grid, *pre_from_post);
+        move |n| {
+            let y = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+            let moved = pre_from_post.apply(y);
+            let back = at(&self.inverse, moved).unwrap_or_default();
+            let d = moved.mm.coords + Vector3::from(back) - y.mm.coords;
+            [d.x as f32, d.y as f32, d.z as f32].map(rounded)
+        }
+    }
+
+    /// A voxel of the whole grid as one of the part.
+    fn of_whole(&self, n: usize) -> Option<usize> {
+        let v = self.whole.voxel(n);
+        let dims = self.forward.grid.dims;
+        let at = [0, 1, 2].map(|a| v[a].wrapping_sub(self.first[a]));
+        (0..3).all(|a| at[a] < dims[a]).then(|| self.forward.grid.index(at[0], at[1], at[2]))
+    }
+
+    /// How far the point at a voxel of the whole grid moves, mm.
+    pub fn forward_at(&self, n: usize) -> [f32; 3] {
+        self.of_whole(n).map_or([0.0; 3], |m| self.forward.data[m])
+    }
+
+    /// The same of the inverse.
+    pub fn inverse_at(&self, n: usize) -> [f32; 3] {
+        self.of_whole(n).map_or([0.0; 3], |m| self.inverse.data[m])
+    }
+
+    /// A volume of the part on the whole grid, `outside` elsewhere.
+    pub fn on_whole<T: Copy + Send + Sync>(&self, part: &[T], outside: T) -> Volume<T, Pre> {
+        Volume::from_fn(self.whole, |n| self.of_whole(n).map_or(outside, |m| part[m]))
+    }
+
+    /// Largest and median length of the shift over the tissue, mm, and where the largest is (mm, pre-operative scan).
+    pub fn sizes(&self) -> Option<(f64, f64, [f64; 3])> {
+        let size = |n: usize| self.forward.data[n].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt();
+        let mut sizes: Vec<(f64, usize)> =
+            (0..self.believed.len()).filter(|&n| self.believed[n]).map(|n| (size(n), n)).collect();
+        sizes.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        let (largest, at) = *sizes.last()?;
+        let grid = &self.forward.grid;
+        let place = grid.position(Point3::from(grid.voxel(at).map(|v| v as f64)));
+        Some((largest, sizes[sizes.len() / 2].0, place.mm.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::field::vectors::carried;
+    use crate::experiment::phantom::block;
+    use crate::geometry::Frame;
+
+    /// A block of tissue in a larger head, moved as a function says, with a piece taken out.
+    fn field(u: impl Fn([f64; 3]) -> [f64; 3]) -> (ShiftField, Surroundings) {
+        let mesh = block(6);
+        let displacement: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| u(*x)).collect();
+        let nodes = mesh.nodes_mm().len();
+        let (low, high) = mesh.nodes_mm().iter().fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |(l, h), x| {
+            ([0, 1, 2].map(|a| l[a].min(x[a])), [0, 1, 2].map(|a| h[a].max(x[a])))
+        });
+        let dims = [0, 1, 2].map(|a| ((high[a] - low[a]) / 2.0) as usize + 31);
+        let grid = Grid::<Mni>::axis_aligned(dims, [2.0; 3], low.map(|x| x - 30.0));
+        let to_pre = RigidTransform::<Mni, Pre>::about(
+            [1.0, 2.0, 3.0].into(),
+            Vector3::new(0.1, -0.2, 0.3),
+            Vector3::new(5.0, 0.0, -4.0),
+        );
+        let whole = Grid::<Pre>::new(dims, to_pre.to_matrix() * grid.mm_from_voxel).unwrap();
+        let at = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+        let around = Surroundings {
+            brain: Mask::from_fn(whole, |n| (0..3).all(|a| at(n)[a] > low[a] - 6.0 && at(n)[a] < high[a] + 6.0)),
+            resected: Mask::from_fn(whole, |n| (0..3).all(|a| at(n)[a] < low[a] + 14.0 && at(n)[a] > low[a])),
+        };
+        let state = Moved {
+            tets: mesh.tets(),
+            nodes_mm: mesh.nodes_mm(),
+            displacement_mm: &displacement,
+            sd_mm: &vec![0.5; nodes],
+            reach95_mm: &vec![3.0; nodes],
+        };
+        (shift_field(&state, None, &to_pre, &around, &FieldSettings::default()), around)
+    }
+
+    #[test]
+    fn inside_it_is_the_meshs_own_and_it_falls_to_zero_at_the_skull_and_can_be_inverted() {
+        let (field, around) = field(|x| [0.02 * x[2], -2.0, 1.0 + 0.01 * x[0]]);
+        assert!(field.jacobian_min > 0.05 && field.changed == 0, "{} {}", field.jacobian_min, field.changed);
+        let outside = dilate(&around.brain, 8.0);
+        for n in 0..field.whole.len() {
+            if !outside.data[n] {
+                assert_eq!(field.forward_at(n), [0.0; 3]);
+            }
+        }
+        let resected = field.on_whole(&field.believed, false);
+        assert!(resected.data.iter().zip(&around.resected.data).all(|(b, r)| !(*b && *r)), "nothing is known there");
+        assert!(field.believed.iter().filter(|b| **b).count() > 1000);
+        for (n, _) in field.believed.iter().enumerate().filter(|(_, b)| **b).step_by(97) {
+            let grid = &field.forward.grid;
+            let p: [f64; 3] = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.into();
+            let there = carried(&field.forward, p).unwrap();
+            let home = carried(&field.inverse, there).unwrap();
+            assert!((0..3).all(|a| (home[a] - p[a]).abs() < 0.05), "{p:?} {home:?}");
+            assert!((field.sd_mm[n] - 0.5).abs() < 1e-6 && (field.reach95_mm[n] - 3.0).abs() < 1e-6);
+        }
+        assert_eq!(Pre::NAME, "pre");
+    }
+
+    #[test]
+    fn a_shift_to_the_right_stays_one_to_the_right_of_the_head() {
+        let (field, _) = field(|_| [10.0, 0.0, 0.0]);
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.2, 0.3));
+        let expected = turn * Vector3::new(10.0, 0.0, 0.0);
+        let (largest, median, at) = field.sizes().unwrap();
+        assert!((largest - 10.0).abs() < 0.01 && (median - 10.0).abs() < 0.01);
+        let there = carried(&field.forward, at).unwrap();
+        assert!((0..3).all(|a| (there[a] - at[a] - expected[a]).abs() < 0.01));
+    }
+}

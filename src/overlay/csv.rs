@@ -1,0 +1,78 @@
+//! Points as a table: columns `x`, `y`, `z` (mm, RAS+), or the first three columns of numbers.
+
+use super::{Carried, Drawing, Kept, OverlayError, damaged, written};
+
+/// The table as it was, and where its coordinates stand.
+#[derive(Clone, Debug)]
+pub(super) struct Table {
+    header: Option<Vec<String>>,
+    rows: Vec<Vec<String>>,
+    columns: [usize; 3],
+}
+
+pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(false)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(bytes);
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for (n, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| damaged(name, format!("row {}", n + 1), e.to_string()))?;
+        rows.push(record.iter().map(|cell| cell.trim_start_matches('\u{feff}').to_owned()).collect());
+    }
+    let Some(first) = rows.first().cloned() else { return Err(damaged(name, "the table", "it holds no row")) };
+    let is_number = |cell: &String| cell.parse::<f64>().is_ok();
+    let numbers = first.iter().filter(|cell| is_number(cell)).count();
+    let (header, columns) = if numbers >= 3 {
+        let places: Vec<usize> = (0..first.len()).filter(|&c| is_number(&first[c])).collect();
+        (None, [places[0], places[1], places[2]])
+    } else {
+        let named = |axis: &str| {
+            let fits = |cell: &String| [axis, &format!("{axis}_mm")].contains(&cell.to_lowercase().as_str());
+            first.iter().position(fits).ok_or_else(|| {
+                damaged(name, "the first row", format!("no column is called `{axis}`: say x, y and z (mm, RAS)"))
+            })
+        };
+        let columns = [named("x")?, named("y")?, named("z")?];
+        (Some(rows.remove(0)), columns)
+    };
+    let mut points_mm = Vec::with_capacity(rows.len());
+    for (n, row) in rows.iter().enumerate() {
+        let number = |c: usize| {
+            let line = n + 1 + usize::from(header.is_some());
+            row[c]
+                .parse::<f64>()
+                .map_err(|_| damaged(name, format!("row {line}"), format!("`{}` is not a number", row[c])))
+        };
+        points_mm.push([number(columns[0])?, number(columns[1])?, number(columns[2])?]);
+    }
+    let label = header
+        .as_ref()
+        .and_then(|h| h.iter().position(|c| ["name", "label", "id"].contains(&c.to_lowercase().as_str())));
+    let label = label.or_else(|| header.is_none().then(|| (0..first.len()).find(|c| !is_number(&first[*c]))).flatten());
+    let names =
+        rows.iter().enumerate().map(|(n, row)| label.map_or_else(|| (n + 1).to_string(), |c| row[c].clone())).collect();
+    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Kept::Csv(Table { header, rows, columns }) })
+}
+
+impl Table {
+    /// The table with the points where they are now, and two columns more: `sd_mm` and `state`.
+    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+        let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
+        let mut write = |row: Vec<String>| writer.write_record(row).expect("writing to memory does not fail");
+        if let Some(header) = &self.header {
+            write(header.iter().cloned().chain(["sd_mm".to_owned(), "state".to_owned()]).collect());
+        }
+        for (row, point) in self.rows.iter().zip(carried) {
+            let mut row = row.clone();
+            for (c, x) in self.columns.iter().zip(point.mm) {
+                row[*c] = written(x);
+            }
+            row.extend([point.sd_mm.map_or_else(String::new, written), point.state.to_string()]);
+            write(row);
+        }
+        writer.into_inner().expect("writing to memory does not fail")
+    }
+}

@@ -1,0 +1,74 @@
+//! 3D Slicer's fiducials before version 5 (`.fcsv`): a comma-separated table under comment lines that name its axes.
+
+use super::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
+
+/// The lines as they were.
+#[derive(Clone, Debug)]
+pub(super) struct Lines {
+    lines: Vec<String>,
+    lps: bool,
+}
+
+fn is_point(line: &str) -> bool {
+    !line.starts_with('#') && !line.trim().is_empty()
+}
+
+pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
+    let text = std::str::from_utf8(bytes).map_err(|_| damaged(name, "the file", "not UTF-8 text"))?;
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let system = lines.iter().find_map(|line| line.strip_prefix("# CoordinateSystem =")).map_or("RAS", str::trim);
+    let lps = match system {
+        "RAS" | "0" => false,
+        "LPS" | "1" => true,
+        other => return Err(damaged(name, "CoordinateSystem", format!("`{other}` is neither RAS nor LPS"))),
+    };
+    let (mut points_mm, mut names) = (Vec::new(), Vec::new());
+    for (n, line) in lines.iter().enumerate().filter(|(_, line)| is_point(line)) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |c: usize| -> Result<f64, OverlayError> {
+            let cell = cells.get(c).copied().unwrap_or("");
+            let wrong = |_| damaged(name, format!("line {}", n + 1), format!("`{cell}` is not a number"));
+            cell.trim().parse().map_err(wrong)
+        };
+        points_mm.push(turned([number(1)?, number(2)?, number(3)?], lps));
+        let label = cells.get(11).copied().filter(|label| !label.is_empty());
+        names.push(label.unwrap_or(cells[0]).to_owned());
+    }
+    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Kept::Fcsv(Lines { lines, lps }) })
+}
+
+impl Lines {
+    /// The same lines; the column of descriptions says how sure a point is.
+    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+        let mut points = carried.iter();
+        let mut text = String::new();
+        for line in &self.lines {
+            let point = if is_point(line) { points.next() } else { None };
+            let Some(point) = point else {
+                text += line;
+                text.push('\n');
+                continue;
+            };
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            for (cell, x) in cells[1..4].iter_mut().zip(turned(point.mm, self.lps)) {
+                *cell = written(x);
+            }
+            if let Some(description) = cells.get_mut(12) {
+                *description = said(point);
+            }
+            // The node of a scene, which is not this file's.
+            if let Some(node) = cells.get_mut(13) {
+                node.clear();
+            }
+            text += &cells.join(",");
+            text.push('\n');
+        }
+        text.into_bytes()
+    }
+}
+
+/// A point's state and spread in words without a comma.
+pub(super) fn said(point: &Carried) -> String {
+    let sd = point.sd_mm.map_or_else(String::new, |sd| format!(" sd {} mm", written(sd)));
+    format!("{}{sd}", point.state)
+}

@@ -1,0 +1,76 @@
+use super::*;
+
+fn moved(drawing: &Drawing, by: [f64; 3]) -> Vec<Carried> {
+    let to =
+        |p: &[f64; 3]| Carried { mm: [0, 1, 2].map(|a| p[a] + by[a]), sd_mm: Some(0.75), state: PointState::Tissue };
+    drawing.points_mm.iter().map(to).collect()
+}
+
+/// Ten millimetres to the right in every text format, whichever way its axes go; what else it holds stays.
+#[test]
+fn ten_mm_to_the_right_is_ten_mm_to_the_right_in_every_format() {
+    let fcsv = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n1,-5,6,7,0,0,0,1,1,1,0,F-1,,vtkMRMLScalarVolumeNode1\n";
+    let markups = r#"{"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": [{"label": "F-1", "position": [-5.0, 6.0, 7.0]}]}]}"#;
+    let vtk = "# vtk DataFile Version 4.2\nvtk output SPACE=LPS\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n-5 6 7 \nVERTICES 1 2\n1 0\n";
+    let ply = "ply\nformat ascii 1.0\ncomment SPACE=LPS\nelement vertex 1\nproperty uchar red\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n9 -5 6 7\n";
+    let csv = "name,x,y,z\nF-1,5,-6,7\n";
+    let tag = "MNI Tag Point File\nVolumes = 1;\n\nPoints =\n 5 -6 7 \"F-1\";\n";
+    let files =
+        [("a.fcsv", fcsv), ("a.mrk.json", markups), ("a.vtk", vtk), ("a.ply", ply), ("a.csv", csv), ("a.tag", tag)];
+    for (name, text) in files {
+        let drawing = Drawing::decode(text.as_bytes(), name).unwrap();
+        assert_eq!(drawing.points_mm, [[5.0, -6.0, 7.0]], "{name}");
+        let bytes = drawing.encode(&moved(&drawing, [10.0, 0.0, 0.0]));
+        let again = Drawing::decode(&bytes, name).unwrap();
+        assert_eq!(again.points_mm, [[15.0, -6.0, 7.0]], "{name}");
+        assert_eq!(again.names, drawing.names, "{name}");
+        let said = String::from_utf8(bytes).unwrap();
+        assert!(!said.contains("vtkMRML"), "{name}: {said}");
+        let carries_sd = [".csv", ".fcsv", ".json"].iter().any(|end| name.ends_with(end));
+        assert_eq!(said.contains("0.75") && said.contains("tissue"), carries_sd, "{name}: {said}");
+    }
+}
+
+#[test]
+fn pairs_of_a_tag_file_are_read_and_a_table_without_names_of_columns_too() {
+    let tag = "MNI Tag Point File\nVolumes = 2;\n%Volume: before\n%Volume: after\n\nPoints =\n 1 2 3 4 5 6 \"\"\n 7 8 9 10 11 12 \"\";";
+    let drawing = Drawing::decode(tag.as_bytes(), "a.tag").unwrap();
+    assert_eq!(drawing.points_mm, [[1.0, 2.0, 3.0], [7.0, 8.0, 9.0]]);
+    assert_eq!(drawing.pairs_mm, [[4.0, 5.0, 6.0], [10.0, 11.0, 12.0]]);
+    let table = Drawing::decode(b"a, 1, 2, 3\nb, 4, 5, 6\n", "a.csv").unwrap();
+    assert_eq!((table.points_mm.len(), table.names), (2, vec!["a".to_owned(), "b".to_owned()]));
+}
+
+#[test]
+fn a_damaged_file_is_refused_with_its_place() {
+    let refuse = |bytes: &[u8], name: &str| Drawing::decode(bytes, name).unwrap_err().to_string();
+    assert!(refuse(b"x,y\n1,2\n", "a.csv").contains("a.csv: the first row: no column is called `z`"));
+    assert!(refuse(b"x,y,z\n1,2,up\n", "a.csv").contains("row 2: `up`"));
+    assert!(refuse(b"x,y,z\n1,2,inf\n", "a.csv").contains("point 0"));
+    assert!(refuse(b"", "a.xyz").contains(".mrk.json"));
+    assert!(refuse(b"{}", "a.mrk.json").contains("markups"));
+    assert!(refuse(b"mrtrix tracks\ndatatype: Float32LE\nfile: . 50\nEND\n", "a.tck").contains("a.tck"));
+    assert!(refuse(b"TRACK", "a.trk").contains("TRACK"));
+    assert!(refuse(&[0; 100], "a.stl").contains("cut short"));
+}
+
+#[test]
+fn lines_keep_their_lengths_and_their_numbers() {
+    let (mut at, mut bytes) =
+        (0, b"mrtrix tracks\ndatatype: Float32LE\ntimestamp: 1\ncount: 2\nfile: . 100\nEND\n".to_vec());
+    bytes.resize(100, b' ');
+    for length in [3, 2] {
+        for _ in 0..length {
+            at += 1;
+            bytes.extend([at as f32, 0.5, -1.0].iter().flat_map(|x: &f32| x.to_le_bytes()));
+        }
+        bytes.extend([f32::NAN; 3].iter().flat_map(|x| x.to_le_bytes()));
+    }
+    bytes.extend([f32::INFINITY; 3].iter().flat_map(|x| x.to_le_bytes()));
+    let drawing = Drawing::decode(&bytes, "a.tck").unwrap();
+    assert_eq!((drawing.points_mm.len(), drawing.streamlines()), (5, Some(2)));
+    let carried = drawing.encode(&moved(&drawing, [0.0, 0.0, 4.0]));
+    assert!(!String::from_utf8_lossy(&carried[..60]).contains("timestamp"));
+    let again = Drawing::decode(&carried, "a.tck").unwrap();
+    assert_eq!((again.points_mm[4], again.streamlines()), ([5.0, 0.5, 3.0], Some(2)));
+}

@@ -1,0 +1,228 @@
+//! The maps of points that a case, or a field of the user's own, stands for.
+
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
+use super::settings::Settings;
+use super::stage_name::Subject;
+use super::stages::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, transforms};
+use crate::experiment::field::{ShiftField, carried, inverse};
+use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
+use crate::image::nifti::{self, ReadOptions, decode_displacement};
+use crate::image::{Grid, Mask, Volume};
+use crate::layout::{
+    ESTIMATE_STATE, NATIVE_RESECTED, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN, PRE_FROM_POST_FIELD, PRE_NATIVE_BRAIN,
+    SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
+};
+use crate::overlay::{Carried, PointState};
+use crate::segment::atlas;
+use serde::Deserialize;
+
+/// Where something of a patient is carried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WarpTo {
+    /// From the pre-operative scan to the post-operative one.
+    Post,
+    /// From the pre-operative scan to the deformed state, in the pre-operative scan's frame.
+    Deformed,
+    /// From the post-operative scan back to the pre-operative one.
+    Pre,
+    /// From the pre-operative scan to MNI space: a rigid motion, without any brain shift.
+    Mni,
+}
+
+/// A map of points with what is known of them. All frames are that of what is carried, or of where it goes.
+#[derive(Debug)]
+pub(crate) struct Map {
+    /// Displacement of points, mm; `None` for a rigid motion alone.
+    forward: Option<Volume<[f32; 3], Native>>,
+    /// The same for images: from where they go back to where they were.
+    back: Option<Volume<[f32; 3], Native>>,
+    /// The rigid part alone, of points.
+    rigid: AffineTransform<Native, Native>,
+    /// Standard deviation, mm, in the pre-operative scan's frame.
+    sd: Option<Volume<f32, Native>>,
+    /// Where the displacement is believed, in the same frame.
+    believed: Option<Mask<Native>>,
+    /// The tissue that was taken, in the same frame.
+    resected: Option<Mask<Native>>,
+    /// Whether the pre-operative scan is where points arrive.
+    backwards: bool,
+    /// Where images go.
+    pub grid: Option<Grid<Native>>,
+}
+
+/// Which part of a map is needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    Points,
+    Images,
+}
+
+fn native<T: Copy, F: Frame>(volume: Volume<T, F>) -> Volume<T, Native> {
+    volume.relabelled()
+}
+
+impl Map {
+    /// A field of the user's own: it moves points; images go through its inverse.
+    pub fn of_field(field: Volume<[f32; 3], Native>, part: Part) -> Self {
+        let back = (part == Part::Images).then(|| inverse(&field));
+        Self {
+            forward: Some(field),
+            back,
+            rigid: AffineTransform::identity(),
+            sd: None,
+            believed: None,
+            resected: None,
+            backwards: false,
+            grid: None,
+        }
+    }
+
+    /// The map of a case in a state.
+    pub fn of_case(case: &Case, state: Option<&str>, to: WarpTo, part: Part) -> Result<(Self, String), WorkflowError> {
+        let (pre_from_post, mni_from_pre) = transforms(case)?;
+        if to == WarpTo::Mni {
+            let rigid = AffineTransform::from_matrix(&mni_from_pre.to_matrix());
+            let map = Self { forward: None, rigid, grid: Some(atlas::template().grid().relabelled()), ..Self::still() };
+            return Ok((map, "rigid".to_owned()));
+        }
+        let state = named(case, state)?;
+        let (points, images) = match to {
+            WarpTo::Post => (POST_FROM_PRE_FIELD, PRE_FROM_POST_FIELD),
+            WarpTo::Pre => (PRE_FROM_POST_FIELD, POST_FROM_PRE_FIELD),
+            WarpTo::Deformed | WarpTo::Mni => (SHIFT, SHIFT_BACK),
+        };
+        let family = if part == Part::Points { points } else { images };
+        let file = family.of(&state);
+        let (field, sd, believed) = if case.path(&file).exists() {
+            let (sd, mask) = (SHIFT_SD.of(&state), SHIFT_MASK.of(&state));
+            let options = ReadOptions::default();
+            let sd = if part == Part::Points {
+                Some(nifti::decode_intensities(&case.read(&sd)?, &sd, &options)?)
+            } else {
+                None
+            };
+            let (mask, _) = nifti::decode_labels(&case.read(&mask)?, &mask, &options)?;
+            (decode_displacement(&case.read(&file)?, &file)?, sd, mask.map(|l| l > 0))
+        } else {
+            computed(case, &state, family, to)?
+        };
+        let (taken, _) = nifti::decode_labels(&case.read(NATIVE_RESECTED)?, NATIVE_RESECTED, &ReadOptions::default())?;
+        let rigid = match to {
+            WarpTo::Post => pre_from_post.inverse().to_matrix(),
+            WarpTo::Pre => pre_from_post.to_matrix(),
+            WarpTo::Deformed | WarpTo::Mni => nalgebra::Matrix4::identity(),
+        };
+        let grid: Grid<Native> = match to {
+            WarpTo::Post => grid_of::<Post>(case, POST_NATIVE_BRAIN)?.relabelled(),
+            _ => grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?.relabelled(),
+        };
+        let (forward, back) = if part == Part::Points { (Some(field), None) } else { (None, Some(field)) };
+        let map = Self {
+            forward,
+            back,
+            rigid: AffineTransform::from_matrix(&rigid),
+            sd,
+            believed: Some(believed),
+            resected: Some(taken.map(|l| l > 0)),
+            backwards: to == WarpTo::Pre,
+            grid: Some(grid),
+        };
+        Ok((map, state))
+    }
+
+    fn still() -> Self {
+        Self {
+            forward: None,
+            back: None,
+            rigid: AffineTransform::identity(),
+            sd: None,
+            believed: None,
+            resected: None,
+            backwards: false,
+            grid: None,
+        }
+    }
+
+    /// Carries a point (mm).
+    pub fn carry(&self, x_mm: [f64; 3]) -> Carried {
+        let x = Position::new(x_mm[0], x_mm[1], x_mm[2]);
+        let rigid: [f64; 3] = self.rigid.apply(x).mm.into();
+        let Some(field) = &self.forward else {
+            return Carried { mm: rigid, sd_mm: None, state: PointState::Tissue };
+        };
+        let Some(mm) = carried(field, x_mm) else {
+            return Carried { mm: rigid, sd_mm: None, state: PointState::Outside };
+        };
+        let at_rest = if self.backwards { Position::new(mm[0], mm[1], mm[2]) } else { x };
+        let is = |mask: &Option<Mask<Native>>| mask.as_ref().map(|mask| mask.nearest(at_rest) == Some(true));
+        if is(&self.resected) == Some(true) {
+            return Carried { mm: rigid, sd_mm: None, state: PointState::Removed };
+        }
+        let still = (0..3).all(|a| (mm[a] - rigid[a]).abs() < 2e-3);
+        let state = match is(&self.believed) {
+            Some(true) | None => PointState::Tissue,
+            Some(false) if still => PointState::Outside,
+            Some(false) => PointState::Fluid,
+        };
+        let sd_mm = self.sd.as_ref().filter(|_| state != PointState::Outside).and_then(|sd| sd.trilinear(at_rest));
+        Carried { mm, sd_mm: sd_mm.map(f64::from), state }
+    }
+
+    /// Where the place of an image at a point (mm) was before it was carried.
+    pub fn source(&self, y: Position<Native>) -> Option<Position<Native>> {
+        match &self.back {
+            None => self.rigid.inverse().ok().map(|back| back.apply(y)),
+            Some(field) => carried(field, y.mm.into()).map(|x| Position::new(x[0], x[1], x[2])),
+        }
+    }
+
+    /// Whether the image at a point was taken: `from` where it was, `to` where it is.
+    pub fn removed(&self, from: Position<Native>, to: Position<Native>) -> bool {
+        let at_rest = if self.backwards { to } else { from };
+        self.resected.as_ref().is_some_and(|mask| mask.nearest(at_rest) == Some(true))
+    }
+}
+
+/// The state that is meant: the one named, else the estimate, else the model that the fields were made with.
+fn named(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
+    let missing =
+        |file: String| CaseError::Missing { folder: case.folder().to_path_buf(), file, subject: case.subject() };
+    if let Some(state) = state {
+        return Ok(state.to_owned());
+    }
+    if case.path(ESTIMATE_STATE).exists() {
+        return Ok(ESTIMATE.to_owned());
+    }
+    let model = brain_shift(case)?.and_then(|shift| shift.model);
+    Ok(model.ok_or_else(|| missing(ESTIMATE_STATE.to_owned()))?)
+}
+
+/// Displacement, standard deviation and mask.
+type Known = (Volume<[f32; 3], Native>, Option<Volume<f32, Native>>, Mask<Native>);
+
+/// A state whose fields are not kept in the folder.
+fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo) -> Result<Known, WorkflowError> {
+    let settings = Settings::resolve([&case.settings()?])?;
+    let own = !matches!(state, FUSED | OBSERVED);
+    let model = if own { Some(state.to_owned()) } else { brain_shift(case)?.and_then(|shift| shift.model) };
+    let samples = super::plan::samples(&settings, Subject::Patient)?;
+    let samples =
+        samples.into_iter().map(|s| s.id).filter(|id| case.path(&crate::layout::SAMPLE_STATE.of(id)).exists());
+    let believed_mm = settings.estimate.displacement.depth_mm;
+    let of_case = CaseShift::read(case, model.as_deref(), samples.collect(), (&settings.fields, believed_mm))?;
+    let field: ShiftField = of_case.state(state)?;
+    let vectors = if family == PRE_FROM_POST_FIELD {
+        let value = field.to_pre(&of_case.post_grid, &of_case.post_from_pre.inverse());
+        native(Volume::from_fn(of_case.post_grid, value))
+    } else if family == POST_FROM_PRE_FIELD {
+        native(Volume::from_fn(field.whole, field.to_post(&of_case.post_from_pre)))
+    } else if to == WarpTo::Deformed && family == SHIFT {
+        native(Volume::from_fn(field.whole, |n| field.forward_at(n)))
+    } else {
+        native(Volume::from_fn(field.whole, |n| field.inverse_at(n)))
+    };
+    let sd = native(field.on_whole(&field.sd_mm, 0.0));
+    Ok((vectors, Some(sd), native(field.on_whole(&field.believed, false))))
+}

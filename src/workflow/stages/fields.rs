@@ -1,0 +1,126 @@
+//! Stage `fields`: the brain shift as displacement fields of the scans, and the pre-operative images carried by it.
+
+use super::shift::{CaseShift, FUSED, OBSERVED};
+use crate::artefact::{Manifest, Produced};
+use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
+use crate::geometry::{Frame, Position, Pre};
+use crate::image::nifti::{
+    self, ReadOptions, encode_displacement, encode_f32, encode_intensities, encode_mask, encode_u8,
+};
+use crate::image::{Grid, Mask, Volume};
+use crate::layout::{
+    NATIVE_RESECTED, POST_FROM_PRE_FIELD, PRE_FROM_POST_FIELD, PRE_NATIVE_LABELS, PRE_NATIVE_T1, SHIFT, SHIFT_BACK,
+    SHIFT_JSON, SHIFT_MASK, SHIFT_REACH, SHIFT_SD, WARPED_LABELS, WARPED_T1,
+};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::stage_name::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use nalgebra::Point3;
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Fields;
+
+/// What the fields are made from.
+#[derive(Debug)]
+pub(crate) struct FieldsInput<'a> {
+    /// The state of the model, where one converged.
+    pub model: Option<String>,
+    /// Manifests of the samples.
+    pub samples: &'a [Manifest],
+}
+
+/// Writes (or skips) the fields of every state that is asked for.
+pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) -> Result<BrainShift, WorkflowError> {
+    let settings = &work.settings.fields;
+    let believed_mm = work.settings.estimate.displacement.depth_mm;
+    let posed = serde_json::json!({ "fields": settings, "model": input.model, "believed_mm": believed_mm });
+    let mut stage = work.stage(made, &NAME, VERSION, &posed).frame(Pre::NAME);
+    if let Some(estimate) = made.get(&StageName::Estimate) {
+        stage = stage.after(estimate);
+    }
+    let stage = input.samples.iter().fold(stage, crate::artefact::Stage::after);
+    work.run(made, &NAME, &stage, || {
+        work.tell(|p| p.begin("fields", 1 + settings.states.len()));
+        let ids = input.samples.iter().filter_map(|m| match StageName::parse(&m.stage) {
+            Some(StageName::Sample(id)) if !m.outputs.is_empty() => Some(id),
+            _ => None,
+        });
+        let case = CaseShift::read(&work.case, input.model.as_deref(), ids.collect(), (settings, believed_mm))?;
+        let mut produced = Produced::default();
+        let mut shift = BrainShift {
+            model: input.model.clone(),
+            explained: case.explained(),
+            discrepancy: case.discrepancy(),
+            ..BrainShift::default()
+        };
+        for source in &settings.states {
+            let state = match (source, &input.model) {
+                (Source::Model, Some(model)) => model.as_str(),
+                (Source::Fused, Some(_)) => FUSED,
+                (Source::Observed, _) => OBSERVED,
+                (Source::Model | Source::Fused, None) => continue,
+            };
+            work.tell(|p| p.doing(state));
+            let field = case.state(state)?;
+            shift.states.push(StateShift::of(state, &field));
+            files(state, &field, &case, &mut produced);
+            if *source == Source::Model {
+                carried(work, &field, &mut produced)?;
+            }
+            work.tell(|p| p.step());
+        }
+        for state in shift.states.iter().filter(|state| state.smoothed_voxels > 0) {
+            produced.warnings.push(format!(
+                "{}: tissue folds over at {} voxels; the displacement field is smoothed there and not believed",
+                state.state, state.smoothed_voxels
+            ));
+        }
+        let json = serde_json::to_string_pretty(&shift).expect("figures are plain data") + "\n";
+        produced.files.push((SHIFT_JSON.to_owned(), json.into_bytes()));
+        produced.facts = facts(&shift);
+        work.tell(|p| p.end());
+        Ok(produced)
+    })
+}
+
+/// The files of one state.
+fn files(state: &str, field: &ShiftField, case: &CaseShift<'_>, produced: &mut Produced) {
+    let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
+    write(SHIFT.of(state), encode_displacement(&field.whole, |n| field.forward_at(n)));
+    write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |n| field.inverse_at(n)));
+    write(POST_FROM_PRE_FIELD.of(state), encode_displacement(&field.whole, field.to_post(&case.post_from_pre)));
+    let to_pre = field.to_pre(&case.post_grid, &case.post_from_pre.inverse());
+    write(PRE_FROM_POST_FIELD.of(state), encode_displacement(&case.post_grid, to_pre));
+    write(SHIFT_SD.of(state), encode_f32(&field.on_whole(&field.sd_mm, 0.0)));
+    write(SHIFT_REACH.of(state), encode_f32(&field.on_whole(&field.reach95_mm, 0.0)));
+    write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+}
+
+/// The pre-operative scan and its labels carried to the deformed state, on the scan's own grid.
+fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produced) -> Result<(), WorkflowError> {
+    let options = ReadOptions::default();
+    let t1: Volume<f32, Pre> =
+        nifti::decode(&work.case.read(PRE_NATIVE_T1)?, PRE_NATIVE_T1, &options)?.volume.relabelled();
+    let (labels, _) = nifti::decode_labels(&work.case.read(PRE_NATIVE_LABELS)?, PRE_NATIVE_LABELS, &options)?;
+    let labels: Volume<f32, Pre> = labels.relabelled::<Pre>().map(f32::from);
+    let (taken, _) = nifti::decode_labels(&work.case.read(NATIVE_RESECTED)?, NATIVE_RESECTED, &options)?;
+    let taken: Mask<Pre> = taken.relabelled::<Pre>().map(|l| l > 0);
+    let grid = t1.grid;
+    let back = |n: usize| Some(moved_back(field, &grid, n));
+    // As whole as the scan: between whole numbers there is nothing to be known.
+    let whole = t1.data.iter().all(|x| *x == x.round());
+    let t1 = seen_through(&t1, &grid, back, Some(&taken), Between::Intensities);
+    let t1 = if whole { t1.map(f32::round) } else { t1 };
+    let labels = seen_through(&labels, &grid, back, Some(&taken), Between::Labels);
+    produced.files.push((WARPED_T1.to_owned(), encode_intensities(&t1)));
+    produced.files.push((WARPED_LABELS.to_owned(), encode_u8(&labels.map(|l| l as u8))));
+    Ok(())
+}
+
+/// Where the tissue at a voxel came from.
+fn moved_back(field: &ShiftField, grid: &Grid<Pre>, n: usize) -> Position<Pre> {
+    let y = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+    let d = at(&field.inverse, y).unwrap_or_default();
+    Position::new(y.mm.x + d[0], y.mm.y + d[1], y.mm.z + d[2])
+}
