@@ -78,8 +78,26 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
         best.verdict = Verdict::new(Finding::CannotTell, best.verdict.explained_share, moduli, reasons);
         best.limits = best.verdict.because();
     }
+    if best.verdict.finding == Finding::NoShift {
+        // A bound that not every model gives is none.
+        let bound = |(tissue, _): &(String, Claim)| {
+            let of = |(_, m): &(String, EstimateOutcome)| above(&m.verdict, tissue);
+            let weakest = models.iter().map(of).reduce(|a, b| Some(a?.min(b?))).flatten();
+            (tissue.clone(), weakest.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa }))
+        };
+        let moduli = best.verdict.moduli.iter().map(bound).collect();
+        best.verdict = Verdict::new(Finding::NoShift, best.verdict.explained_share, moduli, best.verdict.reasons);
+    }
     let comparison = Comparison { candidates, log_odds, verdict: best.verdict.clone() };
     Some((comparison, best))
+}
+
+/// The bound that a verdict gives of a tissue, Pa.
+fn above(verdict: &Verdict, tissue: &str) -> Option<f64> {
+    verdict.moduli.iter().find(|(name, _)| name == tissue).and_then(|(_, claim)| match claim {
+        Claim::Above { bound_pa } => Some(*bound_pa),
+        _ => None,
+    })
 }
 
 /// The tissues of an estimate with their place among its parameters.

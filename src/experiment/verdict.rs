@@ -269,10 +269,13 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
     match finding {
         Finding::NoShift if bounds.is_empty() => format!("No shift seen: {first}. No stiffness is claimed."),
         Finding::NoShift => format!("No shift seen: {first}. With the load as assumed, {bounds}."),
-        Finding::Unexplained => format!("The model does not explain the shift: {first}. No stiffness is claimed."),
-        Finding::Conflict => format!(
-            "The shift contradicts what is known: {first}. The load or the supports are not as assumed; no stiffness is \
+        Finding::Unexplained => format!(
+            "The model does not explain the shift: {first}. The load or the supports may not be as assumed; no stiffness is \
              claimed."
+        ),
+        Finding::Conflict => format!(
+            "Conflict: the shift contradicts what is known: {first}. The load or the supports are not as assumed; no \
+             stiffness is claimed."
         ),
         Finding::CannotTell => format!("Cannot tell: {first}. Averaged over them: {intervals}."),
         Finding::PriorDominated => format!(

@@ -152,21 +152,19 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
     let mut mesh_log_sd = Vec::new();
     if let (Some(coarse), Some(found)) = (problem.coarser, &fitted.correlated) {
-        let mut coarse_body = Body::new(
-            coarse,
-            problem.template,
-            unknown.clone(),
-            problem.poisson_ratio,
-            Observation::Nodes(Vec::new()),
-        )?;
-        let there = coarse_body.solve(&fitted.descent.log_parameters)?.outcome.displacement_mm;
-        let there = at_places(coarse, &there, &found.places_mm);
-        let change =
-            |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
-        let made = found.made_up_by(change, prior.len());
-        let left = left_of_difference(problem.mesh, coarse);
-        mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
-        model_error.clone_from(&mesh_log_sd);
+        let nothing = Observation::Nodes(Vec::new());
+        let there = Body::new(coarse, problem.template, unknown.clone(), problem.poisson_ratio, nothing)
+            .and_then(|mut body| body.solve(&fitted.descent.log_parameters));
+        // A coarse mesh without an equilibrium says nothing of the finer one: then what is expected of meshes stands.
+        if let Ok(there) = there {
+            let there = at_places(coarse, &there.outcome.displacement_mm, &found.places_mm);
+            let change =
+                |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
+            let made = found.made_up_by(change, prior.len());
+            let left = left_of_difference(problem.mesh, coarse);
+            mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
+            model_error.clone_from(&mesh_log_sd);
+        }
     }
     let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
     let posed = Posed {
@@ -322,7 +320,10 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
             let (log_odds, would_be_seen_mm) = (found.odds.moved_to_still, found.shift.would_be_seen_mm);
             still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
         }
-        let (discrepancy_mm, noise_mm) = (found.unexplained.discrepancy.sd_mm, found.measured_noise.sd_mm);
+        // Noise that had to grow is as unexplained as a discrepancy is.
+        let (unexplained_by, noise_mm) = (found.unexplained, found.measured_noise.sd_mm);
+        let left_mm = unexplained_by.noise.sd_mm.hypot(unexplained_by.discrepancy.sd_mm);
+        let discrepancy_mm = (left_mm * left_mm - noise_mm * noise_mm).max(0.0).sqrt();
         let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
         // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
         if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
@@ -348,10 +349,10 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
     let dominated = named().all(|(n, _)| posterior.identifiability.verdicts[n] != super::Knowledge::Identified);
     let finding = if still.is_some() {
         Finding::NoShift
-    } else if !unexplained.is_empty() {
-        Finding::Unexplained
     } else if !conflict.is_empty() {
         Finding::Conflict
+    } else if !unexplained.is_empty() {
+        Finding::Unexplained
     } else if dominated {
         Finding::PriorDominated
     } else if wider.is_some() {
@@ -371,7 +372,7 @@ fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, 
         _ => Claim::Withheld,
     };
     let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
-    let mut reasons: Vec<Reason> = still.into_iter().chain(unexplained).chain(conflict).chain(wider).collect();
+    let mut reasons: Vec<Reason> = still.into_iter().chain(conflict).chain(unexplained).chain(wider).collect();
     if finding.has_stiffness() {
         let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != super::Knowledge::Identified);
         reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
