@@ -106,7 +106,7 @@ fn whole_brain(labels: &LabelMap<Mni>) -> Mask<Mni> {
 /// [`RegisterError`].
 pub fn pose_of_labels<F: Frame>(labels: &LabelMap<F>) -> Result<RigidFit<F, Mni>, RegisterError> {
     let head = drawn_head();
-    register_to_mean_head(&drawn(labels), &MeanHead { t1: &head, brain: &atlas::mean_head().brain })
+    register_to_mean_head(&drawn(labels), &MeanHead { t1: &head, brain: &atlas::mean_head().brain, bare: &head })
 }
 
 /// The template fitted to a label map: its tissues drawn with the template's own intensities, so that the scan's contrast
@@ -119,7 +119,7 @@ pub fn fit_template_to_labels(
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<Mni>, DeformableError> {
     let (subject, head) = (drawn(labels_mni), drawn_head());
-    let mean = MeanHead { t1: &head, brain: &atlas::mean_head().brain };
+    let mean = MeanHead { t1: &head, brain: &atlas::mean_head().brain, bare: &head };
     let start = atlas::head_from_template().then(&subject_from_mean_head(&subject, &mean, None));
     fit_atlas(&subject, &atlas::template().t1_f32(), &start, None, settings)
 }
