@@ -18,6 +18,7 @@ pub enum Observed {
 /// How the estimate is posed; the table `[estimate]` of the settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[allow(clippy::struct_excessive_bools, reason = "independent switches of a table of settings")]
 pub struct EstimateOptions {
     /// The descent; its noise is the noise floor's where that is known.
     pub descent: EstimateSettings,

@@ -259,7 +259,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
         let tissues = plan::tissues(work.settings, work.subject);
         let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
-        let input = EstimateInput { shift, coarser, held, ..self.asked(&tissues) };
+        let input = EstimateInput { coarser, held, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }
 

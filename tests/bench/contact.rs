@@ -2,9 +2,9 @@
 //! that the template's labels give.
 
 use super::bar::{Bar, cpu_seconds, data};
-use hgm::experiment::resection::ResectionSettings;
+use hgm::experiment::resection::{ResectionSettings, Supports};
 use hgm::experiment::supports::{SkullSettings, with_sliding_sets};
-use hgm::fem::{FemError, Outcome, Scenario, Support, simulate};
+use hgm::fem::{FemError, Outcome, Scenario, simulate};
 use hgm::geometry::{Mni, SmoothField};
 use hgm::image::LabelMap;
 use hgm::image::nifti::{ReadOptions, decode};
@@ -151,7 +151,7 @@ fn bytes(small: &TetMesh, settings: &ResectionSettings, field: &Arc<SmoothField>
 /// Every bar of contact on brain meshes.
 pub fn bars() -> Vec<Bar> {
     let mut settings =
-        ResectionSettings { supports: Support::Sliding, density_kg_per_m3: 1000.0, ..Default::default() };
+        ResectionSettings { supports: Supports::Sliding, density_kg_per_m3: 1000.0, ..Default::default() };
     settings.skull.gap_mm = 0.8;
     let Some(folder) = data().map(|folder| folder.join("meshes")) else {
         println!(

@@ -93,6 +93,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("bids participant", &[&bids, &CHEAP[..]].concat());
     prints("bids group", &["bids", &study, &out, "group"]);
     prints("estimate", &["estimate", &case]);
+    prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
     prints(
         "mesh",

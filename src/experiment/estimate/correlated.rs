@@ -3,17 +3,14 @@
 
 use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
-use super::mesh_error::made_up_by;
-use super::outcome::{Fitted, ROUGH, differences};
+use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::process::{Factor, Process, spread_out};
 use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
-use super::{Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, ProblemError, estimate, information};
+use super::{Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, estimate, information};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::verdict::CONTRADICTION_SD;
 use nalgebra::{DMatrix, DVector};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// What is known of the errors of displacements beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,69 +21,6 @@ pub struct CorrelatedErrors {
     pub rigid_mm: f64,
     /// Most places that are looked at: they are chosen evenly, and what lies between them says the same.
     pub places: usize,
-}
-
-/// How probable the model is beside simpler explanations: natural logarithms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Odds {
-    /// Evidence of the model with its discrepancy.
-    pub log_evidence: f64,
-    /// Evidence of the model were it exact.
-    pub log_evidence_exact: f64,
-    /// Odds of the model against a smooth movement of any kind.
-    pub model_to_any_movement: f64,
-    /// Odds of movement (the model's or any) against none.
-    pub moved_to_still: f64,
-}
-
-/// Whether anything has moved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Shift {
-    /// Movement is more probable than stillness by more than [`super::STRONG`].
-    pub seen: bool,
-    /// Root mean square of the displacement seen, rigid remainder taken away, mm.
-    pub seen_rms_mm: f64,
-    /// Share of it that the model explains.
-    pub explained_share: f64,
-    /// The shift, at its largest place, that would have been seen (three standard deviations of its size), mm.
-    pub would_be_seen_mm: f64,
-    /// Largest size (95 %, one-sided) of what the prior's most probable body would do under the load, as a share of it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub largest_share: Option<f64>,
-}
-
-/// Everything that the fit says beside the parameters.
-pub struct Findings {
-    /// Noise and discrepancy.
-    pub unexplained: Unexplained,
-    /// The noise as it was measured.
-    pub measured_noise: Process,
-    /// Model, any movement, none.
-    pub odds: Odds,
-    /// Size of the rigid remainder, mm.
-    pub rigid_remainder_mm: f64,
-    /// The shift.
-    pub shift: Shift,
-    /// The places that were looked at, mm, and their nodes.
-    pub places_mm: Vec<[f64; 3]>,
-    /// Their nodes.
-    pub nodes: Vec<u32>,
-    factor: Factor,
-    /// The Jacobian through the factor, and the prior's inverse covariance, rigid remainder included.
-    white_jacobian: DMatrix<f64>,
-    precision: DMatrix<f64>,
-}
-
-impl Findings {
-    /// The change of the first `own` parameters that makes up for a change (mm) of the model at the places, row by row.
-    pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Vec<f64> {
-        let rows = 3 * self.nodes.len();
-        let change = DMatrix::from_fn(rows, 1, |row, _| change_mm(row));
-        let white = self.factor.whiten(&change).column(0).into_owned();
-        made_up_by(&self.white_jacobian, &self.precision, &white, own)
-    }
 }
 
 /// One-sided 95 % of a Gaussian.
@@ -134,7 +68,7 @@ impl Fit<'_, '_> {
             residuals_mm: &at.linearisation.residuals_mm,
             jacobian_mm: &at.linearisation.jacobian_mm,
             away: DVector::from_iterator(self.prior.len(), away),
-            precision: super::precision(&self.prior),
+            precision: super::joint_precision(&self.prior),
         }
     }
 }
@@ -284,7 +218,7 @@ impl Fit<'_, '_> {
         let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
         Ok(Findings {
             white_jacobian: factor.whiten(&descent.linearisation.jacobian_mm),
-            precision: super::precision(&self.prior),
+            precision: super::joint_precision(&self.prior),
             factor,
             places_mm: self.places_mm.clone(),
             nodes: seen.iter().map(|(n, _)| *n).collect(),

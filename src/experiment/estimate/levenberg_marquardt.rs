@@ -137,7 +137,7 @@ pub fn estimate<M: Forward>(
     settings: &EstimateSettings,
 ) -> Result<Descent, EstimateError> {
     let weight = settings.noise_mm.powi(-2);
-    let precision = super::precision(prior);
+    let precision = super::joint_precision(prior);
     let mean = DVector::from_iterator(prior.len(), prior.iter().map(|p| p.mean));
     let cost = |theta: &DVector<f64>, r: &DVector<f64>| {
         let away = theta - &mean;

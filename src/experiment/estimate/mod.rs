@@ -8,6 +8,7 @@ mod body;
 mod correlated;
 mod displacement;
 mod evidence;
+mod findings;
 mod levenberg_marquardt;
 mod mesh_error;
 mod outcome;
@@ -17,18 +18,18 @@ mod re_registration;
 mod rigid_remainder;
 
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};
-pub use correlated::{CorrelatedErrors, Odds, Shift};
+pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
 pub use evidence::{Evidence, NOISE_LOG_SD, STRONG, Unexplained, weights};
+pub use findings::{Odds, ProblemError, Shift};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
-pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, ProblemError, solve_problem};
-pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, laplace};
+pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, solve_problem};
+pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace};
 pub use process::Process;
 pub use re_registration::{Instrument, ReRegistration, moved_by};
 
-use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,56 +82,5 @@ impl LogPrior {
     /// 1 / sd^2, zero without prior knowledge.
     pub fn precision(&self) -> f64 {
         self.sd.map_or(0.0, |sd| 1.0 / (sd * sd))
-    }
-}
-
-/// The inverse of the joint covariance of these priors; rows of no prior knowledge are zero.
-pub fn precision(prior: &[LogPrior]) -> DMatrix<f64> {
-    let n = prior.len();
-    if prior.iter().all(|p| p.correlation.is_empty()) {
-        return DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(LogPrior::precision)));
-    }
-    let known: Vec<usize> = (0..n).filter(|&p| prior[p].sd.is_some()).collect();
-    let sd = |p: usize| prior[p].sd.unwrap_or(0.0);
-    let correlation = |a: usize, b: usize| match a.cmp(&b) {
-        std::cmp::Ordering::Equal => 1.0,
-        std::cmp::Ordering::Greater => prior[a].correlation.get(a - b - 1).copied().unwrap_or(0.0),
-        std::cmp::Ordering::Less => prior[b].correlation.get(b - a - 1).copied().unwrap_or(0.0),
-    };
-    let covariance = DMatrix::from_fn(known.len(), known.len(), |r, c| {
-        correlation(known[r], known[c]) * sd(known[r]) * sd(known[c])
-    });
-    let inverse = posterior::invert(&covariance);
-    let mut precision = DMatrix::zeros(n, n);
-    for (r, &p) in known.iter().enumerate() {
-        for (c, &q) in known.iter().enumerate() {
-            precision[(p, q)] = inverse[(r, c)];
-        }
-    }
-    precision
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn correlated_priors_have_the_inverse_of_their_covariance_as_precision() {
-        let prior = |sd: Option<f64>, correlation: Vec<f64>| LogPrior {
-            name: String::new(),
-            mean: 0.0,
-            sd,
-            scale: Scale::Plain,
-            correlation,
-        };
-        let found = precision(&[prior(Some(0.5), vec![]), prior(Some(2.0), vec![0.6]), prior(None, vec![])]);
-        let covariance = nalgebra::Matrix2::new(0.25, 0.6, 0.6, 4.0);
-        let expected = covariance.try_inverse().unwrap();
-        for r in 0..2 {
-            for c in 0..2 {
-                assert!((found[(r, c)] - expected[(r, c)]).abs() < 1e-12);
-            }
-        }
-        assert_eq!(found[(2, 2)], 0.0);
     }
 }

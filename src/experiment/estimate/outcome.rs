@@ -1,27 +1,21 @@
 //! From a posed problem to the estimate that is reported.
 
-use super::body::{Body, BodyError, Observation, Solved, Unknown};
-use super::correlated::{self, CorrelatedErrors, Odds, Shift};
+use super::body::{Body, Observation, Solved, Unknown};
+use super::correlated::{self, CorrelatedErrors};
 use super::evidence::Unexplained;
+use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
-use super::{
-    Convergence, Descent, EstimateError, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace,
-};
+use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
 use crate::fem::{Outcome, Scenario};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
-use crate::register::deformable::DeformableError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use thiserror::Error;
-
-/// Where a descent may end that another follows, in standard deviations of the posterior.
-pub(super) const ROUGH: f64 = 0.1;
 
 /// What is known of the errors of what was observed.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,40 +124,6 @@ pub struct Estimate {
     pub materials: BTreeMap<String, Material>,
 }
 
-/// Why there is no estimate.
-#[derive(Debug, Error)]
-pub enum ProblemError {
-    /// The scenario or mesh is refused, or the last state cannot be solved.
-    #[error(transparent)]
-    Body(#[from] BodyError),
-    /// The descent cannot start.
-    #[error(transparent)]
-    Estimate(#[from] EstimateError),
-    /// The estimate's state cannot be registered.
-    #[error("the estimate's state, registered like the post-operative scan: {0}")]
-    Instrument(#[from] DeformableError),
-}
-
-/// What a fit has found, whatever the errors are taken to be.
-pub(super) struct Fitted {
-    /// The minimum, of the problem's own parameters.
-    pub descent: Descent,
-    /// What the data alone say there.
-    pub fisher: nalgebra::DMatrix<f64>,
-    /// Standard deviation of one observation, mm.
-    pub noise_mm: f64,
-    /// How many observations count as independent.
-    pub independent: f64,
-    /// Root mean square of the residuals, mm.
-    pub residual_rms_mm: f64,
-    /// Observations.
-    pub observations: usize,
-    /// What was taken out of one observation, mm.
-    pub taken_out_rms_mm: Option<f64>,
-    /// What correlated errors say.
-    pub correlated: Option<correlated::Findings>,
-}
-
 /// Finds the most probable parameters and how sure they are.
 ///
 /// # Errors
@@ -206,7 +166,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         let made = found.made_up_by(change, prior.len());
         let left = left_of_difference(problem.mesh, coarse);
         mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
-        model_error = mesh_log_sd.clone();
+        model_error.clone_from(&mesh_log_sd);
     }
     let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
     let posed = Posed {
@@ -307,11 +267,6 @@ fn fit_independent(
         correlated: None,
         descent,
     })
-}
-
-/// Component by component, mm.
-pub(super) fn differences(seen: &[(u32, [f64; 3])], corrected: &[(u32, [f64; 3])]) -> Vec<f64> {
-    seen.iter().zip(corrected).flat_map(|((_, s), (_, c))| (0..3).map(move |a| s[a] - c[a])).collect()
 }
 
 /// Standard deviation and 95 % reach of every node by linear propagation of the posterior.
@@ -439,6 +394,7 @@ mod tests {
     use crate::experiment::sweep::scenario_of;
     use crate::fem::simulate;
     use crate::material::meta_model::MetaModel;
+    use crate::register::deformable::DeformableError;
 
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {

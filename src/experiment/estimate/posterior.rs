@@ -72,10 +72,36 @@ pub fn information(jacobian: &DMatrix<f64>, own: usize, others: &[f64]) -> DMatr
     ours - cross.transpose() * invert(&theirs) * cross
 }
 
+/// The inverse of the joint covariance of these priors; rows of no prior knowledge are zero.
+pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
+    let n = prior.len();
+    if prior.iter().all(|p| p.correlation.is_empty()) {
+        return DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(LogPrior::precision)));
+    }
+    let known: Vec<usize> = (0..n).filter(|&p| prior[p].sd.is_some()).collect();
+    let sd = |p: usize| prior[p].sd.unwrap_or(0.0);
+    let correlation = |a: usize, b: usize| match a.cmp(&b) {
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => prior[a].correlation.get(a - b - 1).copied().unwrap_or(0.0),
+        std::cmp::Ordering::Less => prior[b].correlation.get(b - a - 1).copied().unwrap_or(0.0),
+    };
+    let covariance = DMatrix::from_fn(known.len(), known.len(), |r, c| {
+        correlation(known[r], known[c]) * sd(known[r]) * sd(known[c])
+    });
+    let inverse = invert(&covariance);
+    let mut precision = DMatrix::zeros(n, n);
+    for (r, &p) in known.iter().enumerate() {
+        for (c, &q) in known.iter().enumerate() {
+            precision[(p, q)] = inverse[(r, c)];
+        }
+    }
+    precision
+}
+
 /// The Laplace posterior at a minimum; `fisher` is what the data alone say there ([`information`]).
 pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
     let n = prior.len();
-    let precision = super::precision(prior);
+    let precision = joint_precision(prior);
     let covariance = invert(&(fisher + &precision));
     let data_only = invert(fisher);
 
@@ -216,5 +242,25 @@ mod tests {
     fn withheld_figures_are_none_that_the_data_had_narrowed() {
         let posterior = of(DMatrix::from_element(25, 1, 2.0), &[prior(Some(1.0))]).withheld();
         assert_eq!(posterior.identifiability.verdicts, [Knowledge::Withheld]);
+    }
+
+    #[test]
+    fn correlated_priors_have_the_inverse_of_their_covariance_as_precision() {
+        let prior = |sd: Option<f64>, correlation: Vec<f64>| LogPrior {
+            name: String::new(),
+            mean: 0.0,
+            sd,
+            scale: Scale::Plain,
+            correlation,
+        };
+        let found = joint_precision(&[prior(Some(0.5), vec![]), prior(Some(2.0), vec![0.6]), prior(None, vec![])]);
+        let covariance = nalgebra::Matrix2::new(0.25, 0.6, 0.6, 4.0);
+        let expected = covariance.try_inverse().unwrap();
+        for r in 0..2 {
+            for c in 0..2 {
+                assert!((found[(r, c)] - expected[(r, c)]).abs() < 1e-12);
+            }
+        }
+        assert_eq!(found[(2, 2)], 0.0);
     }
 }

@@ -178,7 +178,7 @@ pub(crate) fn estimate(
             (0, Some(error)) => return Err(error),
             (0, None) => return Err(WorkflowError::NoEvidence),
             (1, None) => (models.remove(0), None),
-            _ => chosen(models)?,
+            _ => chosen(models),
         };
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
@@ -189,16 +189,16 @@ pub(crate) fn estimate(
 }
 
 /// The most probable model with the verdict over all of them.
-fn chosen(mut models: Vec<(String, Estimate)>) -> Result<((String, Estimate), Option<Comparison>), WorkflowError> {
+fn chosen(mut models: Vec<(String, Estimate)>) -> ((String, Estimate), Option<Comparison>) {
     let outcomes = models.iter().map(|(name, found)| (name.clone(), found.outcome.clone())).collect();
     let Some((comparison, outcome)) = compare(outcomes) else {
         // Errors that are not correlated give no evidence: the first of the family stands.
-        return Ok((models.remove(0), None));
+        return (models.remove(0), None);
     };
     let best = comparison.candidates.first().map(|c| c.name.clone()).unwrap_or_default();
     let place = models.iter().position(|(name, _)| *name == best).unwrap_or(0);
     let (name, found) = models.swap_remove(place);
-    Ok(((name, Estimate { outcome, ..found }), Some(comparison)))
+    ((name, Estimate { outcome, ..found }), Some(comparison))
 }
 
 /// The bodies that are tried, with what is observed of all of them.
