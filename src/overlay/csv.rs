@@ -1,6 +1,6 @@
 //! Points as a table: columns `x`, `y`, `z` (mm, RAS+), or the first three columns of numbers.
 
-use super::{Carried, Drawing, Kept, OverlayError, damaged, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, written};
 
 /// The table as it was, and where its coordinates stand.
 #[derive(Clone, Debug)]
@@ -54,12 +54,12 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let label = label.or_else(|| header.is_none().then(|| (0..first.len()).find(|c| !is_number(&first[*c]))).flatten());
     let names =
         rows.iter().enumerate().map(|(n, row)| label.map_or_else(|| (n + 1).to_string(), |c| row[c].clone())).collect();
-    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Kept::Csv(Table { header, rows, columns }) })
+    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Table { header, rows, columns }) })
 }
 
-impl Table {
+impl Kept for Table {
     /// The table with the points where they are now, and two columns more: `sd_mm` and `state`.
-    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
         let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
         let mut write = |row: Vec<String>| writer.write_record(row).expect("writing to memory does not fail");
         if let Some(header) = &self.header {

@@ -1,6 +1,6 @@
 //! 3D Slicer's fiducials before version 5 (`.fcsv`): a comma-separated table under comment lines that name its axes.
 
-use super::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
 
 /// The lines as they were.
 #[derive(Clone, Debug)]
@@ -34,12 +34,12 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         let label = cells.get(11).copied().filter(|label| !label.is_empty());
         names.push(label.unwrap_or(cells[0]).to_owned());
     }
-    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Kept::Fcsv(Lines { lines, lps }) })
+    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Lines { lines, lps }) })
 }
 
-impl Lines {
+impl Kept for Lines {
     /// The same lines; the column of descriptions says how sure a point is.
-    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
         let mut points = carried.iter();
         let mut text = String::new();
         for line in &self.lines {

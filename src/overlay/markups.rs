@@ -1,7 +1,7 @@
 //! 3D Slicer's markups (`.mrk.json`): point lists, lines, curves.
 
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
 use super::fcsv::said;
-use super::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
 use serde_json::{Value, json};
 
 /// The document as it was.
@@ -36,12 +36,12 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
             names.push(point["label"].as_str().map_or_else(|| (n + 1).to_string(), str::to_owned));
         }
     }
-    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Kept::Markups(Markups { document }) })
+    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Markups { document }) })
 }
 
-impl Markups {
+impl Kept for Markups {
     /// The same document; a point's description says how sure it is. Measurements, which no longer hold, are left out.
-    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
         let mut document = self.document.clone();
         let mut carried = carried.iter();
         for markup in document["markups"].as_array_mut().into_iter().flatten() {

@@ -1,6 +1,6 @@
 //! PLY, text or binary in either order: the vertices move, everything else stays.
 
-use super::{Drawing, Kept, OverlayError, damaged, says_lps, turned, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned, written};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
@@ -95,7 +95,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         }
         end
     };
-    let kept = Kept::Ply(Vertices { bytes: bytes.to_vec(), order, lps, first, end, places, row });
+    let kept = Box::new(Vertices { bytes: bytes.to_vec(), order, lps, first, end, places, row });
     Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept })
 }
 
@@ -110,8 +110,9 @@ fn number(row: &[u8], (at, size): (usize, usize), order: Order) -> f64 {
     }
 }
 
-impl Vertices {
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
+impl Kept for Vertices {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let points_mm = &places(carried);
         let mut bytes = self.bytes[..self.first].to_vec();
         if self.order == Order::Text {
             // Read as text before.

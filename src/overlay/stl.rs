@@ -1,6 +1,6 @@
 //! STL, binary or text: triangles without connection.
 
-use super::{Drawing, Kept, OverlayError, damaged, says_lps, turned};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned};
 use nalgebra::Vector3;
 
 /// Which way the axes go, and the two bytes that each triangle ends with.
@@ -41,12 +41,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     if points_mm.len() != 3 * words.len() {
         return Err(damaged(name, "the last facet", "it has not three corners"));
     }
-    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Kept::Stl(Facets { lps, words }) })
+    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Box::new(Facets { lps, words }) })
 }
 
-impl Facets {
+impl Kept for Facets {
     /// Binary; normals anew.
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let points_mm = &places(carried);
         let mut bytes = format!("binary STL, mm, SPACE={}", if self.lps { "LPS" } else { "RAS" }).into_bytes();
         bytes.resize(80, b' ');
         bytes.extend((self.words.len() as u32).to_le_bytes());

@@ -1,6 +1,6 @@
 //! GIFTI surfaces, by the format file of room `mesh`.
 
-use super::{Drawing, Kept, OverlayError, damaged};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places};
 use crate::mesh::TriMesh;
 use crate::mesh::format::gifti::{Space, decode_surface, encode_surface};
 
@@ -14,13 +14,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let prefix = format!("{name}: ");
     let said = |e: crate::mesh::format::ReadError| e.to_string().trim_start_matches(&prefix).to_owned();
     let surface = decode_surface(bytes, name).map_err(|e| damaged(name, "the surface", said(e)))?;
-    let kept = Kept::Gifti(Surface { triangles: surface.triangles });
+    let kept = Box::new(Surface { triangles: surface.triangles });
     Ok(Drawing { points_mm: surface.nodes_mm, names: Vec::new(), pairs_mm: Vec::new(), kept })
 }
 
-impl Surface {
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
-        let surface = TriMesh { nodes_mm: points_mm.to_vec(), triangles: self.triangles.clone() };
+impl Kept for Surface {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let surface = TriMesh { nodes_mm: places(carried), triangles: self.triangles.clone() };
         encode_surface(&surface, Space::Scanner, "carried")
     }
 }

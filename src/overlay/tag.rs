@@ -1,7 +1,11 @@
 //! Tag points of the MNI (`.tag`), what the ultrasound data sets keep their landmarks in: one point or a pair in a row,
 //! mm of the scanner (the first axis to the right, the second to the front, the third up).
 
-use super::{Drawing, Kept, OverlayError, damaged, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, written};
+
+/// Nothing is kept but what every drawing has.
+#[derive(Debug)]
+struct Tags;
 
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     let text = std::str::from_utf8(bytes).map_err(|_| damaged(name, "the file", "not UTF-8 text"))?;
@@ -35,15 +39,17 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
             pairs_mm.push([read[3], read[4], read[5]]);
         }
     }
-    Ok(Drawing { points_mm, names, pairs_mm, kept: Kept::Tag })
+    Ok(Drawing { points_mm, names, pairs_mm, kept: Box::new(Tags) })
 }
 
-/// One volume of points with their names.
-pub(super) fn encode(points_mm: &[[f64; 3]], names: &[String]) -> Vec<u8> {
-    let row = |(p, name): (&[f64; 3], &String)| {
-        let [x, y, z] = p.map(written);
-        format!(" {x} {y} {z} \"{}\"", name.replace('"', "'"))
-    };
-    let rows: Vec<String> = points_mm.iter().zip(names).map(row).collect();
-    format!("MNI Tag Point File\nVolumes = 1;\n\nPoints =\n{};\n", rows.join("\n")).into_bytes()
+impl Kept for Tags {
+    /// One volume of points with their names.
+    fn encode(&self, carried: &[Carried], names: &[String]) -> Vec<u8> {
+        let row = |(p, name): (&Carried, &String)| {
+            let [x, y, z] = p.mm.map(written);
+            format!(" {x} {y} {z} \"{}\"", name.replace('"', "'"))
+        };
+        let rows: Vec<String> = carried.iter().zip(names).map(row).collect();
+        format!("MNI Tag Point File\nVolumes = 1;\n\nPoints =\n{};\n", rows.join("\n")).into_bytes()
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! Source: <https://mrtrix.readthedocs.io/en/latest/getting_started/image_data.html#tracks-file-format-tck>.
 
-use super::{Drawing, Kept, OverlayError, damaged};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places};
 
 /// Points of every line, and the kind of number.
 #[derive(Clone, Debug)]
@@ -69,16 +69,17 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     if length > 0 {
         lengths.push(length);
     }
-    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Kept::Tck(Lengths { lengths, double }) })
+    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Box::new(Lengths { lengths, double }) })
 }
 
-impl Lengths {
-    pub fn count(&self) -> usize {
-        self.lengths.len()
+impl Kept for Lengths {
+    fn streamlines(&self) -> Option<usize> {
+        Some(self.lengths.len())
     }
 
     /// The same lines; nothing of the old header but the kind of number.
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let points_mm = &places(carried);
         let kind = if self.double { "Float64LE" } else { "Float32LE" };
         let head = |offset: usize| {
             format!("mrtrix tracks\ndatatype: {kind}\ncount: {}\nfile: . {offset}\nEND\n", self.lengths.len())

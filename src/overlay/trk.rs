@@ -3,7 +3,7 @@
 //!
 //! Sources: <http://trackvis.org/docs/?subsect=fileformat>, and nibabel's reading of what it leaves open.
 
-use super::{Drawing, Kept, OverlayError, damaged};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places};
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 
 const HEAD: usize = 1000;
@@ -130,16 +130,17 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     head[504..948].fill(0);
     head[988..992].copy_from_slice(&(lines.len() as i32).to_le_bytes());
     let tracks = Tracks { head, mm_from_file, scalars, lines };
-    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Kept::Trk(tracks) })
+    Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept: Box::new(tracks) })
 }
 
-impl Tracks {
-    pub fn count(&self) -> usize {
-        self.lines.len()
+impl Kept for Tracks {
+    fn streamlines(&self) -> Option<usize> {
+        Some(self.lines.len())
     }
 
     /// The same lines in the same grid's numbers.
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let points_mm = &places(carried);
         // The matrix was checked: a grid with voxels of a size.
         let file_from_mm = self.mm_from_file.try_inverse().unwrap_or_else(Matrix4::identity);
         let mut bytes = self.head.clone();

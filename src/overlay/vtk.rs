@@ -1,6 +1,6 @@
 //! VTK's legacy files (`.vtk`), text or binary: the points move, whatever hangs on them stays.
 
-use super::{Drawing, Kept, OverlayError, damaged, says_lps, turned, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned, written};
 
 /// The file with the place of its points.
 #[derive(Clone, Debug)]
@@ -72,12 +72,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let mut before = bytes[..title].to_vec();
     before.extend(format!("carried by hgm {space}\n").bytes());
     before.extend(&bytes[kind..first]);
-    let kept = Kept::Vtk(Points { before, after: bytes[end..].to_vec(), text, double, lps });
+    let kept = Box::new(Points { before, after: bytes[end..].to_vec(), text, double, lps });
     Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept })
 }
 
-impl Points {
-    pub fn encode(&self, points_mm: &[[f64; 3]]) -> Vec<u8> {
+impl Kept for Points {
+    fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
+        let points_mm = &places(carried);
         let mut bytes = self.before.clone();
         for (n, p) in points_mm.iter().enumerate() {
             let p = turned(*p, self.lps);

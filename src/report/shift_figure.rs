@@ -1,7 +1,7 @@
 //! The brain shift on a slice: seen, modelled, and what is between them, on one scale.
 
 use super::colour::ColourScale;
-use super::page::CaptionedPicture;
+use super::page::{CaptionedPicture, ShiftFigure};
 use super::picture::Picture;
 use crate::experiment::field::{at, in_tetrahedra};
 use crate::geometry::{Mni, Position};
@@ -16,15 +16,6 @@ const ARROWS_MM: usize = 10;
 const LONGER: f64 = 2.0;
 /// Share of the colour over the grey of the scan.
 const WASH: f64 = 0.6;
-
-/// Pictures of one slice with the scale of their colours.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ShiftFigure {
-    /// Seen, modelled, difference.
-    pub pictures: Vec<CaptionedPicture>,
-    /// The colours, mm.
-    pub scale: ColourScale,
-}
 
 /// The axial slice through the model's largest shift; `None` where nothing moves or nothing was seen.
 pub fn shift_figure(

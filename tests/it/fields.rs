@@ -90,7 +90,8 @@ fn points(field: &ShiftField) -> Vec<[f64; 3]> {
 }
 
 fn text(points: &[[f64; 3]]) -> String {
-    points.iter().map(|p| format!("{:.6} {:.6} {:.6}\n", p[0], p[1], p[2])).collect()
+    let row = |p: &[f64; 3]| format!("{:.6} {:.6} {:.6}", p[0], p[1], p[2]);
+    points.iter().map(row).collect::<Vec<_>>().join("\n")
 }
 
 /// What each tool makes of the points, largest distance from ours in mm, a line for each field and tool.

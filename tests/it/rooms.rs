@@ -37,13 +37,13 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("material", vec!["artefact"]),
         ("overlay", vec!["geometry", "mesh"]),
         ("fem", vec!["geometry", "mesh", "material"]),
-        ("experiment", all[..11].to_vec()),
+        ("experiment", all[..12].to_vec()),
         ("layout", vec!["geometry"]),
         (
             "report",
             vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment", "layout"],
         ),
-        ("workflow", all[..14].to_vec()),
+        ("workflow", all[..15].to_vec()),
         ("cli", all.to_vec()),
     ])
 }

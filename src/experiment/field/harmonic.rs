@@ -17,6 +17,8 @@ const SWEEPS: usize = 24;
 const COARSEST_SWEEPS: usize = 200;
 /// A level is not halved below this many voxels along an axis.
 const SMALLEST: usize = 6;
+/// Voxels that one thread does alone.
+const FEW: usize = 1 << 14;
 /// Over-relaxation of a sweep.
 const OVER: f32 = 1.5;
 
@@ -54,29 +56,32 @@ pub fn continued<const N: usize>(
         // The last sweeps without over-relaxation leave no ripples.
         let over = if sweep + 4 < sweeps { OVER } else { 1.0 };
         for colour in &colours {
-            let renewed: Vec<[f32; N]> = colour
-                .par_iter()
-                .map(|&n| {
-                    let n = n as usize;
-                    let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
-                    let (mut sum, mut total) = ([0f32; N], 0f32);
-                    for a in 0..3 {
-                        let mut add = |m: usize| {
-                            for (s, x) in sum.iter_mut().zip(&values[m]) {
-                                *s += weight[a] * x;
-                            }
-                            total += weight[a];
-                        };
-                        if v[a] > 0 {
-                            add(n - stride[a]);
+            let renew = |&n: &u32| -> [f32; N] {
+                let n = n as usize;
+                let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
+                let (mut sum, mut total) = ([0f32; N], 0f32);
+                for a in 0..3 {
+                    let mut add = |m: usize| {
+                        for (s, x) in sum.iter_mut().zip(&values[m]) {
+                            *s += weight[a] * x;
                         }
-                        if v[a] + 1 < dims[a] {
-                            add(n + stride[a]);
-                        }
+                        total += weight[a];
+                    };
+                    if v[a] > 0 {
+                        add(n - stride[a]);
                     }
-                    std::array::from_fn(|c| values[n][c] + over * (sum[c] / total - values[n][c]))
-                })
-                .collect();
+                    if v[a] + 1 < dims[a] {
+                        add(n + stride[a]);
+                    }
+                }
+                std::array::from_fn(|c| values[n][c] + over * (sum[c] / total - values[n][c]))
+            };
+            // Few are done before other threads have woken.
+            let renewed: Vec<[f32; N]> = if colour.len() < FEW {
+                colour.iter().map(renew).collect()
+            } else {
+                colour.par_iter().map(renew).collect()
+            };
             for (&n, value) in colour.iter().zip(renewed) {
                 values[n as usize] = value;
             }

@@ -1,16 +1,13 @@
 //! The brain shift: how far, where, how much of it the model explains; landmarks against it.
 
-use super::super::chart;
 use super::super::html::{fixed, number};
-use super::super::shift_figure::ShiftFigure;
-use super::pictures;
 use super::results::{Row, table, words};
 use crate::experiment::field::{BrainShift, Explained};
 use crate::experiment::landmarks::Evaluation;
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 /// The section's body.
-pub fn section(shift: &BrainShift, figure: Option<&ShiftFigure>, landmarks: Option<&Evaluation>) -> Markup {
+pub fn section(shift: &BrainShift, figure: Option<Markup>, landmarks: Option<&Evaluation>) -> Markup {
     let head = ["State", "Largest (mm)", "Median (mm)", "Median SD (mm)", "Smallest Jacobian"].map(str::to_owned);
     let row = |s: &crate::experiment::field::StateShift| -> Row {
         let figures = [s.largest_mm, s.median_mm, s.sd_median_mm, s.jacobian_min].map(|x| number(x, 3));
@@ -19,10 +16,7 @@ pub fn section(shift: &BrainShift, figure: Option<&ShiftFigure>, landmarks: Opti
     let rows: Vec<Row> = shift.states.iter().map(row).collect();
     html! {
         p class="lead" { (in_a_sentence(shift)) } "\n"
-        @if let Some(figure) = figure {
-            (pictures(&figure.pictures))
-            div class="bar-row" { (PreEscaped(chart::colour_bar(&figure.scale))) } "\n"
-        }
+        @if let Some(figure) = figure { (figure) }
         (table("Displacement of the tissue that is left", &head, &rows))
         @if let Some(d) = &shift.discrepancy {
             p {

@@ -14,7 +14,6 @@ use super::chart;
 use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
 use super::html::{png_address, without_control_characters};
-use super::shift_figure::ShiftFigure;
 use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
 use crate::experiment::landmarks::Evaluation;
@@ -46,6 +45,15 @@ pub struct ErrorMap {
     pub pictures: Vec<CaptionedPicture>,
     /// Errors of the nodes, mm, per set.
     pub errors_mm: Vec<(String, Vec<f64>)>,
+}
+
+/// The brain shift on a slice: seen, modelled, what is between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShiftFigure {
+    /// The colours of all its pictures, mm.
+    pub scale: ColourScale,
+    /// The pictures.
+    pub pictures: Vec<CaptionedPicture>,
 }
 
 /// Everything a page can show. What is absent is left out, and said so in `absent`.
@@ -200,7 +208,8 @@ impl CasePage {
         };
         let outcome = self.outcome.as_ref();
         let shift = self.brain_shift.as_ref().filter(|shift| !shift.states.is_empty());
-        let (figure, landmarks) = (self.shift_figure.as_ref(), self.landmarks.as_ref());
+        let figure = self.shift_figure.as_ref().map(shift_pictures);
+        let landmarks = self.landmarks.as_ref();
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("summary", "Summary", outcome.map(results::summary));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
@@ -300,6 +309,13 @@ pub fn title_of(kind: Option<ExperimentKind>) -> &'static str {
         Some(ExperimentKind::Phantom) => "Phantom: a known deformation, found again",
         Some(ExperimentKind::Resection) => "Brain deformation after resection",
         None => "Prepared case",
+    }
+}
+
+fn shift_pictures(figure: &ShiftFigure) -> Markup {
+    html! {
+        (pictures(&figure.pictures))
+        div class="bar-row" { (PreEscaped(chart::colour_bar(&figure.scale))) } "\n"
     }
 }
 

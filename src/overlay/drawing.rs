@@ -1,0 +1,114 @@
+//! A drawing, whatever file it came from.
+
+use std::fmt;
+use thiserror::Error;
+
+/// A drawing as read.
+#[derive(Debug)]
+pub struct Drawing {
+    /// Every position, mm, RAS+.
+    pub points_mm: Vec<[f64; 3]>,
+    /// Names of the points, where they have names.
+    pub names: Vec<String>,
+    /// The same points on a second image, where the file holds pairs.
+    pub pairs_mm: Vec<[f64; 3]>,
+    pub(super) kept: Box<dyn Kept>,
+}
+
+/// What a file holds besides positions.
+pub(super) trait Kept: fmt::Debug {
+    /// The file again with its points carried.
+    fn encode(&self, carried: &[Carried], names: &[String]) -> Vec<u8>;
+
+    /// How many lines a file of streamlines holds.
+    fn streamlines(&self) -> Option<usize> {
+        None
+    }
+}
+
+/// Where points are now, mm.
+pub(super) fn places(carried: &[Carried]) -> Vec<[f64; 3]> {
+    carried.iter().map(|c| c.mm).collect()
+}
+
+/// Where a point lies, as far as its displacement goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointState {
+    /// In tissue: moved, and believed.
+    Tissue,
+    /// In fluid or at the brain's edge: moved by the field's continuation.
+    Fluid,
+    /// In tissue that was taken: not moved by any brain shift.
+    Removed,
+    /// Beyond the field: not moved by any brain shift.
+    Outside,
+}
+
+impl fmt::Display for PointState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Tissue => "tissue",
+            Self::Fluid => "fluid",
+            Self::Removed => "removed",
+            Self::Outside => "outside",
+        })
+    }
+}
+
+/// A point after it was carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carried {
+    /// Where it is now, mm, RAS+.
+    pub mm: [f64; 3],
+    /// Standard deviation of its displacement (root of the trace of the covariance), mm, where known.
+    pub sd_mm: Option<f64>,
+    /// Where it lay.
+    pub state: PointState,
+}
+
+/// Why a drawing cannot be read.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum OverlayError {
+    #[error("{file}: no format of points, streamlines or surfaces is known by this name: {known}")]
+    Unknown { file: String, known: String },
+    #[error("{file}: {place}: {problem}")]
+    Damaged { file: String, place: String, problem: String },
+}
+
+pub(super) fn damaged(file: &str, place: impl Into<String>, problem: impl Into<String>) -> OverlayError {
+    OverlayError::Damaged { file: file.to_owned(), place: place.into(), problem: problem.into() }
+}
+
+impl Drawing {
+    /// The same drawing with its points carried, in the order they were read.
+    ///
+    /// # Panics
+    /// When there are not as many points as were read, a programming error.
+    pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+        assert_eq!(carried.len(), self.points_mm.len(), "one place for each point");
+        self.kept.encode(carried, &self.names)
+    }
+
+    /// How many lines a file of streamlines holds.
+    pub fn streamlines(&self) -> Option<usize> {
+        self.kept.streamlines()
+    }
+}
+
+/// 3D Slicer notes in a comment which way its coordinates go; without a word they are taken as RAS.
+pub(super) fn says_lps(head: &[u8]) -> bool {
+    let head = String::from_utf8_lossy(&head[..head.len().min(400)]);
+    head.contains("SPACE=LPS")
+}
+
+/// LPS to RAS and back.
+pub(super) fn turned([x, y, z]: [f64; 3], lps: bool) -> [f64; 3] {
+    if lps { [-x, -y, z] } else { [x, y, z] }
+}
+
+/// A coordinate with a ten-thousandth of a mm, without trailing zeros or a minus before zero.
+pub(super) fn written(x: f64) -> String {
+    let x = (x * 1e4).round() / 1e4 + 0.0;
+    format!("{x}")
+}
