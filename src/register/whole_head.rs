@@ -85,7 +85,7 @@ impl<F: Frame> MeanHead<'_, F> {
         let centre_mm = head::centre_mm(&brain);
         let region = morphology::dilate(&brain, AROUND_MM);
         let normalised = (0..SEARCHED).map(|n| over_neighbourhood(&levels[n], &region, None, n)).collect();
-        Prepared { region, levels, normalised, near_brain, centre_mm }
+        Prepared { levels, normalised, region, near_brain, centre_mm }
     }
 }
 
@@ -290,6 +290,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
 }
 
 /// The best pose of a search.
+#[derive(Clone, Copy)]
 struct Found {
     likeness: f64,
     pose: Pose,
