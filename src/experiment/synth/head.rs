@@ -34,7 +34,7 @@ const AIR: f64 = 3.0;
 /// The head in the template's frame, on a grid larger than the template's.
 #[derive(Clone, Debug)]
 pub struct Head {
-    /// T1 intensity without bias and noise; white matter is 210, as a tissue of the drawing.
+    /// T1 intensity without bias and noise; white matter is 210.
     pub t1: Volume<f32, Mni>,
     /// Labels of the brain.
     pub labels: LabelMap<Mni>,
