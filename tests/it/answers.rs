@@ -9,7 +9,7 @@ use std::path::Path;
 /// A head again from another receive coil: another gain, bias and noise, nothing taken out.
 fn again(scan: &Path, copy: &Path) {
     let bytes = std::fs::read(scan).unwrap();
-    let before = decode(&bytes, "scan", &ReadOptions::default()).unwrap().volume;
+    let before = decode(&bytes, "scan.nii.gz", &ReadOptions::default()).unwrap().volume;
     let grid = before.grid;
     let after = Volume::from_fn(grid, |n| {
         let [i, _, k] = grid.voxel(n).map(|v| v as f32);
