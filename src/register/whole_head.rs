@@ -161,7 +161,7 @@ pub(super) fn level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: u
 }
 
 /// One resolution of the search for poses.
-fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
+pub(super) fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, most: usize) -> Level<'a> {
     let range = [-LARGEST, LARGEST];
     let request =
         Draw { most, other_spacing_mm: LEVELS_MM[n], bins: BINS, range, centre_mm: head.centre_mm, seed: 1 + n as u64 };
@@ -371,7 +371,7 @@ fn turns_within(reach_rad: f64, step_rad: f64) -> Vec<Rotation3<f64>> {
 
 /// How much a scan seen through a pose looks like the mean head: the mean local correlation over the brain and its rim at
 /// 4 mm, less where little of it is in the field of view.
-fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
+pub(super) fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
     let (template, image) = (&head.levels[1], &subject.levels[1]);
     let grid = template.grid;
     let read = |n: usize| -> Option<f32> {

@@ -1,7 +1,8 @@
 //! Whether what looks like a cavity is one: its depth, its folds and where it lies have to make sense.
 
-use super::blood::Window;
-use super::cavity::{CavityPair, both};
+use super::cavity_pair::CavityPair;
+use super::sets::both;
+use super::window::Window;
 use crate::geometry::Mni;
 use crate::image::distance::distance_mm;
 use crate::image::{Mask, Volume, VoxelBox};
@@ -96,8 +97,11 @@ impl Evidence {
 
         let ventricle = labels.map(|l| l == label::VENTRICLE);
         let (to_outside, to_ventricle) = (distance_mm(&inside.map(|x| !x)), distance_mm(&ventricle));
-        let surface: Vec<usize> = (0..inside.data.len()).filter(at).filter(|&n| to_outside.data[n] < 1.1).collect();
-        let touching = surface.iter().filter(|&&n| ventricle.count() > 0 && to_ventricle.data[n] < 2.1).count();
+        let voxel_mm = seed.grid.spacing_mm().into_iter().fold(0.0, f64::max) as f32;
+        let is_surface = |n: &usize| to_outside.data[*n] < 1.1 * voxel_mm;
+        let surface: Vec<usize> = (0..inside.data.len()).filter(at).filter(is_surface).collect();
+        let touching =
+            surface.iter().filter(|&&n| ventricle.count() > 0 && to_ventricle.data[n] < 2.1 * voxel_mm).count();
         Self {
             seed_cc: seed.volume_cc(),
             loss: median(loss).unwrap_or(0.0),

@@ -1,36 +1,17 @@
 //! The cavity that surgery left, and the tissue that filled it.
 
 use super::belief::{Doubt, Evidence};
+use super::cavity_pair::CavityPair;
+use super::sets::{both, either, without};
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, components, fill_holes, largest_component};
 use crate::image::distance::distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode, open};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::image::{LabelMap, Mask};
 use crate::segment::label;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-/// Both scans on one grid, reached rigidly.
-#[derive(Clone, Copy, Debug)]
-pub struct CavityPair<'a> {
-    /// Pre-operative intensities.
-    pub pre: &'a Volume<f32, Mni>,
-    /// Pre-operative labels (`segment::label`).
-    pub pre_labels: &'a LabelMap<Mni>,
-    /// Pre-operative brain.
-    pub pre_brain: &'a Mask<Mni>,
-    /// Post-operative intensities on the pre-operative scale ([`super::on_the_scale_of`]).
-    pub post: &'a Volume<f32, Mni>,
-    /// Where the post-operative scan looked: elsewhere is unknown, never cavity.
-    pub post_known: &'a Mask<Mni>,
-    /// Intensity between CSF and grey matter on the pre-operative scale.
-    pub csf_grey_border: f64,
-    /// Mean intensity of grey matter on the pre-operative scale.
-    pub grey_mean: f64,
-    /// White matter's mean intensity less grey matter's.
-    pub grey_white_contrast: f64,
-}
 
 /// How the cavity is found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -284,18 +265,6 @@ fn side_of(mask: &Mask<Mni>) -> Side {
     if sum < 0.0 { Side::Left } else { Side::Right }
 }
 
-pub(super) fn both(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_fn(a.grid, |n| a.data[n] && b.data[n])
-}
-
-pub(super) fn either(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_fn(a.grid, |n| a.data[n] || b.data[n])
-}
-
-pub(super) fn without(a: &Mask<Mni>, b: &Mask<Mni>) -> Mask<Mni> {
-    Mask::from_fn(a.grid, |n| a.data[n] && !b.data[n])
-}
-
 /// A mask without what touches another within `margin_mm`: the post-operative ventricle next to the cavity.
 pub fn apart_from(mask: &Mask<Mni>, other: &Mask<Mni>, margin_mm: f64) -> Mask<Mni> {
     without(mask, &dilate(other, margin_mm))
@@ -304,7 +273,7 @@ pub fn apart_from(mask: &Mask<Mni>, other: &Mask<Mni>, margin_mm: f64) -> Mask<M
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Grid;
+    use crate::image::{Grid, Volume};
 
     /// A ball of white matter of radius 40 mm with a ventricle, and a second scan with other gain and a hole.
     struct Head {
@@ -380,13 +349,19 @@ mod tests {
         };
         let folded = |v: &Volume<f32, Mni>| Volume::from_fn(v.grid, |n| v.data[n] + fold(n));
         let pre = folded(&h.pre);
-        let shadow = Volume::from_fn(pre.grid, |n| pre.data[n] * if h.hole.data[n] { 0.4 } else { 1.0 });
+        // As coils shade: over centimetres.
+        let shade = |n: usize| {
+            let p = pre.grid.position(pre.grid.voxel(n).map(|c| c as f64).into()).mm;
+            let far_mm = (p - nalgebra::Point3::new(-22.0, 5.0, 0.0)).norm();
+            1.0 - 0.65 * (-0.5 * (far_mm / 25.0).powi(2)).exp() as f32
+        };
+        let shadow = Volume::from_fn(pre.grid, |n| pre.data[n] * shade(n));
         let shaded = CavityPair { pre: &pre, post: &shadow, ..pair(&h, &known) };
         let error = find_cavity(&shaded, &CavitySettings::default()).unwrap_err();
         let ResectError::NoOperation { doubt: Some(Doubt::FoldsKept { correlation }), .. } = error else {
             panic!("{error}")
         };
-        assert!(correlation > 0.9, "{correlation}");
+        assert!(correlation > 0.7, "{correlation}");
         let hole = Volume::from_fn(pre.grid, |n| if h.hole.data[n] { 25.0 } else { pre.data[n] });
         let operated = CavityPair { pre: &pre, post: &hole, ..pair(&h, &known) };
         assert!(find_cavity(&operated, &CavitySettings::default()).is_ok());
@@ -400,7 +375,7 @@ mod tests {
             let p = h.pre.grid.position(h.pre.grid.voxel(n).map(|c| c as f64).into()).mm;
             p.coords.norm()
         };
-        let grown = Volume::from_fn(h.pre.grid, |n| if far(n) < 14.5 { 25.0 } else { h.pre.data[n] });
+        let grown = Volume::from_fn(h.pre.grid, |n| if far(n) < 12.0 { 25.0 } else { h.pre.data[n] });
         h.post = grown;
         let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
         assert!(matches!(error, ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. }), "{error}");

@@ -5,6 +5,7 @@ use crate::image::gaussian::{gaussian, gaussian_along_axes};
 use crate::image::morphology::erode;
 use crate::image::resample::{Interpolation, grid_with_spacing, resample, resample_nearest};
 use crate::image::{Mask, Volume};
+use crate::register::deformable::{DeformableSettings, fit_atlas};
 use crate::segment::atlas;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,8 @@ const FEWEST: usize = 2500;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Likeness {
     /// Median over the windows of a hemisphere of the correlation within a window; of the two hemispheres the better one,
-    /// since an operation changes one of them.
+    /// since an operation changes one of them. Where a rigid motion does not bring the folds together, after the smooth
+    /// movement that does so best: a brain that has sunk by a sulcus' width is still the same brain.
     pub folds: f64,
     /// Windows looked at.
     pub windows: usize,
@@ -61,7 +63,31 @@ pub fn likeness<A: Frame, B: Frame>(
     // Zeros are what defacing, padding and masks leave: no tissue is exactly black in both.
     let seen = |n: usize| a.inside.data[n] && b.inside.data[n] && a.volume.data[n] > 0.0 && b.volume.data[n] > 0.0;
     let known = Mask::from_fn(grid, |n| inner.data[n] > 0 && seen(n));
-    compared(&a.volume, &b.volume, &known)
+    let rigid = compared(&a.volume, &b.volume, &known)?;
+    if rigid.is_one_head() {
+        return Some(rigid);
+    }
+    let whole = resample_nearest(&brain.map(u8::from), &grid, &AffineTransform::identity(), 0);
+    let value = |n: usize| if whole.data[n] > 0 && a.inside.data[n] { a.volume.data[n].max(1e-3) } else { 0.0 };
+    let before = Volume::from_fn(grid, value);
+    let after = Volume::from_fn(grid, |n| if b.inside.data[n] { b.volume.data[n] } else { f32::NAN });
+    let Ok(fit) = fit_atlas(&after, &before, &AffineTransform::identity(), None, &smooth_movement()) else {
+        return Some(rigid);
+    };
+    let [back] = fit.subject_from_atlas.warp([&b.volume], &grid);
+    let moved = compared(&a.volume, &back, &known)?;
+    Some(if moved.folds > rigid.folds { moved } else { rigid })
+}
+
+/// As brains sink: smooth over centimetres. No such movement lays one person's folds on another's.
+fn smooth_movement() -> DeformableSettings {
+    DeformableSettings {
+        levels_mm: vec![8.0, 4.0],
+        iterations: vec![30, 30],
+        update_sigma_voxels: 5.0,
+        affine: false,
+        ..DeformableSettings::default()
+    }
 }
 
 /// Thin voxels averaged to about the spacing they are read at.
@@ -138,6 +164,20 @@ mod tests {
         );
         let off = likeness(&one, &one, &same, &moved).unwrap();
         assert!(!off.is_one_head() && off.folds < 0.7, "{off:?}");
+    }
+
+    /// The template's brain sunk by up to 9 mm, as smoothly as brains do, is still the same brain.
+    #[test]
+    fn a_brain_that_has_sunk_by_the_width_of_a_sulcus_is_one_head() {
+        let one = template();
+        let sunk = Volume::from_fn(one.grid, |n| {
+            let p = one.grid.position(one.grid.voxel(n).map(|v| v as f64).into());
+            let off = p.mm.coords - Vector3::new(20.0, -20.0, 40.0);
+            let by = 9.0 * (-0.5 * off.norm_squared() / (50.0 * 50.0)).exp();
+            let from = crate::geometry::Position::from_point(p.mm + Vector3::new(0.0, 0.5 * by, by));
+            one.trilinear(from).unwrap_or(0.0)
+        });
+        assert!(folds(&one, &sunk) > 0.9, "{}", folds(&one, &sunk));
     }
 
     #[test]

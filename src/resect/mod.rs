@@ -3,14 +3,18 @@
 mod belief;
 mod blood;
 mod cavity;
+mod cavity_pair;
 mod intensity;
 mod likeness;
 mod midline;
 mod pair;
 mod sag;
+mod sets;
+mod window;
 
 pub use belief::{Doubt, Evidence};
-pub use cavity::{CavityFinding, CavityPair, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
+pub use cavity::{CavityFinding, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
+pub use cavity_pair::CavityPair;
 pub use intensity::on_the_scale_of;
 pub use likeness::{Likeness, likeness};
 pub use midline::midline_shift_mm;

@@ -1,8 +1,8 @@
 //! A pre- and a post-operative scan taken apart together.
 
 use super::blood::{SaggedPair, with_blood};
-use super::cavity::both;
 use super::sag::{SagScans, fit_sag};
+use super::sets::both;
 use super::{
     CavityFinding, CavityPair, CavitySettings, Likeness, ResectError, apart_from, find_cavity, likeness,
     on_the_scale_of, subtract,

@@ -1,6 +1,6 @@
 //! The sag of the brain from one scan to the other.
 
-use super::cavity::both;
+use super::sets::both;
 use crate::geometry::{AffineTransform, Mni};
 use crate::image::morphology::dilate;
 use crate::image::{Mask, Volume};

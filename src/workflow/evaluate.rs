@@ -2,10 +2,10 @@
 
 use super::case::Case;
 use super::error::{LandmarkError, WorkflowError};
-use super::inputs::{read_input, shown};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
 use super::stages::{ESTIMATE, FUSED, OBSERVED, brain_shift, transforms};
+use super::user_file::{read_input, shown};
 use crate::artefact::write_whole;
 use crate::experiment::landmarks::{CarriedLandmarks, Evaluation, evaluate};
 use crate::geometry::Position;

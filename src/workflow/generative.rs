@@ -1,7 +1,7 @@
 //! The generative model of brain tissue, from a table of studies to files: fitted, sampled, shown.
 
 use super::error::WorkflowError;
-use super::inputs::{read_input, read_text};
+use super::user_file::{read_input, read_text};
 use crate::artefact::{Produced, Stage, StageError, StageOutcome};
 use crate::material::Task;
 use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior, nine_levels, sample_prior};

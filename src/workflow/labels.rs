@@ -1,8 +1,8 @@
 //! Label maps of other tools: the file, whose numbers it holds, and what comes of it.
 
 use super::error::{LabelMapError, WorkflowError};
-use super::inputs::{read_input, read_text, shown};
 use super::progress::Progress;
+use super::user_file::{read_input, read_text, shown};
 use crate::anatomy::{LabelCount, LabelTable, built_in, named, recognise, table_from_tsv};
 use crate::geometry::Native;
 use crate::image::nifti::{self, ReadOptions};

@@ -1,12 +1,12 @@
 //! A label map in a file to a mesh in a file, with its boundary sets where it is in MNI space.
 
 use super::error::{MeshFileError, WorkflowError};
-use super::inputs::read_input;
 use super::labels::any_labels;
 use super::programs::Programs;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::stages::mesh_outcome;
+use super::user_file::read_input;
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError, write_whole};
 use crate::experiment::outcome::MeshOutcome;

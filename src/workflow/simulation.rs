@@ -1,9 +1,9 @@
 //! One deformation, or one motion, of a mesh in a file by the scenario in another.
 
 use super::error::{SimulationError, WorkflowError};
-use super::inputs::{read_input, read_text};
 use super::progress::Progress;
 use super::settings::in_words;
+use super::user_file::{read_input, read_text};
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};

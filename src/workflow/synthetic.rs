@@ -1,10 +1,10 @@
 //! A synthetic patient as files: on the template's head or on a scan's.
 
 use super::error::WorkflowError;
-use super::inputs::{read_input, shown};
 use super::labels::labels_of_tool;
 use super::progress::Progress;
 use super::settings::Settings;
+use super::user_file::{read_input, shown};
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::synth::{Head, SynthError, synthesize, synthesize_on};
 use crate::geometry::{Mni, Pre};

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::error::{WarpError, WorkflowError};
-use super::inputs::{read_input, shown};
 use super::maps::{Map, Part, WarpTo};
+use super::user_file::{read_input, shown};
 use crate::artefact::write_whole;
 use crate::experiment::field::{Between, looks_like_labels, seen_through};
 use crate::geometry::{Native, Position};

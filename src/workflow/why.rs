@@ -3,11 +3,12 @@
 use super::case::Case;
 use super::error::WorkflowError;
 use super::facts::MeshFacts;
-use super::inputs::{ScanSums, read_input};
+use super::inputs::ScanSums;
 use super::plan::{self, Goal, plan};
 use super::progress::Silent;
 use super::stage_name::{StageName, Subject};
 use super::stages;
+use super::user_file::read_input;
 use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, Reason, Stage, sha256_hex};
 use crate::workflow::settings::Settings;

@@ -6,9 +6,6 @@ use crate::python::tool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A mesh that makes a subject cheap.
-pub const COARSE: [&str; 4] = ["--mesher", "lattice", "--cells", "3000"];
-
 /// A data set of two patients: the sample pair and a synthetic one.
 pub fn data_set(folder: &Path) -> PathBuf {
     let raw = folder.join("study");
@@ -67,8 +64,8 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
     let subjects = group["subjects"].as_array().unwrap();
     assert_eq!((&subjects[0]["participant_id"], &subjects[0]["status"]), (&"sub-00".into(), &"failed".into()));
     let rest = |row: &Value| row["rest_rmse_margin_mm"].as_f64().unwrap();
-    let [first, second] = [1, 2].map(|n| rest(&subjects[n]["figures"]));
-    assert!((rest(&group["median"]) - f64::midpoint(first, second)).abs() < 1e-9);
+    let [one, other] = [1, 2].map(|n| rest(&subjects[n]["figures"]));
+    assert!((rest(&group["median"]) - f64::midpoint(one, other)).abs() < 1e-9);
     let page = text(&out.join("group.html"));
     assert!(page.contains("href=\"sub-01.html\"") && out.join("sub-01.html").exists());
     assert!(!page.contains("href=\"sub-00.html\"") && page.contains("sub-00: failed"));

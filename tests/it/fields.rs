@@ -180,11 +180,12 @@ fn the_program_carries_tables_tracks_and_images_through_a_field_of_the_users_own
     python(
         folder.path(),
         "import nibabel as nib, numpy as np
-from nibabel.streamlines import Tractogram, TrkFile, TckFile, create_tractogram_header
+from nibabel.streamlines import Tractogram, TrkFile, TckFile
 rng = np.random.default_rng(1); image = nib.load('t1.nii.gz')
 lines = [rng.uniform(-30, 30, (n, 3)).astype(np.float32) + np.float32([12, -7, 20]) for n in (2, 40, 7)]
 t = Tractogram(lines, affine_to_rasmm=np.eye(4), data_per_point={'fa': [rng.random((len(l), 1)) for l in lines]})
-TrkFile(t, create_tractogram_header(TrkFile, **{'voxel_to_rasmm': image.affine, 'voxel_sizes': image.header.get_zooms(), 'dimensions': image.shape, 'voxel_order': ''.join(nib.aff2axcodes(image.affine))})).save('a.trk')
+header = {'voxel_to_rasmm': image.affine, 'voxel_sizes': image.header.get_zooms(), 'dimensions': image.shape, 'voxel_order': ''.join(nib.aff2axcodes(image.affine))}
+TrkFile(t, header).save('a.trk')
 TckFile(Tractogram(lines, affine_to_rasmm=np.eye(4))).save('a.tck')
 np.savetxt('a.csv', lines[1], delimiter=',', header='x,y,z', comments='')",
     );

@@ -2,6 +2,7 @@
 //! written.
 
 use crate::job::{CHEAP, output, sample};
+use hgm::image::nifti::{ReadOptions, decode, encode_u8};
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -109,7 +110,7 @@ fn masks_that_fit_neither_scan_are_refused_before_anything_is_written() {
     };
     let masks: [(&str, Vec<u8>, &[&str]); 3] = [
         ("empty.nii.gz", packed(&filled(&plain, 0), 1), &["the mask is empty"]),
-        ("elsewhere.nii.gz", packed(&moved(292, &moved(268, &plain)), 1), &["neither scan", "resample"]),
+        ("elsewhere.nii.gz", packed(&moved(292, &moved(268, &filled(&plain, 1))), 1), &["neither scan", "resample"]),
         ("cut.nii.gz", good[..good.len() / 2].to_vec(), &["gzip", "again"]),
     ];
     for (name, bytes, words) in &masks {
@@ -127,8 +128,10 @@ fn slow_a_mask_outside_the_brain_is_refused_and_no_mask_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
-    // The scan itself: everything is inside.
-    std::fs::copy(&pre, path("head.nii.gz")).unwrap();
+    // All that the scan shows: most of it is no brain.
+    let bytes = std::fs::read(&pre).unwrap();
+    let scan = decode(&bytes, "pre.nii.gz", &ReadOptions::default()).unwrap().volume;
+    std::fs::write(path("head.nii.gz"), encode_u8(&scan.map(|x| u8::from(x > 0.0)))).unwrap();
     let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
     let words = ["run", pair[0], pair[1], "--resected-mask", &path("head.nii.gz"), "-o", &path("case")];
     let result = output(&[&words[..], &CHEAP[..]].concat());

@@ -17,6 +17,7 @@ iterations = [10, 5, 0]
 [anat.sag]
 iterations = [10, 5, 0]
 [estimate]
+two_meshes = false
 observed = \"surfaces\"
 [estimate.descent]
 iterations = 2
@@ -24,8 +25,8 @@ iterations = 2
 
 /// Settings that are changed under way. Both name the same keys: what a file leaves out is the case's own, by design.
 const SETTINGS: [&str; 2] = [
-    "[resection]\nsd_levels = [0.0]\ndensity_kg_per_m3 = 100.0\n[prior]\nstudy = \"hyperelastic\"\n",
-    "[resection]\nsd_levels = [-1.0, 1.0]\ndensity_kg_per_m3 = 60.0\n[prior]\nstudy = \"linear\"\n",
+    "[resection]\nsd_levels = [0.0]\nsupports = \"fixed\"\ndensity_kg_per_m3 = 100.0\n[prior]\nstudy = \"hyperelastic\"\n",
+    "[resection]\nsd_levels = [-1.0, 1.0]\nsupports = \"fixed\"\ndensity_kg_per_m3 = 60.0\n[prior]\nstudy = \"linear\"\n",
 ];
 
 /// What a case is made from.

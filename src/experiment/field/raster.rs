@@ -69,9 +69,11 @@ mod tests {
         let linear = |x: [f64; 3]| [0.1 * x[0] - 0.2 * x[2] + 1.0, x[1]];
         let values: Vec<[f64; 2]> = mesh.nodes_mm().iter().map(|x| linear(*x)).collect();
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, -0.3, 0.4)).to_homogeneous();
-        let affine = Matrix4::new_translation(&Vector3::new(60.0, -70.0, -60.0))
+        // The grid's middle at the block's.
+        let affine = Matrix4::new_translation(&Vector3::new(15.0, 14.0, 16.0))
             * turn
-            * Matrix4::new_nonuniform_scaling(&Vector3::new(-3.0, 3.0, 3.0));
+            * Matrix4::new_nonuniform_scaling(&Vector3::new(-3.0, 3.0, 3.0))
+            * Matrix4::new_translation(&Vector3::new(-22.0, -22.0, -22.0));
         let grid = Grid::<Mni>::new([45; 3], affine).unwrap();
         let found = in_tetrahedra(mesh.tets(), mesh.nodes_mm(), &values, &grid);
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);

@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn inside_it_is_the_meshs_own_and_it_falls_to_zero_at_the_skull_and_can_be_inverted() {
-        let (field, around) = field(|x| [0.02 * x[2], -2.0, 1.0 + 0.01 * x[0]]);
+        let (field, around) = field(|x| [0.01 * x[2], -1.0, 0.5 + 0.005 * x[0]]);
         assert!(field.jacobian_min > 0.05 && field.changed == 0, "{} {}", field.jacobian_min, field.changed);
         let outside = dilate(&around.brain, 8.0);
         for n in 0..field.whole.len() {

@@ -100,7 +100,10 @@ fn labels_and_masks_hold_what_they_should() {
     let fractions = File::with(|f| f.slope = 0.3);
     let text = decode_labels(&fractions, NAME, &options).unwrap_err().to_string();
     assert!(text.contains("voxels") && text.contains("whole numbers") && text.contains("label map"), "{text}");
-    let (mask, _) = decode_mask(&File::sound().bytes(), NAME, &options).unwrap();
+    let text = decode_mask(&File::sound().bytes(), NAME, &options).unwrap_err().to_string();
+    assert!(text.contains("it is a label map and no mask"), "{text}");
+    let ones = File::with(|f| f.voxels = f.voxels.iter().map(|x| x.min(1.0)).collect());
+    let (mask, _) = decode_mask(&ones, NAME, &options).unwrap();
     assert_eq!((mask.count(), mask.data[0]), (23, false));
     let (soft, warnings) = decode_mask(&File::with(|f| f.slope = 1.0 / 24.0), NAME, &options).unwrap();
     assert!(soft.count() == 12 && warnings[0].contains("fractions"), "{} {warnings:?}", soft.count());
