@@ -6,9 +6,9 @@ use crate::material::generative::{
     SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
 };
 use crate::material::gp::Spread;
-use crate::material::literature::table;
-use crate::material::meta_model::FitError;
-use crate::material::meta_model::MetaModel;
+use crate::material::literature::{Curves, LiteratureModel, table};
+use crate::material::meta_model::{FitError, MetaModel, MetaModelSettings};
+use crate::material::rheometry::{Measured, Rheometry, fit_rheometry};
 use crate::material::{Region, StudyKind, Task};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -171,10 +171,12 @@ const DRAWN_STRETCHES: usize = 101;
 const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 
 /// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and the exponent of
-/// Ogden's law or the share of C1 of Mooney and Rivlin's. Mean and covariance are those of laws fitted to whole random
-/// curves of the Gaussian process ([`Spread::Study`]: what one more study would report); an exponent at its bound of 5 says
-/// nothing of the exponent, so Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a
-/// stable law has is as likely as another.
+/// Ogden's law or the share of C1 of Mooney and Rivlin's. The modulus' mean and spread, and its correlation with an exponent,
+/// are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
+/// report). Those curves share their shape far more than studies do, so an exponent's mean and spread are those of the
+/// published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
+/// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
+/// as another.
 ///
 /// # Errors
 /// [`PriorError`].
@@ -196,12 +198,26 @@ pub fn law_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown
         shape.prior(0.0, ANY_SHARE_SD)
     } else {
         let exponents: Vec<f64> = draws.iter().map(|d| d.fit.parameters[1]).collect();
-        let (shape_mean, shape_sd) = mean_and_sd(&exponents);
-        let products = moduli.iter().zip(&exponents).map(|(m, e)| (m - mean) * (e - shape_mean));
-        let correlation = products.sum::<f64>() / (draws.len() as f64 - 1.0) / (sd * shape_sd);
+        let (drawn_mean, drawn_sd) = mean_and_sd(&exponents);
+        let products = moduli.iter().zip(&exponents).map(|(m, e)| (m - mean) * (e - drawn_mean));
+        let correlation = products.sum::<f64>() / (draws.len() as f64 - 1.0) / (sd * drawn_sd);
+        let (shape_mean, shape_sd) = mean_and_sd(&exponents_of_studies(law));
         LogPrior { correlation: vec![correlation], ..shape.prior(shape_mean, shape_sd) }
     };
     Ok(vec![(modulus.clone(), modulus.prior(mean, sd)), (shape, of_shape)])
+}
+
+/// Exponents of the published hyperelastic models of healthy tissue, each fitted over the stretches it was measured at.
+fn exponents_of_studies(law: MetaModel) -> Vec<f64> {
+    let healthy = |model: &LiteratureModel| model.task.region != Region::Abnormal;
+    let hyperelastic = |model: &LiteratureModel| model.task.kind == StudyKind::Hyperelastic;
+    let fitted = |model: LiteratureModel| {
+        let curve = model.curve(Curves::Corrected);
+        let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();
+        let test = Rheometry { measured: Measured::Energy, stretches: curve.stretches, values_pa };
+        fit_rheometry(law, &test, &MetaModelSettings::default()).ok().map(|fit| fit.parameters[1])
+    };
+    table().into_iter().filter(hyperelastic).filter(healthy).filter_map(fitted).collect()
 }
 
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {

@@ -15,6 +15,9 @@ const SPACING_MM: f64 = 2.0;
 const WINDOW_MM: f64 = 4.0;
 /// The mean head's brain less a rim in which a patient's skull may lie, mm.
 const RIM_MM: f64 = 5.0;
+/// Tissue that sinks hardly changes its volume; a movement that swells or shrinks it by more than this makes one head of
+/// another.
+const MOST_SWELLING: f64 = 1.15;
 /// With fewer windows than this on either side nothing is said about that side (200 cc of folds are 25 000).
 const FEWEST: usize = 2500;
 
@@ -74,6 +77,9 @@ pub fn likeness<A: Frame, B: Frame>(
     let Ok(fit) = fit_atlas(&after, &before, &AffineTransform::identity(), None, &smooth_movement()) else {
         return Some(rigid);
     };
+    if fit.quality.smallest_jacobian < 1.0 / MOST_SWELLING || fit.quality.largest_jacobian > MOST_SWELLING {
+        return Some(rigid);
+    }
     let [back] = fit.subject_from_atlas.warp([&b.volume], &grid);
     let moved = compared(&a.volume, &back, &known)?;
     Some(if moved.folds > rigid.folds { moved } else { rigid })

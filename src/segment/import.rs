@@ -138,14 +138,14 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
     if ventricle > 0.4 * tissue {
         return Some(format!("the ventricles are {ventricle:.0} cc of {tissue:.0} cc of tissue"));
     }
-    // Grey matter lies around white matter: more of it borders fluid and skull. Ventricles lie inside.
+    // Ventricles lie inside. Grey matter lies around white matter: more of it borders fluid and skull.
     let [grey_open, white_open, ventricle_open] = [label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE]
         .map(|l| open_share(labels, l, if l == label::VENTRICLE { 0 } else { label::CSF }));
-    if white_open > grey_open {
-        return Some("its white matter lies at the surface more than its grey matter does".to_owned());
-    }
     if ventricle > 1.0 && ventricle_open > 0.35 {
         return Some("its ventricles lie at the surface of the brain".to_owned());
+    }
+    if white_open > grey_open {
+        return Some("its white matter lies at the surface more than its grey matter does".to_owned());
     }
     None
 }
@@ -219,12 +219,14 @@ mod tests {
         assert!(refused(&aseg(-1.0), "freesurfer").contains("left and right are exchanged"));
         let swapped = aseg(1.0).map(|c| [2, 3, 41, 42].iter().position(|x| *x == c).map_or(c, |n| [3, 2, 42, 41][n]));
         assert!(refused(&swapped, "freesurfer").contains("white matter lies at the surface"));
-        let inside_out = aseg(1.0).map(|c| match c {
+        let map = aseg(1.0);
+        let inside_out = Volume::from_fn(map.grid, |n| match map.data[n] {
             4 | 43 => 24,
-            24 => 4,
+            24 if map.grid.voxel(n)[0] < 40 => 4,
+            24 => 43,
             c => c,
         });
-        assert!(refused(&inside_out, "freesurfer").contains("ventricles"));
+        assert!(refused(&inside_out, "freesurfer").contains("ventricles lie at the surface"));
         let half = aseg(1.0).map(|c| if c == 2 || c == 41 { 0 } else { c });
         assert!(refused(&half, "freesurfer").contains("missing"));
     }

@@ -106,8 +106,13 @@ pub fn any_labels(
     }
     let counts: Vec<LabelCount> = voxels.into_iter().map(|(code, voxels)| LabelCount { code, voxels }).collect();
     let holds = |set: &[u32]| counts.iter().any(|c| set.contains(&c.code));
-    // What a map of that tool is never without: then a number more is a slip to be told, not another kind of map.
-    let of_a_tool = built_in().iter().any(|t| t.name != "hgm" && t.needed.iter().all(|set| holds(set)));
+    // What a map of that tool is never without: then a number more is a slip to be told, not another kind of map. With six
+    // such structures one may be missing, or stand under another tool's number.
+    let is_of = |t: &LabelTable| {
+        let missing = t.needed.iter().filter(|set| !holds(set)).count();
+        t.name != "hgm" && missing <= usize::from(t.needed.len() >= 6)
+    };
+    let of_a_tool = built_in().iter().any(is_of);
     if of_a_tool || matches!(recognise(&counts, None), Ok(found) if found.table.name != "hgm") {
         return imported(&codes, name, None, progress);
     }

@@ -4,6 +4,7 @@ use crate::job::output;
 use crate::python::python;
 use hgm::experiment::field::{FieldSettings, Moved, ShiftField, Surroundings, carried, shift_field};
 use hgm::geometry::{Mni, Native, Position, Post, Pre, RigidTransform};
+use hgm::image::morphology::erode;
 use hgm::image::nifti::{decode_displacement, encode_displacement, encode_i16};
 use hgm::image::{Grid, Mask, Volume};
 use hgm::material::random::CounterRng;
@@ -120,7 +121,7 @@ for name in sys.stdin.read().split():
 #[test]
 fn itk_ants_nibabel_and_dipy_carry_points_as_this_program_does_on_an_oblique_left_handed_scan() {
     let folder = tempfile::tempdir().unwrap();
-    let field = field(|x| [4.0 - 0.03 * x[2], 0.02 * x[0] * (x[1] / 50.0), -5.0 + 0.04 * x[1]]);
+    let field = field(|x| [2.0 - 0.015 * x[2], 0.01 * x[0] * (x[1] / 50.0), -2.5 + 0.02 * x[1]]);
     assert!(field.jacobian_min > 0.0);
     let at_rest = points(&field);
     let moved = |v: &Volume<[f32; 3], Native>, x: &[[f64; 3]]| -> Vec<[f64; 3]> {
@@ -143,11 +144,18 @@ fn itk_ants_nibabel_and_dipy_carry_points_as_this_program_does_on_an_oblique_lef
         found.lines().filter_map(|l| l.rsplit_once(' ')).map(|(who, mm)| (who, mm.parse().unwrap())).collect();
     assert_eq!(rows.len(), 16, "{found}");
     assert!(rows.iter().all(|(_, mm)| *mm < 0.01), "{found}");
-    for (back, x) in [(moved(&fields[1].1, &deformed), &at_rest), (moved(&fields[3].1, &in_post), &at_rest)] {
-        let mut off: Vec<f64> =
-            back.iter().zip(x).map(|(a, b)| (Vector3::from(*a) - Vector3::from(*b)).norm()).collect();
-        off.sort_by(f64::total_cmp);
-        assert!(off[989] < 0.05 && off[999] < 0.2, "{} {}", off[989], off[999]);
+    // At the rim of the tissue the field bends between two voxels of 3 mm, and the map back bends elsewhere.
+    let inner = erode(&Mask::from_data(field.forward.grid, field.believed.clone()), 7.0);
+    let is_inner = |x: &[f64; 3]| inner.nearest(Position::new(x[0], x[1], x[2])).unwrap_or(false);
+    for back in [moved(&fields[1].1, &deformed), moved(&fields[3].1, &in_post)] {
+        let off = |(a, b): (&[f64; 3], &[f64; 3])| (Vector3::from(*a) - Vector3::from(*b)).norm();
+        let pairs = || back.iter().zip(&at_rest);
+        let mut inside: Vec<f64> = pairs().filter(|(_, x)| is_inner(x)).map(off).collect();
+        inside.sort_by(f64::total_cmp);
+        assert!(inside.len() > 500, "{}", inside.len());
+        let (most, worst) = (inside[inside.len() * 99 / 100], inside[inside.len() - 1]);
+        assert!(most < 0.05 && worst < 0.2, "{most} {worst}");
+        assert!(pairs().map(off).fold(0.0, f64::max) < 0.5);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Levenberg-Marquardt on residuals in mm with a Gaussian prior on the log-parameters.
 
-use super::LogPrior;
+use super::{LogPrior, Scale};
 use crate::experiment::setting::{SettingError, first_broken};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -41,7 +41,8 @@ pub struct EstimateSettings {
     pub decrement_tolerance: f64,
     /// Most iterations.
     pub iterations: usize,
-    /// Longest step of a log-parameter: a factor e^1 in one go is as far as a linearisation carries.
+    /// Longest step of a log-parameter: a factor e^1 in one go is as far as a linearisation carries. For an exponent, in
+    /// standard deviations of its prior.
     pub longest_step: f64,
 }
 
@@ -139,6 +140,9 @@ pub fn estimate<M: Forward>(
     let weight = settings.noise_mm.powi(-2);
     let precision = super::joint_precision(prior);
     let mean = DVector::from_iterator(prior.len(), prior.iter().map(|p| p.mean));
+    // A quantity that is not a logarithm has the scale of what is known of it.
+    let unit_of = |p: &LogPrior| if p.scale == Scale::Plain { p.sd.unwrap_or(1.0).max(1.0) } else { 1.0 };
+    let unit = DVector::from_iterator(prior.len(), prior.iter().map(unit_of));
     let cost = |theta: &DVector<f64>, r: &DVector<f64>| {
         let away = theta - &mean;
         0.5 * weight * r.norm_squared() + 0.5 * away.dot(&(&precision * &away))
@@ -174,7 +178,7 @@ pub fn estimate<M: Forward>(
             };
             let mut step = -factor.solve(&gradient);
             let decrement = (-step.dot(&gradient)).max(0.0).sqrt();
-            let longest = step.amax();
+            let longest = step.component_div(&unit).amax();
             if longest > settings.longest_step {
                 step *= settings.longest_step / longest;
             }
@@ -208,7 +212,6 @@ pub fn estimate<M: Forward>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::Scale;
 
     /// r_i = a_i / mu_1 + b_i / mu_2 - observed: what a linear-elastic body under gravity does.
     struct Compliance {

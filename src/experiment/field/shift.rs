@@ -253,6 +253,7 @@ mod tests {
     use crate::experiment::field::vectors::carried;
     use crate::experiment::phantom::block;
     use crate::geometry::Frame;
+    use crate::image::morphology::erode;
 
     /// A block of tissue in a larger head, moved as a function says, with a piece taken out.
     fn field(u: impl Fn([f64; 3]) -> [f64; 3]) -> (ShiftField, Surroundings) {
@@ -298,7 +299,11 @@ mod tests {
         let resected = field.on_whole(&field.believed, false);
         assert!(resected.data.iter().zip(&around.resected.data).all(|(b, r)| !(*b && *r)), "nothing is known there");
         assert!(field.believed.iter().filter(|b| **b).count() > 1000);
-        for (n, _) in field.believed.iter().enumerate().filter(|(_, b)| **b).step_by(97) {
+        // Where the field bends between two voxels of 2 mm, at the rim of the tissue, the map back bends elsewhere.
+        let believed = Mask::from_data(field.forward.grid, field.believed.clone());
+        let inner = erode(&believed, 5.0);
+        assert!(inner.count() > 1000);
+        for (n, _) in inner.data.iter().enumerate().filter(|(_, b)| **b).step_by(97) {
             let grid = &field.forward.grid;
             let p: [f64; 3] = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.into();
             let there = carried(&field.forward, p).unwrap();
