@@ -95,6 +95,12 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("estimate", &["estimate", &case]);
     prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
+    for (name, points) in [("pre.csv", "x,y,z\n20,-10,30\n-20,-10,30\n"), ("post.csv", "x,y,z\n15,-5,31\n-23,-8,25\n")]
+    {
+        std::fs::write(at(name), points).unwrap();
+    }
+    prints("warp", &["warp", &case, &at("pre.csv"), "-o", &at("warped.csv")]);
+    prints("evaluate", &["evaluate", &case, "--landmarks", &at("pre.csv"), "--landmarks-post", &at("post.csv")]);
     prints(
         "mesh",
         &[&["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu")], &CHEAP[..]].concat(),
