@@ -67,16 +67,7 @@ impl Map {
     /// A field of the user's own: it moves points; images go through its inverse.
     pub fn of_field(field: Volume<[f32; 3], Native>, part: Part) -> Self {
         let back = (part == Part::Images).then(|| inverse(&field));
-        Self {
-            forward: Some(field),
-            back,
-            rigid: AffineTransform::identity(),
-            sd: None,
-            believed: None,
-            resected: None,
-            backwards: false,
-            grid: None,
-        }
+        Self { forward: Some(field), back, ..Self::still() }
     }
 
     /// The map of a case in a state.

@@ -16,6 +16,7 @@ mod posterior;
 mod process;
 mod re_registration;
 mod rigid_remainder;
+mod verdict_of_fit;
 
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};
 pub use correlated::CorrelatedErrors;

@@ -6,10 +6,11 @@ use super::evidence::Unexplained;
 use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
+use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::sample::Tissue;
-use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
+use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Outcome, Scenario};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
@@ -173,7 +174,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         weight_alone: only_weight && density_known,
         body_known: problem.body_known,
     };
-    let verdict = verdict(&fitted, settings, &posterior, &posed);
+    let verdict = verdict_of_fit(&fitted, settings, &posterior, &posed);
     let materials = tissue_materials(&unknown, &fitted.descent.log_parameters, problem.poisson_ratio);
     let posterior = match verdict.finding {
         Finding::Widened => posterior.widened(),
@@ -297,95 +298,6 @@ fn spread(mean: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>], posterior: &Poster
     (sd, reach.collect())
 }
 
-/// What a verdict needs of its problem.
-struct Posed<'a> {
-    prior: &'a [LogPrior],
-    /// The tissue whose shear modulus a parameter is.
-    tissues: &'a [Option<String>],
-    /// Nothing but weight loads the body, and the density is given.
-    weight_alone: bool,
-    body_known: bool,
-}
-
-/// What the figures come down to.
-fn verdict(fitted: &Fitted, settings: &EstimateSettings, posterior: &Posterior, posed: &Posed<'_>) -> Verdict {
-    let Posed { prior, tissues, weight_alone, body_known } = *posed;
-    let mut unexplained = Vec::new();
-    let mut still = None;
-    let mut share = None;
-    let mut wider = None;
-    if let Some(found) = &fitted.correlated {
-        share = Some(found.shift.explained_share);
-        if !found.shift.seen {
-            let (log_odds, would_be_seen_mm) = (found.odds.moved_to_still, found.shift.would_be_seen_mm);
-            still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
-        }
-        // Noise that had to grow is as unexplained as a discrepancy is.
-        let (unexplained_by, noise_mm) = (found.unexplained, found.measured_noise.sd_mm);
-        let left_mm = unexplained_by.noise.sd_mm.hypot(unexplained_by.discrepancy.sd_mm);
-        let discrepancy_mm = (left_mm * left_mm - noise_mm * noise_mm).max(0.0).sqrt();
-        let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
-        // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
-        if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
-            unexplained.push(reason);
-        } else if discrepancy_mm > noise_mm {
-            wider = Some(reason);
-        }
-        if found.odds.model_to_any_movement < super::STRONG {
-            unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
-        }
-    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt())
-    {
-        // A root mean square of n independent ones is known to its 1 / sqrt(2 n).
-        let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
-        unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
-    }
-    let conflict = prior.iter().zip(&fitted.descent.log_parameters).filter_map(|(prior, value)| {
-        let sd = (value - prior.mean) / prior.sd?;
-        (sd.abs() > CONTRADICTION_SD).then(|| Reason::FarFromPrior { name: prior.name.clone(), sd })
-    });
-    let conflict: Vec<Reason> = if body_known { Vec::new() } else { conflict.collect() };
-    let named = || tissues.iter().enumerate().filter_map(|(n, tissue)| tissue.clone().map(|tissue| (n, tissue)));
-    let dominated = named().all(|(n, _)| posterior.identifiability.verdicts[n] != super::Knowledge::Identified);
-    let finding = if still.is_some() {
-        Finding::NoShift
-    } else if !conflict.is_empty() {
-        Finding::Conflict
-    } else if !unexplained.is_empty() {
-        Finding::Unexplained
-    } else if dominated {
-        Finding::PriorDominated
-    } else if wider.is_some() {
-        Finding::Widened
-    } else {
-        Finding::Identified
-    };
-    let answer = |n: usize| match (&fitted.correlated, finding) {
-        (Some(found), Finding::NoShift) => match found.shift.largest_share {
-            // A body of linear stiffness moves as 1 / modulus.
-            Some(share) if share > 0.0 => Claim::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
-            _ => Claim::Withheld,
-        },
-        _ if finding.has_stiffness() => {
-            Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
-        }
-        _ => Claim::Withheld,
-    };
-    let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
-    let mut reasons: Vec<Reason> = still.into_iter().chain(conflict).chain(unexplained).chain(wider).collect();
-    if finding.has_stiffness() {
-        let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != super::Knowledge::Identified);
-        reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
-    }
-    if weight_alone && finding.has_stiffness() {
-        reasons.push(Reason::LoadAssumed);
-    }
-    if fitted.descent.convergence == Convergence::IterationsExhausted {
-        reasons.push(Reason::NotConverged);
-    }
-    Verdict::new(finding, share, moduli, reasons)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -393,6 +305,7 @@ mod tests {
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
+    use crate::experiment::verdict::Claim;
     use crate::fem::simulate;
     use crate::material::meta_model::MetaModel;
     use crate::register::deformable::DeformableError;

@@ -1,0 +1,102 @@
+//! What a fit comes down to: its figures against the measurement, the prior and stillness.
+
+use super::evidence::STRONG;
+use super::findings::Fitted;
+use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
+use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
+
+/// What a verdict needs of its problem.
+pub(super) struct Posed<'a> {
+    /// What was known before.
+    pub prior: &'a [LogPrior],
+    /// The tissue whose shear modulus a parameter is.
+    pub tissues: &'a [Option<String>],
+    /// Nothing but weight loads the body, and the density is given.
+    pub weight_alone: bool,
+    /// Whether load and supports are known, as a phantom's are: then nothing contradicts them.
+    pub body_known: bool,
+}
+
+/// What the figures come down to.
+pub(super) fn verdict_of_fit(
+    fitted: &Fitted,
+    settings: &EstimateSettings,
+    posterior: &Posterior,
+    posed: &Posed<'_>,
+) -> Verdict {
+    let Posed { prior, tissues, weight_alone, body_known } = *posed;
+    let mut unexplained = Vec::new();
+    let mut still = None;
+    let mut share = None;
+    let mut wider = None;
+    if let Some(found) = &fitted.correlated {
+        share = Some(found.shift.explained_share);
+        if !found.shift.seen {
+            let (log_odds, would_be_seen_mm) = (found.odds.moved_to_still, found.shift.would_be_seen_mm);
+            still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
+        }
+        // Noise that had to grow is as unexplained as a discrepancy is.
+        let (unexplained_by, noise_mm) = (found.unexplained, found.measured_noise.sd_mm);
+        let left_mm = unexplained_by.noise.sd_mm.hypot(unexplained_by.discrepancy.sd_mm);
+        let discrepancy_mm = (left_mm * left_mm - noise_mm * noise_mm).max(0.0).sqrt();
+        let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
+        // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
+        if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
+            unexplained.push(reason);
+        } else if discrepancy_mm > noise_mm {
+            wider = Some(reason);
+        }
+        if found.odds.model_to_any_movement < STRONG {
+            unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
+        }
+    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt())
+    {
+        // A root mean square of n independent ones is known to its 1 / sqrt(2 n).
+        let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
+        unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
+    }
+    let conflict = prior.iter().zip(&fitted.descent.log_parameters).filter_map(|(prior, value)| {
+        let sd = (value - prior.mean) / prior.sd?;
+        (sd.abs() > CONTRADICTION_SD).then(|| Reason::FarFromPrior { name: prior.name.clone(), sd })
+    });
+    let conflict: Vec<Reason> = if body_known { Vec::new() } else { conflict.collect() };
+    let named = || tissues.iter().enumerate().filter_map(|(n, tissue)| tissue.clone().map(|tissue| (n, tissue)));
+    let dominated = named().all(|(n, _)| posterior.identifiability.verdicts[n] != Knowledge::Identified);
+    let finding = if still.is_some() {
+        Finding::NoShift
+    } else if !conflict.is_empty() {
+        Finding::Conflict
+    } else if !unexplained.is_empty() {
+        Finding::Unexplained
+    } else if dominated {
+        Finding::PriorDominated
+    } else if wider.is_some() {
+        Finding::Widened
+    } else {
+        Finding::Identified
+    };
+    let answer = |n: usize| match (&fitted.correlated, finding) {
+        (Some(found), Finding::NoShift) => match found.shift.largest_share {
+            // A body of linear stiffness moves as 1 / modulus.
+            Some(share) if share > 0.0 => Claim::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
+            _ => Claim::Withheld,
+        },
+        _ if finding.has_stiffness() => {
+            Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
+        }
+        _ => Claim::Withheld,
+    };
+    let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
+    let mut reasons: Vec<Reason> = still.into_iter().chain(conflict).chain(unexplained).chain(wider).collect();
+    if finding.has_stiffness() {
+        let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != Knowledge::Identified);
+        reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
+    }
+    if weight_alone && finding.has_stiffness() {
+        reasons.push(Reason::LoadAssumed);
+    }
+    if fitted.descent.convergence == Convergence::IterationsExhausted {
+        reasons.push(Reason::NotConverged);
+    }
+    Verdict::new(finding, share, moduli, reasons)
+}
