@@ -28,6 +28,10 @@ pub struct SkullSettings {
     /// Room between cortex and bone, mm: see `from`. A layer of fluid of about a millimetre where the brain is thickest in
     /// the skull.
     pub gap_mm: f64,
+    /// How well an estimate knows that room: standard deviation of its logarithm; 0 for exactly. The fluid over the cortex
+    /// differs between heads and places by more than a factor of two, and by a third between lying on the back and on the
+    /// face (Rice et al., "Subject position affects EEG magnitudes", NeuroImage 64, 2013).
+    pub gap_log_sd: f64,
     /// The bone is open this far around the cavity, mm; 0 where the flap is back in its place.
     pub opening_mm: f64,
     /// Sulci and fissures up to twice this width are no way for the bone to follow, mm.
@@ -38,7 +42,14 @@ pub struct SkullSettings {
 
 impl Default for SkullSettings {
     fn default() -> Self {
-        Self { from: SkullFrom::default(), gap_mm: 1.0, opening_mm: 0.0, closing_mm: 4.0, brainstem_cut_mm: 3.0 }
+        Self {
+            from: SkullFrom::default(),
+            gap_mm: 1.0,
+            gap_log_sd: 0.5,
+            opening_mm: 0.0,
+            closing_mm: 4.0,
+            brainstem_cut_mm: 3.0,
+        }
     }
 }
 
@@ -51,6 +62,7 @@ impl SkullSettings {
         let length = |x: f64| (0.0..=50.0).contains(&x);
         first_broken(&[
             ("gap_mm", &self.gap_mm, length(self.gap_mm), "0 to 50 mm"),
+            ("gap_log_sd", &self.gap_log_sd, (0.0..=3.0).contains(&self.gap_log_sd), "0 to 3"),
             ("opening_mm", &self.opening_mm, length(self.opening_mm), "0 to 50 mm"),
             ("closing_mm", &self.closing_mm, length(self.closing_mm), "0 to 50 mm"),
             ("brainstem_cut_mm", &self.brainstem_cut_mm, length(self.brainstem_cut_mm), "0 to 50 mm"),

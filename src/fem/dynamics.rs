@@ -119,7 +119,7 @@ impl Moving<'_> {
             self.model.add_free(&mut now, 1.0, &moved);
             let mut first = Some(self.model.tangent_of_body(&now, &self.laws, &mut forces, false, spare.take()));
             // Damping by stiffness is the tissue's: a wall that damped would hold what leaves it.
-            self.model.supports.add_forces(&now, &self.model.nodes_m, &mut forces);
+            self.model.supports.add_forces(&now, &self.model.nodes_m, self.laws.walls_softer, &mut forces);
             let mut rhs = self.model.out_of_balance(&forces, 1.0);
             add(&mut rhs, 1.0, &momentum);
             if let Some(start) = &at_start {
@@ -157,7 +157,7 @@ impl Moving<'_> {
                     kept = Some(tangent);
                     self.mass.plus(mass_factor, sum, 1.0)
                 };
-                self.model.add_stiffness_of_supports(&now, project, &mut system);
+                self.model.add_stiffness_of_supports(&now, self.laws.walls_softer, project, &mut system);
                 solver.prepare(&system);
                 report = if iteration == 0 {
                     self.solve_along_velocity(solver, &system, &rhs, &mut change, finest)

@@ -47,6 +47,12 @@ const FIRST_FORCING: [f64; 2] = [0.1, 0.01];
 /// A load step is given up for a shorter one when the residual has found no new minimum for so many iterations.
 const PATIENCE: usize = 12;
 
+/// How many times softer walls are on the way from rest to their own softness.
+const SOFTER: [f64; 2] = [20.0, 4.5];
+
+/// Relative residual that ends a step whose walls are not yet what they are.
+const ROUGHLY: f64 = 1e-2;
+
 /// Newton iterations of all load steps together, in units of the most for one: the whole call ends with a verdict.
 const BUDGET: usize = 8;
 
@@ -61,7 +67,7 @@ impl Model {
         warm_start: Option<&State>,
         progress: &dyn Fn(&Progress),
     ) -> Result<(Outcome, State), FemError> {
-        let laws = self.laws(materials)?;
+        let mut laws = self.laws(materials)?;
         let mut record = ConvergenceRecord::default();
         let mut solver = solver::for_model(self, largest_ratio(materials));
         let nodes = self.nodes_m.len();
@@ -78,7 +84,14 @@ impl Model {
             if stored.is_finite() {
                 let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);
                 let start_whole = all_whole(&u);
-                let stage = Stage { laws: &laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], progress };
+                let stage = Stage {
+                    laws: &laws,
+                    factor: 1.0,
+                    load_scale,
+                    first_forcing: FIRST_FORCING[1],
+                    goal: self.scenario.solver.relative_residual,
+                    progress,
+                };
                 let found = self.newton(&stage, &mut u, &mut forces, solver.as_mut(), &mut record).is_ok();
                 // A start far off may lead to an equilibrium with cells inside out: then the way is from rest.
                 if found && all_whole(&u) {
@@ -94,7 +107,8 @@ impl Model {
             }
         }
 
-        let from_rest = self.solve_from_rest(&laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
+        let from_rest =
+            self.solve_from_rest(&mut laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
         let (u, forces) = match (from_rest, doubtful) {
             (Ok(u), Some((.., lower))) if self.energy(&u, &laws) - work(&u) < lower => (u, forces),
             (_, Some((u, forces, relative_residual, _))) => {
@@ -109,19 +123,29 @@ impl Model {
     /// Equilibrium from rest, in load steps; `forces` become its internal forces.
     fn solve_from_rest(
         &self,
-        laws: &Laws,
+        laws: &mut Laws,
         load_scale: f64,
         forces: &mut [[f64; 3]],
         solver: &mut dyn LinearSolver,
         record: &mut ConvergenceRecord,
         progress: &dyn Fn(&Progress),
     ) -> Result<Vec<[f64; 3]>, FemError> {
+        let goal = self.scenario.solver.relative_residual;
+        if let Some(u) = self.through_soft_walls(laws, load_scale, forces, solver, record, progress) {
+            let stage = Stage { laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], goal, progress };
+            let mut hardened = u;
+            if self.newton(&stage, &mut hardened, forces, solver, record).is_ok() {
+                record.load_steps.push(1.0);
+                return Ok(hardened);
+            }
+        }
+        let laws = &*laws;
         let mut u = vec![[0.0; 3]; self.nodes_m.len()];
         let mut before: Option<(f64, Vec<[f64; 3]>)> = None;
         let (mut reached, mut step) = (0.0_f64, 1.0_f64);
         while reached < 1.0 {
             let factor = (reached + step).min(1.0);
-            let stage = Stage { laws, factor, load_scale, first_forcing: FIRST_FORCING[0], progress };
+            let stage = Stage { laws, factor, load_scale, first_forcing: FIRST_FORCING[0], goal, progress };
             let start = self.predicted(&u, reached, before.as_ref(), factor, laws, solver);
             let mut trial = start;
             match self.newton(&stage, &mut trial, forces, solver, record) {
@@ -148,6 +172,38 @@ impl Model {
             }
         }
         Ok(u)
+    }
+
+    /// Near the equilibrium of a body before walls under the whole load, by way of softer ones; the walls are what they are
+    /// at the end. `None` without walls, or where that way leads nowhere.
+    ///
+    /// A body with room before its wall falls into it in one step of Newton's method, and most of the next steps go to
+    /// finding out which nodes are pressed. Walls as thick as the room catch it softly.
+    fn through_soft_walls(
+        &self,
+        laws: &mut Laws,
+        load_scale: f64,
+        forces: &mut [[f64; 3]],
+        solver: &mut dyn LinearSolver,
+        record: &mut ConvergenceRecord,
+        progress: &dyn Fn(&Progress),
+    ) -> Option<Vec<[f64; 3]>> {
+        if !self.supports.has_walls() {
+            return None;
+        }
+        let mut u = vec![[0.0; 3]; self.nodes_m.len()];
+        self.move_prescribed(&mut u, 1.0);
+        for (n, softer) in SOFTER.into_iter().enumerate() {
+            laws.walls_softer = softer;
+            let first_forcing = FIRST_FORCING[n.min(1)];
+            let stage = Stage { laws, factor: 1.0, load_scale, first_forcing, goal: ROUGHLY, progress };
+            let found = self.newton(&stage, &mut u, forces, solver, record).is_ok();
+            laws.walls_softer = 1.0;
+            if !found {
+                return None;
+            }
+        }
+        Some(u)
     }
 
     /// Puts prescribed components where they belong at a part of the load.
@@ -263,9 +319,9 @@ impl Model {
                 fraction: factor,
                 iteration: record.iterations.len(),
                 relative_residual: relative,
-                goal: settings.relative_residual,
+                goal: stage.goal,
             });
-            if relative <= settings.relative_residual {
+            if relative <= stage.goal {
                 return Ok(());
             }
             (best, since_best) = if size < best { (size, 0) } else { (best, since_best + 1) };
@@ -273,7 +329,7 @@ impl Model {
             if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
-            let needed = 0.5 * settings.relative_residual / relative;
+            let needed = 0.5 * stage.goal / relative;
             let forcing = if iteration == 0 {
                 stage.first_forcing.max(needed).min(0.5)
             } else {
@@ -378,6 +434,8 @@ struct Stage<'a> {
     factor: f64,
     load_scale: f64,
     first_forcing: f64,
+    /// Relative residual that is low enough.
+    goal: f64,
     progress: &'a dyn Fn(&Progress),
 }
 

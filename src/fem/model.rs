@@ -209,6 +209,12 @@ impl Model {
         })
     }
 
+    /// Moves the wall of this number (as [`crate::fem::By::Gap`] counts them) to another gap from the body, mm; planes count
+    /// it from where they stand. Nothing happens where there is no such wall.
+    pub fn set_gap(&mut self, wall: usize, gap_mm: f64) {
+        self.supports.set_gap(wall, gap_mm);
+    }
+
     /// Number of free nodes (three unknowns each).
     pub fn free_nodes(&self) -> usize {
         self.node_of_row.len()
@@ -269,13 +275,13 @@ impl Model {
 
     /// Stored energy of body, walls and springs, J.
     pub(super) fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {
-        self.body.energy(u, laws) + self.supports.energy(u, &self.nodes_m)
+        self.body.energy(u, laws) + self.supports.energy(u, &self.nodes_m, laws.walls_softer)
     }
 
     /// Its derivative by the displacement of all nodes, N.
     pub(super) fn internal_forces(&self, u: &[[f64; 3]], laws: &Laws, forces: &mut [[f64; 3]]) {
         self.body.assemble(u, laws, &self.partition, forces, None, false);
-        self.supports.add_forces(u, &self.nodes_m, forces);
+        self.supports.add_forces(u, &self.nodes_m, laws.walls_softer, forces);
     }
 
     /// Tangent at u, in the memory of a spare one; also fills the internal forces of all nodes.
@@ -288,15 +294,15 @@ impl Model {
         spare: Option<Tangent>,
     ) -> Tangent {
         let mut tangent = self.tangent_of_body(u, laws, forces, project, spare);
-        self.supports.add_forces(u, &self.nodes_m, forces);
-        self.add_stiffness_of_supports(u, project, &mut tangent);
+        self.supports.add_forces(u, &self.nodes_m, laws.walls_softer, forces);
+        self.add_stiffness_of_supports(u, laws.walls_softer, project, &mut tangent);
         tangent
     }
 
     /// Adds what walls and springs are to a tangent of the body.
-    pub(super) fn add_stiffness_of_supports(&self, u: &[[f64; 3]], project: bool, tangent: &mut Tangent) {
+    pub(super) fn add_stiffness_of_supports(&self, u: &[[f64; 3]], softer: f64, project: bool, tangent: &mut Tangent) {
         let held = self.held_components.as_ref().map(|held| held.as_slice());
-        self.supports.add_stiffness(u, &self.nodes_m, held, project, tangent);
+        self.supports.add_stiffness(u, &self.nodes_m, softer, held, project, tangent);
     }
 
     /// Tangent and internal forces of the body without walls and springs.

@@ -64,11 +64,25 @@ impl Model {
         state: &State,
         by: &[By],
     ) -> Result<Vec<Vec<[f64; 3]>>, FemError> {
+        self.sensitivities_within(TOLERANCE, materials, state, by)
+    }
+
+    /// [`Model::sensitivities`] to this relative residual of their linear systems.
+    ///
+    /// # Errors
+    /// As [`Model::sensitivities`].
+    pub fn sensitivities_within(
+        &self,
+        relative_residual: f64,
+        materials: &Materials,
+        state: &State,
+        by: &[By],
+    ) -> Result<Vec<Vec<[f64; 3]>>, FemError> {
         let mut at = Linearised::new(self, materials, state)?;
         by.iter()
             .map(|by| {
                 let rhs = self.free_part(&at.driving_force(by)?);
-                let step = at.solve(&rhs)?;
+                let step = at.solve(&rhs, relative_residual)?;
                 let mut change = vec![[0.0; 3]; state.u.len()];
                 if *by == By::AllLoads {
                     self.move_prescribed(&mut change, 1.0);
@@ -94,7 +108,7 @@ impl Model {
         self.state(slope_per_mm)?;
         let slope = self.solver_numbering(&slope_per_mm.iter().map(|v| millimetres(*v)).collect::<Vec<_>>());
         let mut at = Linearised::new(self, materials, state)?;
-        let weights = at.solve(&self.free_part(&slope))?;
+        let weights = at.solve(&self.free_part(&slope), TOLERANCE)?;
         by.iter()
             .map(|by| {
                 let mut sum = reduce::dot(&weights, &self.free_part(&at.driving_force(by)?));
@@ -128,9 +142,9 @@ impl<'a> Linearised<'a> {
         Ok(Self { model, materials, u: &state.u, tangent, solver })
     }
 
-    fn solve(&mut self, rhs: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, FemError> {
+    fn solve(&mut self, rhs: &[[f64; 3]], relative_residual: f64) -> Result<Vec<[f64; 3]>, FemError> {
         let mut x = vec![[0.0; 3]; rhs.len()];
-        let report = self.solver.solve(&self.tangent, rhs, &mut x, TOLERANCE);
+        let report = self.solver.solve(&self.tangent, rhs, &mut x, relative_residual);
         if report.negative_curvature { Err(FemError::UnstableState) } else { Ok(x) }
     }
 

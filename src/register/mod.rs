@@ -18,4 +18,4 @@ mod whole_head;
 
 pub use affine::subject_from_mean_head;
 pub use rigid::{FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid};
-pub use whole_head::{MeanHead, register_to_mean_head};
+pub use whole_head::{MeanHead, register_to_mean_head, without_gain};

@@ -174,8 +174,10 @@ pub(super) fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, 
     }
 }
 
-/// The image over its own slow gain: every neighbourhood of the head becomes equally bright on average.
-fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
+/// The image over its own slow gain: every neighbourhood of the head (30 mm, standard deviation) becomes equally bright on
+/// average. Intensities come out in units of their neighbourhood's mean.
+#[must_use]
+pub fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
     use crate::image::gaussian::gaussian;
     /// Wider than the brain's own regions, narrower than a coil's reach.
     const SIGMA_MM: f64 = 30.0;

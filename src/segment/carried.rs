@@ -1,11 +1,12 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
+use super::overhang::{onto_the_brain, share_beyond};
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, segment_with_priors};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
-use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
+use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head, without_gain};
 use thiserror::Error;
 
 /// What is left of the misfit between the carried template and a head, mm: about a voxel of the fit's finest level.
@@ -50,6 +51,13 @@ const DOUBTFUL: f64 = 0.5;
 /// lines up whatever folds it meets, and what it reaches from the right one on the hardest heads (thick slices, small
 /// children, lesions, wide ventricles).
 const LEAST: f64 = 0.4;
+/// Share of the layer outside the carried surface that is found to be brain from which on the template came out too small.
+/// Where it fits, fluid and bone fill that layer: 10 to 25 %.
+const CROWDED: f64 = 0.32;
+/// How often a larger start is tried.
+const LARGER_STARTS: usize = 2;
+/// Loss of local correlation with which a larger template is not believed.
+const MUCH_WORSE: f64 = 0.03;
 /// The brain found over the brain expected; hydrocephalus and atrophy change both.
 const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 
@@ -71,16 +79,58 @@ pub fn fit_template<F: Frame>(
     mni_from_t1: &RigidTransform<F, Mni>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<Mni>, DeformableError> {
-    let template = atlas::template().t1_f32();
-    let affine = mni_from_t1.inverse().to_affine();
-    let on_grid = resample(t1, &template.grid, &affine, Interpolation::Linear, f32::NAN);
-    let start = if settings.affine { stretch(&on_grid.volume, &on_grid.inside) } else { AffineTransform::identity() };
-    let fit = fit_atlas(&on_grid.volume, &template, &start, None, settings)?;
-    if !settings.affine || fit.quality.correlation[1] >= DOUBTFUL {
-        return Ok(fit);
+    Ok(Carried::onto(t1, mni_from_t1, settings)?.fit)
+}
+
+/// A fit with what it began from.
+struct Carried {
+    /// The head on the template's grid as the fit saw it; not a number where nothing is known.
+    subject: Volume<f32, Mni>,
+    /// Subject from template, before the deformable part.
+    start: AffineTransform<Mni, Mni>,
+    fit: AtlasFit<Mni>,
+}
+
+impl Carried {
+    fn from(
+        subject: Volume<f32, Mni>,
+        start: AffineTransform<Mni, Mni>,
+        settings: &DeformableSettings,
+    ) -> Result<Self, DeformableError> {
+        let fit = fit_atlas(&subject, &atlas::template().t1_f32(), &start, None, settings)?;
+        Ok(Self { subject, start, fit })
     }
-    let plain = fit_atlas(&on_grid.volume, &template, &atlas::head_from_template(), None, settings)?;
-    Ok(if plain.quality.correlation[1] > fit.quality.correlation[1] { plain } else { fit })
+
+    fn correlation(&self) -> f64 {
+        self.fit.quality.correlation[1]
+    }
+
+    fn or(self, other: Self) -> Self {
+        if other.correlation() > self.correlation() { other } else { self }
+    }
+
+    /// The fit from the stretch that was found. Where it is doubtful, also with the coil's gain taken out, which bends what
+    /// is compared at coarse levels, and from the mean head's size.
+    fn onto<F: Frame>(
+        t1: &Volume<f32, F>,
+        mni_from_t1: &RigidTransform<F, Mni>,
+        settings: &DeformableSettings,
+    ) -> Result<Self, DeformableError> {
+        let affine = mni_from_t1.inverse().to_affine();
+        let grid = atlas::template().grid();
+        let on_grid = resample(t1, &grid, &affine, Interpolation::Linear, f32::NAN);
+        let (subject, known) = (on_grid.volume, on_grid.inside);
+        let start = if settings.affine { stretch(&subject, &known) } else { AffineTransform::identity() };
+        let first = Self::from(subject, start, settings)?;
+        if !settings.affine || first.correlation() >= DOUBTFUL {
+            return Ok(first);
+        }
+        let flat = without_gain(&first.subject.map(|x| if x.is_finite() { x } else { 0.0 }).relabelled());
+        let flat = Volume::from_fn(grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
+        let best = first.or(Self::from(flat, start, settings)?);
+        let plain = Self::from(best.subject.clone(), atlas::head_from_template(), settings)?;
+        Ok(best.or(plain))
+    }
 }
 
 /// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
@@ -107,13 +157,33 @@ pub fn segment_head<F: Frame>(
     deformable: &DeformableSettings,
     settings: &SegmentSettings,
 ) -> Result<(Segmentation<F>, AtlasFit<Mni>), HeadError> {
-    let fit = fit_template(t1, mni_from_t1, deformable)?;
-    let correlation = fit.quality.correlation[1];
+    let mut carried = Carried::onto(t1, mni_from_t1, deformable)?;
+    let correlation = carried.correlation();
     if correlation < LEAST {
         return Err(HeadError::PoorFit { correlation, least: LEAST });
     }
-    let priors = carried_priors(|p| fit.atlas_from_subject.apply(p));
-    let segmentation = segment_with_priors(t1, mni_from_t1, &priors, overrides, settings)?;
+    let segmented = |fit: &AtlasFit<Mni>| -> Result<_, SegmentError> {
+        let priors = carried_priors(|p| fit.atlas_from_subject.apply(p));
+        Ok((segment_with_priors(t1, mni_from_t1, &priors, overrides, settings)?, priors))
+    };
+    let (mut segmentation, mut priors) = segmented(&carried.fit)?;
+    let beyond = |segmentation: &Segmentation<F>, priors: &AtlasPriors| {
+        share_beyond(&segmentation.brain_mni, &segmentation.known_mni, priors)
+    };
+    for _ in 0..LARGER_STARTS {
+        let share = beyond(&segmentation, &priors);
+        if !deformable.affine || overrides.brain.is_some() || share < CROWDED {
+            break;
+        }
+        let start = carried.start.then(&onto_the_brain(&segmentation.brain_mni, &priors));
+        let larger = Carried::from(carried.subject.clone(), start, deformable)?;
+        let (found, there) = segmented(&larger.fit)?;
+        if larger.correlation() < carried.correlation() - MUCH_WORSE || beyond(&found, &there) >= share {
+            break;
+        }
+        (carried, segmentation, priors) = (larger, found, there);
+    }
+    let fit = carried.fit;
     let known = &segmentation.known_mni.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());

@@ -13,6 +13,13 @@ use rayon::prelude::*;
 const CHUNK: usize = 8192;
 /// Iterations of the Markov field on all voxels once means and bias are known from fewer.
 const LAST_ITERATIONS: usize = 5;
+/// The carried template's ventricles are believed to be full of fluid this far inside their walls.
+const VENTRICLE_DEPTH_MM: f32 = 2.0;
+/// Fewer voxels than this say nothing of fluid.
+const LEAST_FLUID: usize = 50;
+/// How much of the way from the ventricles' fluid to grey matter CSF's mean may lie: sulci are never quite full. A small
+/// child's brain fills its skull; with hardly any CSF to be seen the class would turn to the darker half of the cortex.
+const BRIGHTER: f64 = 0.3;
 /// No voxel: marks neighbours outside the region.
 const NONE: u32 = u32::MAX;
 
@@ -86,6 +93,8 @@ pub(super) fn fit_mixture(
     } else {
         raw.clone()
     };
+    let fluid: Vec<usize> =
+        (0..voxels.len()).filter(|&n| priors.ventricle_mm.data[voxels[n] as usize] < -VENTRICLE_DEPTH_MM).collect();
     let mut contents = believed.clone();
     let iterations = if begun.is_some() { settings.iterations.min(LAST_ITERATIONS) } else { settings.iterations };
     for iteration in 0..iterations {
@@ -119,6 +128,9 @@ pub(super) fn fit_mixture(
             })
             .collect();
         (means, deviations) = Moments::total(&parts);
+        if let Some(fluid) = median(fluid.iter().map(|&n| corrected[n])) {
+            means[CSF] = means[CSF].min(fluid + BRIGHTER * (means[GREY] - fluid).max(0.0));
+        }
         if !(means[CSF] < means[GREY] && means[GREY] < means[WHITE]) {
             return None;
         }
@@ -139,6 +151,16 @@ pub(super) fn fit_mixture(
         }
     }
     Some(Mixture { voxels, contents, means, deviations, bias })
+}
+
+/// The middle of values, when there are enough.
+fn median(values: impl Iterator<Item = f32>) -> Option<f64> {
+    let mut values: Vec<f32> = values.collect();
+    if values.len() < LEAST_FLUID {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1))
 }
 
 fn prior_at(priors: &AtlasPriors, n: usize, disbelief: f64) -> [f32; CLASSES] {

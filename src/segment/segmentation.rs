@@ -2,6 +2,7 @@
 
 use super::atlas;
 use super::brain::{BrainSettings, at_each, brain_mask};
+use super::coil::without_strong_gain;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
@@ -118,6 +119,15 @@ pub enum SegmentWarning {
         /// Share of the template's brain outside the image, in percent.
         percent: f64,
     },
+    /// A surface coil saw parts of the brain much brighter than others.
+    #[error(
+        "parts of the brain are {times:.1} times as bright as others (a surface coil): taken out, but the outline is less sure \
+         where it is brightest, the crown as a rule; the scanner's normalised reconstruction of the scan is better"
+    )]
+    StrongGain {
+        /// How many times.
+        times: f64,
+    },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
     NoVentricle,
@@ -205,6 +215,13 @@ pub fn segment_with_priors<F: Frame>(
     let on_grid = resample(t1, &grid, &t1_from_mni.to_affine(), Interpolation::CubicBSpline, 0.0);
     let (raw, known) = (on_grid.volume.map(|x| x.max(0.0)), on_grid.inside);
     let mut warnings = Vec::new();
+    let raw = match without_strong_gain(&raw, &known, priors) {
+        Some((flat, times)) => {
+            warnings.push(SegmentWarning::StrongGain { times });
+            flat
+        }
+        None => raw,
+    };
 
     let expected = priors.brain_mm.map(|d| d < 0.0);
     let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);

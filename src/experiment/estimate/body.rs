@@ -24,6 +24,8 @@ pub enum Unknown {
     Density,
     /// Pressure on the facets of a set, Pa: `loads.pressure` of this index, in the direction given there.
     Pressure(usize),
+    /// Room before the wall of this number of the scenario's `contact`, mm.
+    Gap(usize),
     /// Turn of gravity (an angle, not a logarithm) about one of the two axes across the direction given.
     GravityTurn(Turn),
 }
@@ -79,6 +81,7 @@ impl Unknown {
             Self::Shape(tissue, _) => format!("alpha of {}", tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
+            Self::Gap(_) => "gap_mm between cortex and skull".to_owned(),
             Self::GravityTurn(Turn::Nodding) => "turn of gravity about left-right, degrees".to_owned(),
             Self::GravityTurn(Turn::Rolling) => "turn of gravity across that, degrees".to_owned(),
         }
@@ -105,7 +108,8 @@ pub struct Body<'a> {
     model: Model,
     /// The gravity that turns are counted from, m/s2.
     gravity: Vector3<f64>,
-    start: Option<State>,
+    /// The last point solved.
+    last: Option<Last>,
     /// Solves for an equilibrium so far.
     pub solves: usize,
     /// Linear solves for sensitivities so far.
@@ -126,6 +130,37 @@ pub enum BodyError {
     /// The solver's own.
     #[error(transparent)]
     Fem(#[from] FemError),
+}
+
+/// A point of the parameters, its equilibrium and how that changes.
+struct Last {
+    log_parameters: Vec<f64>,
+    state: State,
+    solved: Solved,
+}
+
+/// Longest way (of a logarithm) over which sensitivities foretell the next equilibrium better than the last one does: to
+/// first order a body of half the stiffness moves by a half more, in truth by twice as much.
+const FORETOLD: f64 = 0.7;
+
+/// Relative residual of the sensitivities' linear systems: a Gauss-Newton step needs no better ones.
+const SENSITIVE: f64 = 1e-6;
+
+impl Last {
+    /// Where to look for the equilibrium at other parameters.
+    fn towards(&self, log_parameters: &[f64], model: &Model) -> State {
+        let way: Vec<f64> = log_parameters.iter().zip(&self.log_parameters).map(|(to, from)| to - from).collect();
+        if way.iter().any(|step| step.abs() > FORETOLD) {
+            return self.state.clone();
+        }
+        let mut foretold = self.solved.outcome.displacement_mm.clone();
+        for (step, change) in way.iter().zip(&self.solved.sensitivities) {
+            for (u, s) in foretold.iter_mut().zip(change) {
+                (0..3).for_each(|a| u[a] += step * s[a]);
+            }
+        }
+        model.state(&foretold).unwrap_or_else(|_| self.state.clone())
+    }
 }
 
 /// A solved point with everything the maps need.
@@ -162,7 +197,7 @@ impl<'a> Body<'a> {
             observation,
             model,
             gravity,
-            start: None,
+            last: None,
             solves: 0,
             tangent_solves: 0,
         })
@@ -191,7 +226,7 @@ impl<'a> Body<'a> {
         let mut loads = self.template.loads.clone();
         for (unknown, &value) in self.unknowns.iter().zip(parameters) {
             match unknown {
-                Unknown::ShearModulus(_) | Unknown::Shape(..) | Unknown::GravityTurn(_) => {}
+                Unknown::ShearModulus(_) | Unknown::Shape(..) | Unknown::GravityTurn(_) | Unknown::Gap(_) => {}
                 Unknown::Density => loads.density_kg_per_m3 = value.exp(),
                 Unknown::Pressure(n) => {
                     let pressure = &mut loads.pressure[*n].pressure_pa;
@@ -231,13 +266,22 @@ impl<'a> Body<'a> {
     /// # Errors
     /// The solver's.
     pub fn solve(&mut self, log_parameters: &[f64]) -> Result<Solved, BodyError> {
+        if let Some(last) = self.last.as_ref().filter(|last| last.log_parameters == log_parameters) {
+            return Ok(last.solved.clone());
+        }
         let loads = self.loads(log_parameters);
         if loads != self.template.loads {
             self.template.loads = loads;
             self.model = Model::new(self.mesh, &self.template)?;
         }
+        for (unknown, &value) in self.unknowns.iter().zip(log_parameters) {
+            if let Unknown::Gap(wall) = unknown {
+                self.model.set_gap(*wall, value.exp());
+            }
+        }
         let materials = materials(&self.template, &self.unknowns, log_parameters, self.poisson_ratio)?;
-        let (outcome, state) = self.model.solve(&materials, self.start.as_ref(), &|_| {})?;
+        let start = self.last.as_ref().map(|last| last.towards(log_parameters, &self.model));
+        let (outcome, state) = self.model.solve(&materials, start.as_ref(), &|_| {})?;
         self.solves += 1;
         // What to differentiate by, with the unknown it belongs to and its weight there.
         let mut by = Vec::new();
@@ -245,6 +289,8 @@ impl<'a> Body<'a> {
             match unknown {
                 Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
                 Unknown::Pressure(number) => by.push((By::Load(Load::Pressure(*number)), n, 1.0)),
+                // By the gap itself, not by its logarithm.
+                Unknown::Gap(wall) => by.push((By::Gap(*wall), n, log_parameters[n].exp())),
                 Unknown::GravityTurn(_) => {
                     let turning = self.turning(log_parameters, n);
                     by.extend((0..3).map(|axis| (By::Gravity(axis), n, turning[axis])));
@@ -273,9 +319,8 @@ impl<'a> Body<'a> {
         let mut different: Vec<By> = by.iter().map(|(by, ..)| by.clone()).collect();
         different.sort_unstable();
         different.dedup();
-        let parts = self.model.sensitivities(&materials, &state, &different)?;
+        let parts = self.model.sensitivities_within(SENSITIVE, &materials, &state, &different)?;
         self.tangent_solves += different.len();
-        self.start = Some(state);
         let mut sensitivities = vec![vec![[0.0; 3]; outcome.displacement_mm.len()]; self.unknowns.len()];
         for (by, n, weight) in by {
             let part = parts.iter().zip(&different).find(|(_, b)| **b == by).map_or(&[][..], |(part, _)| part);
@@ -285,7 +330,9 @@ impl<'a> Body<'a> {
                 }
             }
         }
-        Ok(Solved { outcome, sensitivities })
+        let solved = Solved { outcome, sensitivities };
+        self.last = Some(Last { log_parameters: log_parameters.to_vec(), state, solved: solved.clone() });
+        Ok(solved)
     }
 
     fn residuals(&self, solved: &Solved) -> Linearisation {

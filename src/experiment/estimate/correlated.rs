@@ -81,7 +81,7 @@ pub(super) fn fit(
     body: &mut Body<'_>,
     errors: &CorrelatedErrors,
     prior: &[LogPrior],
-    start: &[f64],
+    (start, begun): (&[f64], Option<Unexplained>),
     instrument: Option<(&Instrument<'_>, usize)>,
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
@@ -99,15 +99,20 @@ pub(super) fn fit(
     let prior: Vec<LogPrior> = prior.iter().cloned().chain(rigid.priors()).collect();
     let seen_there = pick(&seen);
     body.observe(Observation::Nodes(seen_there.clone()));
-    let pattern_mm = body.solve(start).map_err(|e| EstimateError::Start(e.to_string()))?.outcome.displacement_mm;
+    let usual: Vec<f64> = prior[..own].iter().map(|p| p.mean).collect();
+    let pattern_mm = body.solve(&usual).map_err(|e| EstimateError::Start(e.to_string()))?.outcome.displacement_mm;
     let mut fit = Fit { body, places_mm, rigid, prior, own };
 
     let exact = Unexplained { noise: errors.noise, discrepancy: Process { sd_mm: 0.0, ..errors.noise } };
     let rough = EstimateSettings { decrement_tolerance: ROUGH, ..settings.clone() };
     let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
-    let mut descent = fit.descend(&exact, &from, &rough)?;
-    let mut unexplained = fit.errors(&descent, errors.noise)?.unexplained;
-    descent = fit.descend(&unexplained, &descent.log_parameters, &rough)?;
+    let (mut unexplained, from) = if let Some(begun) = begun {
+        (begun, from)
+    } else {
+        let descent = fit.descend(&exact, &from, &rough)?;
+        (fit.errors(&descent, errors.noise)?.unexplained, descent.log_parameters)
+    };
+    let mut descent = fit.descend(&unexplained, &from, &rough)?;
     let mut taken_out_rms_mm = None;
     if let Some((instrument, rounds)) = instrument {
         for _ in 0..rounds {

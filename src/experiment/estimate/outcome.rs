@@ -53,6 +53,8 @@ pub struct Problem<'a> {
     pub body_known: bool,
     /// Where to start; the prior's mean when empty.
     pub start: Vec<f64>,
+    /// What was found to be unexplained on the way there; looked for anew where nothing is given.
+    pub unexplained: Option<Unexplained>,
     /// The measurement behind nodes' displacements, where its own error is to be taken out, and how many times.
     pub instrument: Option<(&'a Instrument<'a>, usize)>,
 }
@@ -123,7 +125,13 @@ pub struct Estimate {
     pub displacement_95_mm: Vec<f64>,
     /// The tissues' materials at the mode, by tissue.
     pub materials: BTreeMap<String, Material>,
+    /// The unknowns' numbers at the mode, as [`Problem::start`] takes them.
+    pub numbers: Vec<f64>,
 }
+
+/// How far a single room between cortex and skull is off for a head, mm: it differs from place to place by more, and a
+/// head leans on much of its skull at once.
+const ROOM_MM: f64 = 0.3;
 
 /// Finds the most probable parameters and how sure they are.
 ///
@@ -142,7 +150,10 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let unknown = unknowns.clone();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
     let fitted = match &problem.errors {
-        Errors::Correlated(errors) => correlated::fit(&mut body, errors, &prior, &start, problem.instrument, settings)?,
+        Errors::Correlated(errors) => {
+            let from = (start.as_slice(), problem.unexplained);
+            correlated::fit(&mut body, errors, &prior, from, problem.instrument, settings)?
+        }
         Errors::Independent { share } => {
             fit_independent(&mut body, *share, &prior, &start, problem.instrument, settings)?
         }
@@ -168,6 +179,13 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         }
     }
     let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
+    let posterior = unknown.iter().enumerate().fold(posterior, |posterior, (n, unknown)| match unknown {
+        Unknown::Gap(_) => {
+            let values = &fitted.descent.log_parameters;
+            posterior.known_no_better(n, ROOM_MM / values[n].exp(), values, &prior)
+        }
+        _ => posterior,
+    });
     let posed = Posed {
         prior: &prior,
         tissues: &tissues,
@@ -203,7 +221,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         posterior,
         prior,
     };
-    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials })
+    let numbers = fitted.descent.log_parameters;
+    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials, numbers })
 }
 
 /// The material of every tissue at these parameters.
@@ -327,6 +346,7 @@ mod tests {
             coarser: None,
             body_known: true,
             start: vec![2299f64.ln(), 1195f64.ln()],
+            unexplained: None,
             instrument: None,
         }
     }

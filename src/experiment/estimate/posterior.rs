@@ -167,6 +167,26 @@ impl Posterior {
         self
     }
 
+    /// With one parameter known no better than this (standard deviation of its number), whatever the fit says: the others
+    /// are as much less sure as they go along with it.
+    #[must_use]
+    pub fn known_no_better(mut self, parameter: usize, least_sd: f64, values: &[f64], prior: &[LogPrior]) -> Self {
+        let column: Vec<f64> = self.log_covariance.iter().map(|row| row[parameter]).collect();
+        let own = column[parameter];
+        let missing = least_sd * least_sd - own;
+        if missing <= 0.0 || own <= 0.0 {
+            return self;
+        }
+        for p in 0..column.len() {
+            for q in 0..column.len() {
+                self.log_covariance[p][q] += column[p] * column[q] / (own * own) * missing;
+            }
+            self.log_sd[p] = self.log_covariance[p][p].sqrt();
+            self.interval_95[p] = [-Z_95, Z_95].map(|z| prior[p].scale.value(values[p] + z * self.log_sd[p]));
+        }
+        self
+    }
+
     /// With the model's own error (mesh, supports, the body's outer surface) added to the uncertainty of the parameters
     /// whose `error` is given, at these values: standard deviations of their logarithms, in the order of the names.
     #[must_use]
@@ -199,6 +219,26 @@ mod tests {
 
     fn prior(sd: Option<f64>) -> LogPrior {
         LogPrior { name: "mu".to_owned(), mean: 7.0, sd, scale: Scale::Logarithm, correlation: Vec::new() }
+    }
+
+    #[test]
+    fn what_goes_along_with_a_parameter_is_as_much_less_sure() {
+        // Twice the second parameter makes up for the first.
+        let jacobian = DMatrix::from_fn(60, 2, |r, c| {
+            let own = f64::from((r % 5) as u32) - 2.0;
+            if c == 0 { own } else { 0.5 * own + 0.1 * (f64::from((r % 3) as u32) - 1.0) }
+        });
+        let prior = [prior(None), prior(None)];
+        let before = of(jacobian, &prior);
+        let slope = before.log_covariance[0][1] / before.log_covariance[1][1];
+        let same = before.clone().known_no_better(1, 0.5 * before.log_sd[1], &[7.0; 2], &prior);
+        assert_eq!(same.log_sd, before.log_sd);
+        let least = 3.0 * before.log_sd[1];
+        let after = before.clone().known_no_better(1, least, &[7.0; 2], &prior);
+        assert!((after.log_sd[1] - least).abs() < 1e-12);
+        let given = before.log_sd[0].powi(2) - slope * slope * before.log_sd[1].powi(2);
+        assert!((after.log_sd[0].powi(2) - given - (slope * least).powi(2)).abs() < 1e-12);
+        assert!((after.interval_95[0][1].ln() - 7.0 - Z_95 * after.log_sd[0]).abs() < 1e-9);
     }
 
     #[test]

@@ -59,7 +59,8 @@ struct Standing {
     wall: u32,
     before: Before,
     area_m2: f64,
-    /// What the gap is more than the field, or than the way along the normal, m.
+    /// What the gap is more than the field, or than the way along the normal, m; the wall's own gap not counted where the
+    /// room follows it.
     room_m: f64,
     /// The room follows the wall's gap.
     follows_gap: bool,
@@ -80,6 +81,8 @@ struct Barrier {
     set: String,
     potential: Potential,
     field: Option<Arc<SmoothField>>,
+    /// Room between body and wall, m.
+    gap_m: f64,
 }
 
 /// All walls and springs of a model.
@@ -126,7 +129,10 @@ impl Supports {
             stiffness: contact.stiffness_pa_per_mm / METRES_PER_MM,
             softness_m: contact.softness_mm * METRES_PER_MM,
         };
-        let (gap, least) = (contact.gap_mm * METRES_PER_MM, 0.5 * potential.softness_m);
+        let least = 0.5 * potential.softness_m;
+        // A plane stands where it stands.
+        let plane = matches!(contact.wall, Wall::Plane { .. });
+        let gap = if plane { 0.0 } else { contact.gap_mm * METRES_PER_MM };
         let field = match &contact.wall {
             Wall::Field { name, distance_mm: None, .. } => {
                 return Err(FemError::NoField { set: contact.set.clone(), name: name.clone() });
@@ -149,17 +155,31 @@ impl Supports {
                     let room = n.dot(&(Vector3::from(x) - Vector3::from(metres(*point_mm))));
                     (Before::Plane(n), room, true)
                 }
-                Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), gap.max(least), gap > least),
+                Wall::OwnSurface | Wall::Sheet if gap > least => (Before::Plane(-normal), 0.0, true),
+                Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), least, false),
                 Wall::Field { even, .. } => {
                     let seen = field.as_ref().map_or(0.0, |f| f.at(millimetres(x)).value) * METRES_PER_MM;
-                    let room = if *even { gap } else { seen + gap };
-                    (Before::Field, room.max(least) - seen, room > least)
+                    let own = if *even { -seen } else { 0.0 };
+                    let follows = own + seen + gap > least;
+                    (Before::Field, if follows { own } else { least - seen }, follows)
                 }
             };
             self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap });
         }
-        self.walls.push(Barrier { set: contact.set.clone(), potential, field });
+        self.walls.push(Barrier { set: contact.set.clone(), potential, field, gap_m: gap });
         Ok(())
+    }
+
+    /// Gives the wall of this number another gap, mm; it begins no nearer than half its soft layer, as when it was made.
+    pub(super) fn set_gap(&mut self, wall: usize, gap_mm: f64) {
+        if let Some(wall) = self.walls.get_mut(wall) {
+            wall.gap_m = (gap_mm * METRES_PER_MM).max(0.5 * wall.potential.softness_m);
+        }
+    }
+
+    /// Whether anything stands before a wall.
+    pub(super) fn has_walls(&self) -> bool {
+        !self.standing.is_empty()
     }
 
     /// No walls and no springs.
@@ -169,35 +189,38 @@ impl Supports {
 
     fn gap(&self, s: &Standing, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Gap {
         let moved = Vector3::from(u[s.node as usize]);
+        let wall = &self.walls[s.wall as usize];
+        let room_m = s.room_m + if s.follows_gap { wall.gap_m } else { 0.0 };
         match s.before {
-            Before::Plane(n) => (s.room_m + n.dot(&moved), n, Matrix3::zeros()),
+            Before::Plane(n) => (room_m + n.dot(&moved), n, Matrix3::zeros()),
             Before::Field => {
                 let place = Vector3::from(nodes_m[s.node as usize]) + moved;
-                let at = self.walls[s.wall as usize].field.as_ref().map(|f| f.at(millimetres(place.into())));
+                let at = wall.field.as_ref().map(|f| f.at(millimetres(place.into())));
                 let at = at.unwrap_or_default();
                 let bend = Matrix3::from_fn(|r, c| at.hessian[r][c] / METRES_PER_MM);
-                (s.room_m + at.value * METRES_PER_MM, at.gradient.into(), bend)
+                (room_m + at.value * METRES_PER_MM, at.gradient.into(), bend)
             }
         }
     }
 
-    /// `f` of every node before a wall with its gap, in order.
+    /// `f` of every node before a wall, so many times softer than it is, with its gap, in order.
     fn each<T: Send>(
         &self,
         u: &[[f64; 3]],
         nodes_m: &[[f64; 3]],
+        softer: f64,
         f: impl Fn(&Standing, &Potential, Gap) -> T + Sync,
     ) -> Vec<T> {
-        let one = |s: &Standing| f(s, &self.walls[s.wall as usize].potential, self.gap(s, u, nodes_m));
+        let one = |s: &Standing| f(s, &self.walls[s.wall as usize].potential.softer(softer), self.gap(s, u, nodes_m));
         self.standing.par_iter().with_min_len(256).map(one).collect()
     }
 
-    /// Stored energy, J.
-    pub(super) fn energy(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> f64 {
+    /// Stored energy, J, with walls so many times softer than they are.
+    pub(super) fn energy(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]], softer: f64) -> f64 {
         if self.is_empty() {
             return 0.0;
         }
-        let parts = self.each(u, nodes_m, |s, potential, (gap, ..)| s.area_m2 * potential.at(gap)[0]);
+        let parts = self.each(u, nodes_m, softer, |s, potential, (gap, ..)| s.area_m2 * potential.at(gap)[0]);
         let springs = self.tethered.iter().map(|t| {
             let u = Vector3::from(u[t.node as usize]);
             let square = t.along.map_or_else(|| u.norm_squared(), |n| u.dot(&n).powi(2));
@@ -207,11 +230,12 @@ impl Supports {
     }
 
     /// Adds the derivative of the energy to the internal forces of the nodes, N.
-    pub(super) fn add_forces(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]], forces: &mut [[f64; 3]]) {
+    pub(super) fn add_forces(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]], softer: f64, forces: &mut [[f64; 3]]) {
         if self.is_empty() {
             return;
         }
-        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, _)| -s.area_m2 * potential.at(gap)[1] * normal);
+        let parts =
+            self.each(u, nodes_m, softer, |s, potential, (gap, normal, _)| -s.area_m2 * potential.at(gap)[1] * normal);
         for (s, part) in self.standing.iter().zip(parts) {
             (0..3).for_each(|i| forces[s.node as usize][i] += part[i]);
         }
@@ -228,6 +252,7 @@ impl Supports {
         &self,
         u: &[[f64; 3]],
         nodes_m: &[[f64; 3]],
+        softer: f64,
         held: Option<&[[bool; 3]]>,
         project: bool,
         tangent: &mut Tangent,
@@ -235,7 +260,7 @@ impl Supports {
         if self.is_empty() {
             return;
         }
-        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, bend)| {
+        let parts = self.each(u, nodes_m, softer, |s, potential, (gap, normal, bend)| {
             let [_, pressure, stiffness] = potential.at(gap);
             if pressure == 0.0 {
                 return Matrix3::zeros();
@@ -272,7 +297,7 @@ impl Supports {
         if wall >= self.walls.len() {
             return None;
         }
-        let parts = self.each(u, nodes_m, |s, potential, (gap, normal, _)| {
+        let parts = self.each(u, nodes_m, 1.0, |s, potential, (gap, normal, _)| {
             let moves = s.wall as usize == wall && s.follows_gap;
             if moves { -s.area_m2 * potential.at(gap)[2] * METRES_PER_MM * normal } else { Vector3::zeros() }
         });
@@ -288,7 +313,7 @@ impl Supports {
         if self.walls.is_empty() {
             return (Vec::new(), Vec::new());
         }
-        let parts = self.each(u, nodes_m, |_, potential, (gap, normal, _)| (gap, potential.at(gap)[1], normal));
+        let parts = self.each(u, nodes_m, 1.0, |_, potential, (gap, normal, _)| (gap, potential.at(gap)[1], normal));
         let mut walls: Vec<ContactOutcome> =
             self.walls.iter().map(|w| ContactOutcome { set: w.set.clone(), ..Default::default() }).collect();
         let mut pressure_pa = vec![0.0; u.len()];

@@ -14,6 +14,11 @@ pub(super) struct Potential {
 }
 
 impl Potential {
+    /// So many times softer and thicker: the same pressure, that much further before and behind the wall.
+    pub(super) fn softer(&self, times: f64) -> Self {
+        Self { stiffness: self.stiffness / times, softness_m: self.softness_m * times }
+    }
+
     /// Energy (J/m2), pressure (Pa) and stiffness (Pa/m) at a gap (m).
     pub(super) fn at(&self, gap_m: f64) -> [f64; 3] {
         let (k, w) = (self.stiffness, self.softness_m);

@@ -41,6 +41,8 @@ pub(in super::super) struct Laws {
     pub kernels: Vec<Kernel>,
     /// What the nodes evaluate, for elements with averaged deformation.
     pub nodal: Vec<Box<dyn Hyperelastic>>,
+    /// How many times softer and thicker walls are than they will be: 1 but on the way from rest.
+    pub walls_softer: f64,
 }
 
 /// Energy, forces, stiffness and state of a whole body.

@@ -30,7 +30,7 @@ impl<const K: usize, const Q: usize> Body for Plain<K, Q> {
 
     fn laws(&self, materials: &[Material]) -> Laws {
         let kernels = materials.iter().map(|m| Kernel::new(m, m.lame_lambda_pa())).collect();
-        Laws { kernels, nodal: Vec::new() }
+        Laws { kernels, nodal: Vec::new(), walls_softer: 1.0 }
     }
 
     fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {

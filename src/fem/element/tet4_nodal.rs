@@ -54,6 +54,7 @@ impl Body for Averaged {
         Laws {
             kernels: materials.iter().map(|m| Kernel::new(&part(m, 1.0 - NODAL_SHARE), 0.0)).collect(),
             nodal: materials.iter().map(|m| part(m, NODAL_SHARE).law_with_lambda(m.lame_lambda_pa())).collect(),
+            walls_softer: 1.0,
         }
     }
 

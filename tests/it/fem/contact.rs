@@ -194,6 +194,24 @@ fn leaning(height_mm: f64) -> Scenario {
     Scenario::from_toml(&format!("{LEANING}{wall}")).unwrap()
 }
 
+#[test]
+fn a_wall_that_is_moved_away_is_the_wall_put_there() {
+    let mesh = cube(3, 40.0);
+    let (height, by) = (-3.0, 2.0);
+    let put = leaning(height - by * 1.01f64.sqrt());
+    let mut model = Model::new(&mesh, &leaning(height)).unwrap();
+    let solved_by = |model: &Model| model.solve(&put.materials, None, &|_| ()).unwrap().0;
+    let before = solved_by(&model);
+    model.set_gap(0, by);
+    let (moved, there) = (solved_by(&model), solved_by(&Model::new(&mesh, &put).unwrap()));
+    let apart = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    assert!(moved.contact[0].area_mm2 > 0.0);
+    assert!(apart(&moved.displacement_mm, &there.displacement_mm) < 1e-9);
+    assert!(apart(&moved.displacement_mm, &before.displacement_mm) > 0.5);
+}
+
 /// Away from the wall, just within its layer, and pressed against it.
 #[test]
 fn sensitivities_before_a_wall_are_the_slopes_of_solutions() {

@@ -1,0 +1,117 @@
+//! Brain beyond the carried template's surface: the mark of a template that came out too small, and a larger start.
+//!
+//! The template's size is found from heads with their skull. Where that is thin, as a small child's, brain lies where the
+//! mean head has bone, and the deformable fit settles on the wrong side of the cortex.
+
+use super::priors::AtlasPriors;
+use crate::geometry::{AffineTransform, Mni};
+use crate::image::distance::signed_distance_mm;
+use crate::image::{Mask, Volume};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+/// The layer outside the carried surface that is looked at, mm: beyond what a good fit misses, short of where brain is no
+/// longer looked for.
+const LAYER_MM: std::ops::Range<f32> = 2.0..4.5;
+/// One voxel in so many of the surface is enough for twelve unknowns.
+const STRIDE: usize = 7;
+/// Standard deviation of a stretch or shear before anything is seen, and of one distance to the surface, mm; distances of
+/// neighbours are alike, all together are worth so many.
+const STRETCH: f64 = 0.1;
+const DISTANCE_MM: f64 = 2.0;
+const DISTANCES: f64 = 200.0;
+
+/// How much of the layer outside the carried surface was found to be brain, 0 to 1.
+pub(super) fn share_beyond(brain: &Mask<Mni>, known: &Mask<Mni>, priors: &AtlasPriors) -> f64 {
+    let (mut layer, mut found) = (0usize, 0usize);
+    for n in 0..brain.data.len() {
+        if known.data[n] && LAYER_MM.contains(&priors.brain_mm.data[n]) {
+            layer += 1;
+            found += usize::from(brain.data[n]);
+        }
+    }
+    found as f64 / layer.max(1) as f64
+}
+
+/// The affine movement that takes the carried surface nearest to that of the brain found, along its normals.
+pub(super) fn onto_the_brain(brain: &Mask<Mni>, priors: &AtlasPriors) -> AffineTransform<Mni, Mni> {
+    let grid = brain.grid;
+    let signed = signed_distance_mm(brain);
+    let surface: Vec<usize> =
+        (0..grid.len()).filter(|&n| priors.brain_mm.data[n].abs() < 0.5).step_by(STRIDE).collect();
+    let place = |n: usize| grid.position(grid.voxel(n).map(|v| v as f64).into()).mm;
+    let middle = surface.iter().map(|&n| place(n).coords).sum::<Vector3<f64>>() / surface.len().max(1) as f64;
+    let mut normal = DMatrix::<f64>::zeros(12, 12);
+    let mut right = DVector::<f64>::zeros(12);
+    for &n in &surface {
+        let Some(direction) = outward(&priors.brain_mm, n) else { continue };
+        let arm = place(n).coords - middle;
+        let row = DVector::from_fn(12, |p, _| if p < 3 { direction[p] } else { direction[p / 3 - 1] * arm[p % 3] });
+        right.axpy(-f64::from(signed.data[n]), &row, 1.0);
+        normal.ger(1.0, &row, &row, 1.0);
+    }
+    // What the distances are worth together, against a stretch of one standard deviation.
+    let ridge = surface.len() as f64 / DISTANCES * (DISTANCE_MM / STRETCH).powi(2);
+    for p in 0..12 {
+        normal[(p, p)] += if p < 3 { 1e-9 } else { ridge };
+    }
+    let Some(found) = normal.cholesky().map(|c| c.solve(&right)) else { return AffineTransform::identity() };
+    let linear = Matrix3::from_fn(|r, c| f64::from(u8::from(r == c)) + found[3 + 3 * r + c]);
+    let shift = Vector3::new(found[0], found[1], found[2]);
+    AffineTransform::from_parts(linear, middle + shift - linear * middle)
+}
+
+/// The direction in which the distance grows.
+fn outward(distance: &Volume<f32, Mni>, n: usize) -> Option<Vector3<f64>> {
+    let [i, j, k] = distance.grid.voxel(n).map(|v| v as isize);
+    let along = |d: [isize; 3]| {
+        let at = |sign: isize| distance.get(i + sign * d[0], j + sign * d[1], k + sign * d[2]).map(f64::from);
+        Some(at(1)? - at(-1)?)
+    };
+    Vector3::new(along([1, 0, 0])?, along([0, 1, 0])?, along([0, 0, 1])?).try_normalize(1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    fn ball(radius_mm: [f64; 3], centre: [f64; 3]) -> (Mask<Mni>, AtlasPriors) {
+        let grid = Grid::<Mni>::axis_aligned([61, 61, 61], [1.0; 3], [-30.0; 3]);
+        let inside = Mask::from_fn(grid, |n| {
+            let p = grid.voxel(n).map(|v| v as f64 - 30.0);
+            (0..3).map(|a| ((p[a] - centre[a]) / radius_mm[a]).powi(2)).sum::<f64>() < 1.0
+        });
+        let nothing = Volume::filled(grid, 0f32);
+        let priors = AtlasPriors {
+            brain_mm: signed_distance_mm(&inside),
+            tissue: [nothing.clone(), nothing.clone(), nothing.clone()],
+            ventricle_mm: nothing.clone(),
+            cistern_mm: nothing.clone(),
+            deep_grey: nothing,
+        };
+        (inside, priors)
+    }
+
+    #[test]
+    fn a_surface_inside_the_brain_is_taken_out_to_it() {
+        let (brain, _) = ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]);
+        let (_, small) = ball([20.0; 3], [0.0; 3]);
+        let everywhere = brain.map(|_| true);
+        assert!(share_beyond(&brain, &everywhere, &small) > 0.8);
+        let larger = onto_the_brain(&brain, &small);
+        for (axis, radius, middle) in [(0, 24.0, 0.0), (1, 24.0, 0.0), (2, 26.0, 1.0)] {
+            let [low, high] = [-1.0, 1.0].map(|sign| {
+                let mut tip = [0.0; 3];
+                tip[axis] = sign * 20.0;
+                larger.apply(crate::geometry::Position::new(tip[0], tip[1], tip[2])).mm[axis]
+            });
+            // The prior of the stretch holds a little back.
+            assert!(
+                (0.5 * (high - low) - radius).abs() < 1.5 && (0.5 * (high + low) - middle).abs() < 0.6,
+                "{low} {high}"
+            );
+        }
+        let (same, fitting) = ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]);
+        assert!(share_beyond(&same, &everywhere, &fitting) < 0.05);
+    }
+}
