@@ -82,8 +82,14 @@ mod tests {
             (0..3).map(|a| ((p[a] - centre[a]) / radius_mm[a]).powi(2)).sum::<f64>() < 1.0
         });
         let nothing = Volume::filled(grid, 0f32);
+        // As carried by interpolation: any value, not the steps of a distance between voxels.
+        let away = Volume::from_fn(grid, |n| {
+            let p = grid.voxel(n).map(|v| v as f64 - 30.0);
+            let length = (0..3).map(|a| ((p[a] - centre[a]) / radius_mm[a]).powi(2)).sum::<f64>().sqrt();
+            ((length - 1.0) * radius_mm[0]) as f32
+        });
         let priors = AtlasPriors {
-            brain_mm: signed_distance_mm(&inside),
+            brain_mm: away,
             tissue: [nothing.clone(), nothing.clone(), nothing.clone()],
             ventricle_mm: nothing.clone(),
             cistern_mm: nothing.clone(),

@@ -64,10 +64,13 @@ fn even_pressure_goes_through_a_wall_evenly() {
 #[test]
 fn a_body_that_leaves_its_wall_is_not_held_back() {
     let mesh = cube(3, 40.0);
-    let pulled = "fixed = ['z1']\n[loads]\ngravity_m_per_s2 = [0, 0, 9.81]\n";
+    let pulled = "fixed = ['z1']\n[solver]\nrelative_residual = 1e-12\n[loads]\ngravity_m_per_s2 = [0, 0, 9.81]\n";
     let wall = "[[contact]]\nset = 'z0'\nwall = { shape = 'own-surface' }\n";
     let [without, with] = ["", wall].map(|wall| solved(&mesh, &format!("{pulled}{wall}{GREY}")));
-    assert_eq!(without.displacement_mm, with.displacement_mm);
+    // Two ways to one equilibrium: alike but for the solver's residual.
+    for (a, b) in without.displacement_mm.iter().flatten().zip(with.displacement_mm.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
     assert_eq!((with.contact[0].area_mm2, with.contact[0].force_n), (0.0, [0.0; 3]));
 }
 
@@ -197,8 +200,16 @@ fn leaning(height_mm: f64) -> Scenario {
 #[test]
 fn a_wall_that_is_moved_away_is_the_wall_put_there() {
     let mesh = cube(3, 40.0);
-    let (height, by) = (-3.0, 2.0);
-    let put = leaning(height - by * 1.01f64.sqrt());
+    let free = solved(&mesh, LEANING);
+    let below = |n: &u32| {
+        let (x, u) = (mesh.nodes_mm()[*n as usize], free.displacement_mm[*n as usize]);
+        0.1 * (x[0] + u[0]) + x[2] + u[2]
+    };
+    let lowest = mesh.node_sets["z0"].iter().map(below).fold(f64::MAX, f64::min);
+    // Three mm into the way of the lowest node, then one.
+    let (by, length) = (2.0, 1.01f64.sqrt());
+    let [height, lower] = [3.0, 3.0 - by].map(|mm| lowest + mm * length);
+    let put = leaning(lower);
     let mut model = Model::new(&mesh, &leaning(height)).unwrap();
     let solved_by = |model: &Model| model.solve(&put.materials, None, &|_| ()).unwrap().0;
     let before = solved_by(&model);
@@ -209,7 +220,7 @@ fn a_wall_that_is_moved_away_is_the_wall_put_there() {
     };
     assert!(moved.contact[0].area_mm2 > 0.0);
     assert!(apart(&moved.displacement_mm, &there.displacement_mm) < 1e-9);
-    assert!(apart(&moved.displacement_mm, &before.displacement_mm) > 0.5);
+    assert!(apart(&moved.displacement_mm, &before.displacement_mm) > 0.2);
 }
 
 /// Away from the wall, just within its layer, and pressed against it.
