@@ -52,7 +52,7 @@ const DOUBTFUL: f64 = 0.5;
 /// children, lesions, wide ventricles).
 const LEAST: f64 = 0.4;
 /// Share of the layer outside the carried surface that is found to be brain from which on the template came out too small.
-/// Where it fits, fluid and bone fill that layer: 10 to 25 %.
+/// Half way between heads that it fits, where fluid and bone fill that layer, and a small child's that it did not.
 const CROWDED: f64 = 0.32;
 /// How often a larger start is tried.
 const LARGER_STARTS: usize = 2;

@@ -24,7 +24,7 @@ const STRONG: f64 = 0.2;
 /// The surface itself is left out: how much CSF lies there is the patient's.
 const DEPTH_MM: f32 = 2.0;
 
-/// The scan with its gain taken out where that is strong, and how many times brighter than its dark parts (each an eighth of
+/// The scan with its gain taken out where that is strong, and how many times brighter than its dark parts (each a sixth of
 /// the brain or so) the bright ones were; the mean over the brain stays. `None` where it is not strong.
 pub(super) fn without_strong_gain(
     t1: &Volume<f32, Mni>,

@@ -140,7 +140,7 @@ struct Last {
 }
 
 /// Longest way (of a logarithm) over which sensitivities foretell the next equilibrium better than the last one does: to
-/// first order a body of half the stiffness moves by a half more, in truth by twice as much.
+/// first order a body of half the stiffness moves by seven tenths more, in truth by twice as much.
 const FORETOLD: f64 = 0.7;
 
 /// Relative residual of the sensitivities' linear systems: a Gauss-Newton step needs no better ones.

@@ -283,7 +283,7 @@ impl Bodies {
             None => Ok(coarse.clone()),
         };
         let coarser = self.coarser.as_ref().map(supported).transpose()?;
-        // A coarse mesh knows nearly where to look, in a fifth of the time.
+        // A coarse mesh knows nearly where to look, in a fraction of the time.
         let start = coarser.as_ref().zip(input.shift).and_then(|(coarse, shift)| {
             let nodes = options.displacement.observed(coarse, |x| moved_by(&shift.seen, x));
             let problem = Problem {

@@ -197,15 +197,20 @@ fn leaning(height_mm: f64) -> Scenario {
     Scenario::from_toml(&format!("{LEANING}{wall}")).unwrap()
 }
 
-#[test]
-fn a_wall_that_is_moved_away_is_the_wall_put_there() {
-    let mesh = cube(3, 40.0);
-    let free = solved(&mesh, LEANING);
+/// Height of a plane of [`leaning`] that the body just touches when nothing is in its way.
+fn height_of_the_lowest(mesh: &TetMesh) -> f64 {
+    let free = solved(mesh, LEANING);
     let below = |n: &u32| {
         let (x, u) = (mesh.nodes_mm()[*n as usize], free.displacement_mm[*n as usize]);
         0.1 * (x[0] + u[0]) + x[2] + u[2]
     };
-    let lowest = mesh.node_sets["z0"].iter().map(below).fold(f64::MAX, f64::min);
+    mesh.node_sets["z0"].iter().map(below).fold(f64::MAX, f64::min)
+}
+
+#[test]
+fn a_wall_that_is_moved_away_is_the_wall_put_there() {
+    let mesh = cube(3, 40.0);
+    let lowest = height_of_the_lowest(&mesh);
     // Three mm into the way of the lowest node, then one.
     let (by, length) = (2.0, 1.01f64.sqrt());
     let [height, lower] = [3.0, 3.0 - by].map(|mm| lowest + mm * length);
@@ -227,12 +232,7 @@ fn a_wall_that_is_moved_away_is_the_wall_put_there() {
 #[test]
 fn sensitivities_before_a_wall_are_the_slopes_of_solutions() {
     let mesh = cube(3, 40.0);
-    let free = solved(&mesh, LEANING);
-    let below = |n: &u32| {
-        let (x, u) = (mesh.nodes_mm()[*n as usize], free.displacement_mm[*n as usize]);
-        0.1 * (x[0] + u[0]) + x[2] + u[2]
-    };
-    let lowest = mesh.node_sets["z0"].iter().map(below).fold(f64::MAX, f64::min);
+    let lowest = height_of_the_lowest(&mesh);
     let length = 1.01f64.sqrt();
     // Height of the plane at which the lowest node has this room.
     let with_room = |room: f64| leaning(lowest - room * length);
