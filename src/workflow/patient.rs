@@ -256,7 +256,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let held = || -> Result<Vec<HeldBody>, WorkflowError> {
             settings.supports.family().into_iter().map(|supports| self.held(supports)).collect()
         };
-        let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, &work.settings.anat.sag)?;
+        let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
         let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
         let input = EstimateInput { coarser, held, shift, ..self.asked(&tissues) };

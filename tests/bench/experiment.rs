@@ -160,7 +160,6 @@ fn estimated(
         coarser: None,
         body_known: true,
         start,
-        unexplained: None,
         instrument: None,
     };
     solve_problem(problem, &EstimateSettings { noise_mm, ..EstimateSettings::default() }).unwrap()

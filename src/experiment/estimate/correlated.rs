@@ -5,9 +5,12 @@ use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::process::{Factor, Process, spread_out};
+use super::projection::Projection;
 use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
-use super::{Descent, EstimateError, EstimateSettings, Linearisation, LogPrior, estimate, information};
+use super::{
+    Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
+};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::verdict::CONTRADICTION_SD;
 use nalgebra::{DMatrix, DVector};
@@ -23,6 +26,16 @@ pub struct CorrelatedErrors {
     pub places: usize,
 }
 
+/// Most iterations of a descent that another follows: the errors are looked at again before it.
+const ROUGH_ITERATIONS: usize = 8;
+
+/// Most descents, each under the errors of the point before it, until point and errors agree.
+const SETTLING: usize = 3;
+
+/// How many times more the instrument is shown the state where that has since moved by more than the noise: its own error
+/// is about a tenth of what it is shown.
+const AGAIN: usize = 2;
+
 /// One-sided 95 % of a Gaussian.
 const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 
@@ -37,16 +50,15 @@ struct Fit<'b, 'a> {
 }
 
 impl Fit<'_, '_> {
-    /// Descends under these errors; the linearisation of what is returned is in mm.
+    /// Descends by what the model could do; the linearisation of what is returned is in mm.
     fn descend(
         &mut self,
-        unexplained: &Unexplained,
+        projection: &Projection,
         start: &[f64],
         settings: &EstimateSettings,
     ) -> Result<Descent, ProblemError> {
-        let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
         let settings = EstimateSettings { noise_mm: 1.0, ..settings.clone() };
-        let mut weighted = Weighted { model: &mut *self.body, rigid: &self.rigid, factor: &factor, plain: Vec::new() };
+        let mut weighted = Weighted { model: &mut *self.body, rigid: &self.rigid, projection, plain: Vec::new() };
         let mut descent = estimate(&mut weighted, &self.prior, start, &settings)?;
         let (own, amounts) = descent.log_parameters.split_at(self.own);
         let plain = weighted.plain.iter().rev().find(|(at, _)| at == own);
@@ -54,6 +66,52 @@ impl Fit<'_, '_> {
             descent.linearisation = with_remainder(plain, &self.rigid, amounts);
         }
         Ok(descent)
+    }
+
+    /// A descent that has not begun.
+    fn at(&mut self, parameters: &[f64]) -> Result<Descent, ProblemError> {
+        let (own, amounts) = parameters.split_at(self.own);
+        let plain = self.body.linearise(own).map_err(|e| EstimateError::Start(e.to_string()))?;
+        Ok(Descent {
+            log_parameters: parameters.to_vec(),
+            linearisation: with_remainder(&plain, &self.rigid, amounts),
+            costs: Vec::new(),
+            evaluations: 0,
+            convergence: Convergence::IterationsExhausted,
+        })
+    }
+
+    /// What the model could do about a point, under these errors.
+    fn projection(&self, at: &Descent, unexplained: &Unexplained) -> Result<Projection, ProblemError> {
+        let factor = unexplained.factor(&self.places_mm);
+        let found = factor.and_then(|factor| Projection::new(&at.linearisation.jacobian_mm, &factor));
+        Ok(found.ok_or(EstimateError::Covariance)?)
+    }
+
+    /// Descends from a point by what the model could do there, under the most probable errors.
+    fn descend_projected(
+        &mut self,
+        from: &Descent,
+        noise: Process,
+        settings: &EstimateSettings,
+    ) -> Result<Descent, ProblemError> {
+        let unexplained = self.errors(from, noise)?.unexplained;
+        let projection = self.projection(from, &unexplained)?;
+        self.descend(&projection, &from.log_parameters, settings)
+    }
+
+    /// Descends until point and errors agree, or nearly: far from the minimum a large discrepancy is the most probable one,
+    /// and under it the prior weighs more than it should.
+    fn settle(&mut self, from: Descent, noise: Process, settings: &EstimateSettings) -> Result<Descent, ProblemError> {
+        let mut here = from;
+        for _ in 0..SETTLING {
+            here = self.descend_projected(&here, noise, settings)?;
+            // The first evaluation is of the point itself.
+            if here.evaluations <= 1 {
+                break;
+            }
+        }
+        Ok(here)
     }
 
     /// The most probable errors around a point.
@@ -81,7 +139,7 @@ pub(super) fn fit(
     body: &mut Body<'_>,
     errors: &CorrelatedErrors,
     prior: &[LogPrior],
-    (start, begun): (&[f64], Option<Unexplained>),
+    start: &[f64],
     instrument: Option<(&Instrument<'_>, usize)>,
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
@@ -99,38 +157,36 @@ pub(super) fn fit(
     let prior: Vec<LogPrior> = prior.iter().cloned().chain(rigid.priors()).collect();
     let seen_there = pick(&seen);
     body.observe(Observation::Nodes(seen_there.clone()));
-    let usual: Vec<f64> = prior[..own].iter().map(|p| p.mean).collect();
-    let pattern_mm = body.solve(&usual).map_err(|e| EstimateError::Start(e.to_string()))?.outcome.displacement_mm;
     let mut fit = Fit { body, places_mm, rigid, prior, own };
 
-    let exact = Unexplained { noise: errors.noise, discrepancy: Process { sd_mm: 0.0, ..errors.noise } };
-    let rough = EstimateSettings { decrement_tolerance: ROUGH, ..settings.clone() };
+    let iterations = settings.iterations.min(ROUGH_ITERATIONS);
+    let rough = EstimateSettings { decrement_tolerance: ROUGH, iterations, ..settings.clone() };
     let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
-    let (mut unexplained, from) = if let Some(begun) = begun {
-        (begun, from)
-    } else {
-        let descent = fit.descend(&exact, &from, &rough)?;
-        (fit.errors(&descent, errors.noise)?.unexplained, descent.log_parameters)
-    };
-    let mut descent = fit.descend(&unexplained, &from, &rough)?;
+    let start = fit.at(&from)?;
+    let mut descent = fit.settle(start, errors.noise, &rough)?;
     let mut taken_out_rms_mm = None;
-    if let Some((instrument, rounds)) = instrument {
-        for _ in 0..rounds {
+    if let Some((instrument, rounds)) = instrument.filter(|(_, rounds)| *rounds > 0) {
+        let mut shown: Option<Vec<[f64; 3]>> = None;
+        for round in 0..rounds + AGAIN {
             let known = fit.body.solve(&descent.log_parameters[..own])?.outcome.displacement_mm;
+            let away = |before: &Vec<[f64; 3]>| rms_between(before, &known, &seen);
+            if round >= rounds && shown.as_ref().is_some_and(|before| away(before) <= errors.noise.sd_mm) {
+                break;
+            }
             let corrected = without_own_error(&seen, &known, instrument)?;
             taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected));
             fit.body.observe(Observation::Nodes(pick(&corrected)));
-            descent = fit.descend(&unexplained, &descent.log_parameters, &rough)?;
-            unexplained = fit.errors(&descent, errors.noise)?.unexplained;
+            descent = fit.settle(descent, errors.noise, &rough)?;
+            shown = Some(known);
         }
     }
-    descent = fit.descend(&unexplained, &descent.log_parameters, settings)?;
+    descent = fit.descend_projected(&descent, errors.noise, settings)?;
     let evidence = fit.errors(&descent, errors.noise)?;
     let exact = fit.linear(&descent).with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
     // A discrepancy that is not needed is none: its size would widen nothing but by chance.
     let unexplained = if evidence.log_evidence > exact.log_evidence { evidence.unexplained } else { exact.unexplained };
 
-    let findings = fit.findings(errors, &seen_there, &pattern_mm, &descent, unexplained, [evidence, exact])?;
+    let findings = fit.findings(errors, &seen_there, &descent, unexplained, [evidence, exact])?;
     let precisions: Vec<f64> = fit.prior[own..].iter().map(LogPrior::precision).collect();
     let residuals = descent.linearisation.residuals_mm.as_slice();
     let residual_rms_mm = root_mean_square(residuals).unwrap_or(0.0);
@@ -153,6 +209,12 @@ pub(super) fn fit(
     })
 }
 
+/// Root mean square distance between two states over the nodes that were seen, mm.
+fn rms_between(before: &[[f64; 3]], after: &[[f64; 3]], seen: &[MovedNode]) -> f64 {
+    let squared = |n: usize| (0..3).map(|a| (after[n][a] - before[n][a]).powi(2)).sum::<f64>();
+    (seen.iter().map(|(n, _)| squared(*n as usize)).sum::<f64>() / seen.len().max(1) as f64).sqrt()
+}
+
 /// How many independent observations tell as much of a shift of everything as these do.
 fn independent(factor: &Factor, places_mm: &[[f64; 3]], sd_mm: f64) -> f64 {
     let along_x = DMatrix::from_fn(3 * places_mm.len(), 1, |row, _| if row % 3 == 0 { 1.0 } else { 0.0 });
@@ -162,10 +224,9 @@ fn independent(factor: &Factor, places_mm: &[[f64; 3]], sd_mm: f64) -> f64 {
 impl Fit<'_, '_> {
     /// What the fit says of the shift and of the model, beside simpler explanations.
     fn findings(
-        &self,
+        &mut self,
         errors: &CorrelatedErrors,
         seen: &[MovedNode],
-        pattern_mm: &[[f64; 3]],
         descent: &Descent,
         unexplained: Unexplained,
         [evidence, exact]: [Evidence; 2],
@@ -192,10 +253,14 @@ impl Fit<'_, '_> {
             moved_to_still: model.max(anything.log_evidence) - nothing.log_evidence,
         };
 
-        // How much of what the prior's most probable body would do is there, and how well that is known.
+        // How much of what the body would do is there, and how well that is known. Of a body that has not moved only the
+        // prior's most probable one says what it would do.
+        let seen_at_all = odds.moved_to_still > super::STRONG;
+        let usual: Vec<f64> = self.prior[..self.own].iter().map(|p| p.mean).collect();
+        let body = if seen_at_all { &descent.log_parameters[..self.own] } else { &usual };
+        let pattern_mm = self.body.solve(body)?.outcome.displacement_mm;
         let pattern = flat(&|n| pattern_mm[seen[n].0 as usize]);
         // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
-        let seen_at_all = odds.moved_to_still > super::STRONG;
         let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
         let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
         let columns =
@@ -220,11 +285,12 @@ impl Fit<'_, '_> {
         let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
         // What was seen without the instrument's own error is what the model was held against.
         let shifted = flat(&|n| self.body.observed_nodes()[n].1) - &remainder;
-        let factor = unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?;
+        let projection = self.projection(descent, &unexplained)?;
         Ok(Findings {
-            white_jacobian: factor.whiten(&descent.linearisation.jacobian_mm),
+            white_jacobian: projection.whiten(&descent.linearisation.jacobian_mm),
             precision: super::joint_precision(&self.prior),
-            factor,
+            factor: unexplained.factor(&self.places_mm).ok_or(EstimateError::Covariance)?,
+            projection,
             places_mm: self.places_mm.clone(),
             nodes: seen.iter().map(|(n, _)| *n).collect(),
             unexplained,
@@ -236,7 +302,7 @@ impl Fit<'_, '_> {
                 seen_rms_mm: rms(&shifted),
                 explained_share: 1.0 - residuals.norm_squared() / shifted.norm_squared().max(f64::MIN_POSITIVE),
                 would_be_seen_mm: size.map_or(0.0, |(_, sd)| CONTRADICTION_SD * sd * largest_mm),
-                largest_share: size.map(|(share, sd)| share.max(0.0) + Z_95_ONE_SIDED * sd),
+                largest_share: size.filter(|_| !seen_at_all).map(|(share, sd)| share.max(0.0) + Z_95_ONE_SIDED * sd),
             },
         })
     }

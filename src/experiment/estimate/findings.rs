@@ -4,8 +4,9 @@ use super::body::BodyError;
 use super::evidence::Unexplained;
 use super::mesh_error::made_up_by;
 use super::process::{Factor, Process};
+use super::projection::Projection;
+use super::re_registration::InstrumentError;
 use super::{Descent, EstimateError};
-use crate::register::deformable::DeformableError;
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ pub enum ProblemError {
     Estimate(#[from] EstimateError),
     /// The estimate's state cannot be registered.
     #[error("the estimate's state, registered like the post-operative scan: {0}")]
-    Instrument(#[from] DeformableError),
+    Instrument(#[from] InstrumentError),
 }
 
 /// What a fit has found, whatever the errors are taken to be.
@@ -74,7 +75,8 @@ pub struct Shift {
     pub explained_share: f64,
     /// The shift, at its largest place, that would have been seen (three standard deviations of its size), mm.
     pub would_be_seen_mm: f64,
-    /// Largest size (95 %, one-sided) of what the prior's most probable body would do under the load, as a share of it.
+    /// Where nothing was seen to move: largest size (95 %, one-sided) of what the prior's most probable body would do under
+    /// the load, as a share of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_share: Option<f64>,
 }
@@ -96,7 +98,9 @@ pub struct Findings {
     /// Their nodes.
     pub nodes: Vec<u32>,
     pub(super) factor: Factor,
-    /// The Jacobian through the factor, rigid remainder included.
+    /// What the model could do of a displacement.
+    pub(super) projection: Projection,
+    /// The Jacobian through the projection, rigid remainder included.
     pub(super) white_jacobian: DMatrix<f64>,
     /// The prior's inverse covariance.
     pub(super) precision: DMatrix<f64>,
@@ -107,7 +111,7 @@ impl Findings {
     pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Vec<f64> {
         let rows = 3 * self.nodes.len();
         let change = DMatrix::from_fn(rows, 1, |row, _| change_mm(row));
-        let white = self.factor.whiten(&change).column(0).into_owned();
+        let white = self.projection.whiten(&change).column(0).into_owned();
         made_up_by(&self.white_jacobian, &self.precision, &white, own)
     }
 }

@@ -65,7 +65,7 @@ impl EstimateSettings {
 
 impl Default for EstimateSettings {
     fn default() -> Self {
-        Self { noise_mm: 0.5, step_tolerance: 1e-6, decrement_tolerance: 1e-4, iterations: 30, longest_step: 1.0 }
+        Self { noise_mm: 0.5, step_tolerance: 1e-6, decrement_tolerance: 1e-2, iterations: 30, longest_step: 1.0 }
     }
 }
 

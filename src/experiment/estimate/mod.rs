@@ -14,6 +14,7 @@ mod mesh_error;
 mod outcome;
 mod posterior;
 mod process;
+mod projection;
 mod re_registration;
 mod rigid_remainder;
 mod verdict_of_fit;
@@ -29,7 +30,7 @@ pub use levenberg_marquardt::{
 pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, solve_problem};
 pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace};
 pub use process::Process;
-pub use re_registration::{Instrument, ReRegistration, moved_by};
+pub use re_registration::{Instrument, InstrumentError, ReRegistration, moved_by};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

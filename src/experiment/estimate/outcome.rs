@@ -53,8 +53,6 @@ pub struct Problem<'a> {
     pub body_known: bool,
     /// Where to start; the prior's mean when empty.
     pub start: Vec<f64>,
-    /// What was found to be unexplained on the way there; looked for anew where nothing is given.
-    pub unexplained: Option<Unexplained>,
     /// The measurement behind nodes' displacements, where its own error is to be taken out, and how many times.
     pub instrument: Option<(&'a Instrument<'a>, usize)>,
 }
@@ -150,10 +148,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let unknown = unknowns.clone();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
     let fitted = match &problem.errors {
-        Errors::Correlated(errors) => {
-            let from = (start.as_slice(), problem.unexplained);
-            correlated::fit(&mut body, errors, &prior, from, problem.instrument, settings)?
-        }
+        Errors::Correlated(errors) => correlated::fit(&mut body, errors, &prior, &start, problem.instrument, settings)?,
         Errors::Independent { share } => {
             fit_independent(&mut body, *share, &prior, &start, problem.instrument, settings)?
         }
@@ -320,14 +315,13 @@ fn spread(mean: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>], posterior: &Poster
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::{Scale, Turn, material};
+    use crate::experiment::estimate::{InstrumentError, Scale, Turn, material};
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
     use crate::experiment::verdict::Claim;
     use crate::fem::simulate;
     use crate::material::meta_model::MetaModel;
-    use crate::register::deformable::DeformableError;
 
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {
@@ -346,7 +340,6 @@ mod tests {
             coarser: None,
             body_known: true,
             start: vec![2299f64.ln(), 1195f64.ln()],
-            unexplained: None,
             instrument: None,
         }
     }
@@ -435,7 +428,7 @@ mod tests {
     #[test]
     fn an_instruments_own_error_does_not_reach_the_moduli() {
         let (mesh, scenario, observed) = phantom(4);
-        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, DeformableError> {
+        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> {
             let drift = |n: usize| 0.002 * mesh.nodes_mm()[n][0];
             Ok(u.iter().enumerate().map(|(n, u)| (n as u32, [u[0], u[1] + drift(n), 0.9 * u[2]])).collect())
         };

@@ -67,6 +67,15 @@ impl Factor {
         solve_lower_triangular_in_place(self.lower.as_ref(), parts.as_mut(), Par::Seq);
         DMatrix::from_fn(rows.nrows(), columns, |row, column| parts[(row / 3, 3 * column + row % 3)])
     }
+
+    /// L^T of every column, component by component: the square of its length is the variance of that sum of errors.
+    pub fn lower_transposed_times(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.lower.nrows();
+        DMatrix::from_fn(rows.nrows(), rows.ncols(), |row, column| {
+            let (place, axis) = (row / 3, row % 3);
+            (place..n).map(|below| self.lower[(below, place)] * rows[(3 * below + axis, column)]).sum()
+        })
+    }
 }
 
 /// `count` of the places, each as far from those before it as can be: an even cover that depends on nothing but the

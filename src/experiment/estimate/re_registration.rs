@@ -8,18 +8,32 @@
 
 use crate::experiment::nodal_field::on_grid;
 use crate::geometry::{Mni, Position};
+use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
+use crate::register::{RegisterError, RigidMasks, RigidSettings, register_rigid};
 use crate::resect::{SagScans, fit_sag, moved_scan};
 use nalgebra::Vector3;
+use thiserror::Error;
 
 /// A node and its displacement, mm.
 pub type MovedNode = (u32, [f64; 3]);
 
 /// What a measurement shows of nodes that have moved by a known displacement: all nodes' displacement in, the observed
 /// nodes' out, mm.
-pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<MovedNode>, DeformableError> + 'a;
+pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<MovedNode>, InstrumentError> + 'a;
+
+/// Why a known displacement cannot be measured.
+#[derive(Debug, Error, PartialEq)]
+pub enum InstrumentError {
+    /// The scans cannot be brought onto each other.
+    #[error(transparent)]
+    Rigid(#[from] RegisterError),
+    /// Nor deformed onto each other.
+    #[error(transparent)]
+    Deformable(#[from] DeformableError),
+}
 
 /// What was seen, without what the instrument adds to a displacement that is known.
 ///
@@ -29,7 +43,7 @@ pub fn without_own_error(
     seen: &[MovedNode],
     known_mm: &[[f64; 3]],
     instrument: &Instrument<'_>,
-) -> Result<Vec<MovedNode>, DeformableError> {
+) -> Result<Vec<MovedNode>, InstrumentError> {
     let shown = instrument(known_mm)?;
     let corrected = |(&(n, seen), (m, shown)): (&MovedNode, &MovedNode)| {
         assert_eq!(n, *m, "an instrument shows the nodes that were seen, in their order");
@@ -52,7 +66,9 @@ pub struct ReRegistration<'a> {
     pub cavity: &'a Mask<Mni>,
     /// Intensity of fluid on the pre-operative scan.
     pub fluid: f32,
-    /// The registration.
+    /// The rigid registration of the two scans.
+    pub rigid: &'a RigidSettings,
+    /// The deformable one after it.
     pub settings: &'a DeformableSettings,
 }
 
@@ -61,13 +77,13 @@ impl ReRegistration<'_> {
     /// displacement on the registration's grid.
     ///
     /// # Errors
-    /// [`DeformableError`] when too little of the brain is known.
+    /// [`InstrumentError`] when too little of the brain is known.
     pub fn sees(
         &self,
         mesh: &TetMesh,
         displacement_mm: &[[f64; 3]],
         like: &DisplacementField<Mni>,
-    ) -> Result<DisplacementField<Mni>, DeformableError> {
+    ) -> Result<DisplacementField<Mni>, InstrumentError> {
         let moved: Vec<[f64; 3]> = mesh
             .nodes_mm()
             .iter()
@@ -77,7 +93,11 @@ impl ReRegistration<'_> {
         let back: Vec<[f64; 3]> = displacement_mm.iter().map(|u| u.map(|v| -v)).collect();
         let back = on_grid(mesh.tets(), &moved, &back, like.grid());
         let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
-        let post = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
+        let moved = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
+        // Rigid registration follows a part of the shift, and the patient's scans went through it too.
+        let rigid = register_rigid(&moved, self.pre, RigidMasks::default(), self.rigid)?;
+        let moved_from_pre = rigid.fixed_from_moving.inverse().to_affine();
+        let post = resample(&moved, &self.pre.grid, &moved_from_pre, Interpolation::CubicBSpline, 0.0).volume;
         let scans = SagScans {
             pre: self.pre,
             pre_brain: self.pre_brain,

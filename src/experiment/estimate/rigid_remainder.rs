@@ -3,7 +3,7 @@
 //! Rigid registration of whole heads takes up a part of the brain's shift (.06 to .13 mm of a shift of 2 to 5 mm on patients
 //! made by another program), and no later step takes that out.
 
-use super::process::Factor;
+use super::projection::Projection;
 use super::{Forward, Linearisation, LogPrior, Scale};
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -49,15 +49,15 @@ impl RigidModes {
     }
 }
 
-/// A model seen through the covariance of its errors, with the rigid remainder behind its own parameters: residuals are
-/// independent and of standard deviation 1.
+/// A model held against the part of what was seen that it could do itself, with the rigid remainder behind its own
+/// parameters: residuals are independent and of standard deviation 1.
 pub struct Weighted<'a, M> {
     /// The model.
     pub model: &'a mut M,
     /// The remainder.
     pub rigid: &'a RigidModes,
-    /// The errors.
-    pub factor: &'a Factor,
+    /// What it could do.
+    pub projection: &'a Projection,
     /// The model's own parameters and linearisations, in mm, in the order they were asked for.
     pub plain: Vec<(Vec<f64>, Linearisation)>,
 }
@@ -73,10 +73,10 @@ pub fn with_remainder(plain: &Linearisation, rigid: &RigidModes, amounts: &[f64]
 }
 
 /// The same, independent and of standard deviation 1.
-fn whitened(linear: &Linearisation, factor: &Factor) -> Linearisation {
+fn whitened(linear: &Linearisation, projection: &Projection) -> Linearisation {
     let residuals = DMatrix::from_column_slice(linear.residuals_mm.len(), 1, linear.residuals_mm.as_slice());
-    let residuals_mm = factor.whiten(&residuals).column(0).into_owned();
-    Linearisation { residuals_mm, jacobian_mm: factor.whiten(&linear.jacobian_mm) }
+    let residuals_mm = projection.whiten(&residuals).column(0).into_owned();
+    Linearisation { residuals_mm, jacobian_mm: projection.whiten(&linear.jacobian_mm) }
 }
 
 impl<M: Forward> Forward for Weighted<'_, M> {
@@ -85,7 +85,7 @@ impl<M: Forward> Forward for Weighted<'_, M> {
     fn linearise(&mut self, parameters: &[f64]) -> Result<Linearisation, M::Error> {
         let (own, amounts) = parameters.split_at(parameters.len() - RIGID);
         let plain = self.model.linearise(own)?;
-        let white = whitened(&with_remainder(&plain, self.rigid, amounts), self.factor);
+        let white = whitened(&with_remainder(&plain, self.rigid, amounts), self.projection);
         self.plain.push((own.to_vec(), plain));
         Ok(white)
     }

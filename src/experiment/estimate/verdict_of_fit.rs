@@ -55,6 +55,10 @@ pub(super) fn verdict_of_fit(
         let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
         unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
     }
+    // What was not found explains nothing.
+    if fitted.descent.convergence == Convergence::IterationsExhausted {
+        unexplained.push(Reason::NotConverged);
+    }
     let conflict = prior.iter().zip(&fitted.descent.log_parameters).filter_map(|(prior, value)| {
         let sd = (value - prior.mean) / prior.sd?;
         (sd.abs() > CONTRADICTION_SD).then(|| Reason::FarFromPrior { name: prior.name.clone(), sd })
@@ -94,9 +98,6 @@ pub(super) fn verdict_of_fit(
     }
     if weight_alone && finding.has_stiffness() {
         reasons.push(Reason::LoadAssumed);
-    }
-    if fitted.descent.convergence == Convergence::IterationsExhausted {
-        reasons.push(Reason::NotConverged);
     }
     Verdict::new(finding, share, moduli, reasons)
 }

@@ -64,7 +64,13 @@ struct Standing {
     room_m: f64,
     /// The room follows the wall's gap.
     follows_gap: bool,
+    /// How much nearer to the wall a step of 1 comes by the field at rest: where a smooth distance bends or two of them
+    /// meet it rises by less than it should. Only for even walls, where the field says how the room changes and no more.
+    field_slope: f64,
 }
+
+/// The least slope of a field that is taken at its word.
+const LEAST_SLOPE: f64 = 0.3;
 
 /// One node on a spring.
 #[derive(Clone, Copy, Debug)]
@@ -149,6 +155,7 @@ impl Supports {
                 continue;
             }
             let x = at.nodes_m[node as usize];
+            let mut field_slope = 1.0;
             let (before, room_m, follows_gap) = match &contact.wall {
                 Wall::Plane { point_mm, normal } => {
                     let n = Vector3::from(*normal).normalize();
@@ -158,13 +165,17 @@ impl Supports {
                 Wall::OwnSurface | Wall::Sheet if gap > least => (Before::Plane(-normal), 0.0, true),
                 Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), least, false),
                 Wall::Field { even, .. } => {
-                    let seen = field.as_ref().map_or(0.0, |f| f.at(millimetres(x)).value) * METRES_PER_MM;
+                    let at = field.as_ref().map(|f| f.at(millimetres(x))).unwrap_or_default();
+                    if *even {
+                        field_slope = Vector3::from(at.gradient).norm().clamp(LEAST_SLOPE, 1.0);
+                    }
+                    let seen = at.value * METRES_PER_MM / field_slope;
                     let own = if *even { -seen } else { 0.0 };
                     let follows = own + seen + gap > least;
                     (Before::Field, if follows { own } else { least - seen }, follows)
                 }
             };
-            self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap });
+            self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap, field_slope });
         }
         self.walls.push(Barrier { set: contact.set.clone(), potential, field, gap_m: gap });
         Ok(())
@@ -197,8 +208,9 @@ impl Supports {
                 let place = Vector3::from(nodes_m[s.node as usize]) + moved;
                 let at = wall.field.as_ref().map(|f| f.at(millimetres(place.into())));
                 let at = at.unwrap_or_default();
-                let bend = Matrix3::from_fn(|r, c| at.hessian[r][c] / METRES_PER_MM);
-                (room_m + at.value * METRES_PER_MM, at.gradient.into(), bend)
+                let bend = Matrix3::from_fn(|r, c| at.hessian[r][c] / METRES_PER_MM / s.field_slope);
+                let way = Vector3::from(at.gradient) / s.field_slope;
+                (room_m + at.value * METRES_PER_MM / s.field_slope, way, bend)
             }
         }
     }

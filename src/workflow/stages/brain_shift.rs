@@ -8,8 +8,10 @@ use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{POST_NATIVE_BRAIN, PRE_BRAIN, PRE_T1};
+use crate::register::RigidSettings;
 use crate::register::deformable::{DeformableSettings, DisplacementField};
 use crate::segment::label;
+use crate::workflow::Settings;
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 
@@ -23,13 +25,13 @@ pub(crate) struct SeenShift {
     post_known: Mask<Mni>,
     cavity: Mask<Mni>,
     fluid: f32,
+    rigid: RigidSettings,
     settings: DeformableSettings,
 }
 
 impl SeenShift {
-    /// Reads the images of a case.
-    /// The registration is posed as it was for the masks: by the case's own settings.
-    pub fn read(case: &Case, anatomy: Anatomy, settings: &DeformableSettings) -> Result<Self, WorkflowError> {
+    /// Reads the images of a case. The registrations are posed as they were for the masks: by the case's own settings.
+    pub fn read(case: &Case, anatomy: Anatomy, settings: &Settings) -> Result<Self, WorkflowError> {
         let options = ReadOptions::default();
         let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_T1)?, PRE_T1, &options)?.volume.relabelled();
         let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options)?;
@@ -46,7 +48,9 @@ impl SeenShift {
             post_known,
             seen: anatomy.sag,
             cavity: anatomy.cavity,
-            settings: settings.clone(),
+            // The state is known: it is no mirror image.
+            rigid: RigidSettings { try_mirror: false, ..settings.register.clone() },
+            settings: settings.anat.sag.clone(),
         })
     }
 
@@ -58,6 +62,7 @@ impl SeenShift {
             post_known: &self.post_known,
             cavity: &self.cavity,
             fluid: self.fluid,
+            rigid: &self.rigid,
             settings: &self.settings,
         }
     }

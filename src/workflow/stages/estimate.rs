@@ -25,7 +25,7 @@ use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -297,7 +297,6 @@ impl Bodies {
                 coarser: None,
                 body_known: !patient,
                 start: Vec::new(),
-                unexplained: None,
                 instrument: None,
             };
             let settings = EstimateSettings { noise_mm, decrement_tolerance: NEARLY, ..options.descent.clone() };
@@ -313,7 +312,6 @@ impl Bodies {
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             coarser: coarser.as_ref(),
             body_known: !patient,
-            unexplained: start.as_ref().and_then(|found| found.outcome.unexplained),
             start: start.map_or_else(Vec::new, |found| found.numbers),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
