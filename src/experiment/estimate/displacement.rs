@@ -25,7 +25,8 @@ pub struct DisplacementSettings {
     pub correlation_mm: f64,
     /// Most nodes that are looked at; those between them say the same.
     pub places: usize,
-    /// How many times the registration's own error is measured on the estimate's state and taken out.
+    /// How many times at least the registration's own error is measured on the estimate's state and taken out (twice more
+    /// where the state has since moved by more than the noise); 0 for never.
     pub re_registrations: usize,
 }
 

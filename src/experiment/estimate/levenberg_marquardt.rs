@@ -254,7 +254,7 @@ mod tests {
     fn noise_free_parameters_come_back() {
         let truth = [1.3, 0.4];
         let mut model = Compliance { observed: simulate(&truth) };
-        let settings = EstimateSettings { noise_mm: 0.1, ..EstimateSettings::default() };
+        let settings = EstimateSettings { noise_mm: 0.1, decrement_tolerance: 0.0, ..EstimateSettings::default() };
         let descent = estimate(&mut model, &no_prior(), &[3.0, -1.0], &settings).unwrap();
         for p in 0..2 {
             assert!((descent.log_parameters[p] - truth[p]).abs() < 1e-6);
