@@ -74,6 +74,13 @@ pub enum Reason {
         /// The smallest shift (at its largest place) that would have been seen, mm.
         would_be_seen_mm: f64,
     },
+    /// Whatever is seen to move moves by less than the measurement's noise.
+    WithinNoise {
+        /// Size of the measurement's noise, mm.
+        noise_mm: f64,
+        /// The smallest shift (at its largest place) that would have been seen, mm.
+        would_be_seen_mm: f64,
+    },
     /// What is left is above what the measurement is worth.
     Discrepancy {
         /// Size of the discrepancy, mm.
@@ -148,6 +155,10 @@ impl Reason {
             Self::StillAsProbable { log_odds, would_be_seen_mm } => format!(
                 "that nothing has moved is about as probable (log odds {log_odds:.1}); a shift of {would_be_seen_mm:.1} mm at \
                  its largest place would have been seen"
+            ),
+            Self::WithinNoise { noise_mm, would_be_seen_mm } => format!(
+                "whatever moves does so by less than the measurement's noise of {noise_mm:.2} mm; a shift of {would_be_seen_mm:.1} \
+                 mm at its largest place would have been seen"
             ),
             Self::Discrepancy { discrepancy_mm, noise_mm } => format!(
                 "the model leaves {discrepancy_mm:.2} mm in each direction unexplained, the measurement is good to \

@@ -163,9 +163,18 @@ pub(super) fn fit(
     let rough = EstimateSettings { decrement_tolerance: ROUGH, iterations, ..settings.clone() };
     let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
     let start = fit.at(&from)?;
-    let mut descent = fit.settle(start, errors.noise, &rough)?;
+    let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
+    let [_, anything] = fit.without_mechanics(&seen_mm, errors.noise)?;
+    let moved = above_noise(&anything, errors.noise);
+    // What has not moved says nothing of how the registration sees what moves, and a bound needs no minimum.
+    let instrument = instrument.filter(|(_, rounds)| moved && *rounds > 0);
+    let mut descent = if moved {
+        fit.settle(start, errors.noise, &rough)?
+    } else {
+        fit.descend_projected(&start, errors.noise, &rough)?
+    };
     let mut taken_out_rms_mm = None;
-    if let Some((instrument, rounds)) = instrument.filter(|(_, rounds)| *rounds > 0) {
+    if let Some((instrument, rounds)) = instrument {
         let mut shown: Option<Vec<[f64; 3]>> = None;
         for round in 0..rounds + AGAIN {
             let known = fit.body.solve(&descent.log_parameters[..own])?.outcome.displacement_mm;
@@ -180,7 +189,9 @@ pub(super) fn fit(
             shown = Some(known);
         }
     }
-    descent = fit.descend_projected(&descent, errors.noise, settings)?;
+    if moved {
+        descent = fit.descend_projected(&descent, errors.noise, settings)?;
+    }
     let evidence = fit.errors(&descent, errors.noise)?;
     let exact = fit.linear(&descent).with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
     // A discrepancy that is not needed is none: its size would widen nothing but by chance.
@@ -209,6 +220,11 @@ pub(super) fn fit(
     })
 }
 
+/// Whether a smooth movement of any kind is larger than the measurement's noise.
+fn above_noise(anything: &Evidence, noise: Process) -> bool {
+    anything.unexplained.discrepancy.sd_mm > noise.sd_mm
+}
+
 /// Root mean square distance between two states over the nodes that were seen, mm.
 fn rms_between(before: &[[f64; 3]], after: &[[f64; 3]], seen: &[MovedNode]) -> f64 {
     let squared = |n: usize| (0..3).map(|a| (after[n][a] - before[n][a]).powi(2)).sum::<f64>();
@@ -222,6 +238,22 @@ fn independent(factor: &Factor, places_mm: &[[f64; 3]], sd_mm: f64) -> f64 {
 }
 
 impl Fit<'_, '_> {
+    /// What was seen as a rigid remainder and noise alone, and with a smooth movement of any kind.
+    fn without_mechanics(&self, seen_mm: &DVector<f64>, noise: Process) -> Result<[Evidence; 2], ProblemError> {
+        let unmoved = -seen_mm;
+        let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
+        let still = LinearModel {
+            places_mm: &self.places_mm,
+            residuals_mm: &unmoved,
+            jacobian_mm: &self.rigid.columns_mm,
+            away: DVector::zeros(RIGID),
+            precision: DMatrix::from_diagonal(&DVector::from_column_slice(&precision)),
+        };
+        let nothing = still.with_noise_alone(noise).ok_or(EstimateError::Covariance)?;
+        let anything = still.with_discrepancy(noise).ok_or(EstimateError::Covariance)?;
+        Ok([nothing, anything])
+    }
+
     /// What the fit says of the shift and of the model, beside simpler explanations.
     fn findings(
         &mut self,
@@ -234,17 +266,8 @@ impl Fit<'_, '_> {
         let rows = 3 * seen.len();
         let flat = |u: &dyn Fn(usize) -> [f64; 3]| DVector::from_fn(rows, |row, _| u(row / 3)[row % 3]);
         let seen_mm = flat(&|n| seen[n].1);
-        let unmoved = -&seen_mm;
         let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
-        let still = LinearModel {
-            places_mm: &self.places_mm,
-            residuals_mm: &unmoved,
-            jacobian_mm: &self.rigid.columns_mm,
-            away: DVector::zeros(RIGID),
-            precision: DMatrix::from_diagonal(&DVector::from_column_slice(&precision)),
-        };
-        let nothing = still.with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
-        let anything = still.with_discrepancy(errors.noise).ok_or(EstimateError::Covariance)?;
+        let [nothing, anything] = self.without_mechanics(&seen_mm, errors.noise)?;
         let model = evidence.log_evidence.max(exact.log_evidence);
         let odds = Odds {
             log_evidence: model,
@@ -255,7 +278,7 @@ impl Fit<'_, '_> {
 
         // How much of what the body would do is there, and how well that is known. Of a body that has not moved only the
         // prior's most probable one says what it would do.
-        let seen_at_all = odds.moved_to_still > super::STRONG;
+        let seen_at_all = odds.moved_to_still > super::STRONG && above_noise(&anything, errors.noise);
         let usual: Vec<f64> = self.prior[..self.own].iter().map(|p| p.mean).collect();
         let body = if seen_at_all { &descent.log_parameters[..self.own] } else { &usual };
         let pattern_mm = self.body.solve(body)?.outcome.displacement_mm;

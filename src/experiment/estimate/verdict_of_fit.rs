@@ -33,7 +33,11 @@ pub(super) fn verdict_of_fit(
         share = Some(found.shift.explained_share);
         if !found.shift.seen {
             let (log_odds, would_be_seen_mm) = (found.odds.moved_to_still, found.shift.would_be_seen_mm);
-            still = Some(Reason::StillAsProbable { log_odds, would_be_seen_mm });
+            still = Some(if log_odds > STRONG {
+                Reason::WithinNoise { noise_mm: found.measured_noise.sd_mm, would_be_seen_mm }
+            } else {
+                Reason::StillAsProbable { log_odds, would_be_seen_mm }
+            });
         }
         // Noise that had to grow is as unexplained as a discrepancy is.
         let (unexplained_by, noise_mm) = (found.unexplained, found.measured_noise.sd_mm);
