@@ -164,8 +164,7 @@ pub(super) fn fit(
     let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
     let start = fit.at(&from)?;
     let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
-    let [_, anything] = fit.without_mechanics(&seen_mm, errors.noise)?;
-    let moved = above_noise(&anything, errors.noise);
+    let moved = above_noise(&seen_mm, errors.noise);
     // What has not moved says nothing of how the registration sees what moves, and a bound needs no minimum.
     let instrument = instrument.filter(|(_, rounds)| moved && *rounds > 0);
     let mut descent = if moved {
@@ -220,9 +219,16 @@ pub(super) fn fit(
     })
 }
 
-/// Whether a smooth movement of any kind is larger than the measurement's noise.
-fn above_noise(anything: &Evidence, noise: Process) -> bool {
-    anything.unexplained.discrepancy.sd_mm > noise.sd_mm
+/// Whether what was seen moves by more than the measurement's noise, on the whole or, by three standard deviations, in more
+/// than one place of a hundred. The size of a smooth process is no measure of that: one longer than the head may have any.
+fn above_noise(seen_mm: &DVector<f64>, noise: Process) -> bool {
+    let on_the_whole = root_mean_square(seen_mm.as_slice()).is_some_and(|size| size > noise.sd_mm);
+    let far = CONTRADICTION_SD * 3f64.sqrt() * noise.sd_mm;
+    let places = seen_mm.as_slice().chunks(3);
+    let (all, beyond) = places.fold((0, 0), |(all, beyond), u| {
+        (all + 1, beyond + usize::from(u.iter().map(|v| v * v).sum::<f64>().sqrt() > far))
+    });
+    on_the_whole || 100 * beyond > all
 }
 
 /// Root mean square distance between two states over the nodes that were seen, mm.
@@ -278,7 +284,7 @@ impl Fit<'_, '_> {
 
         // How much of what the body would do is there, and how well that is known. Of a body that has not moved only the
         // prior's most probable one says what it would do.
-        let seen_at_all = odds.moved_to_still > super::STRONG && above_noise(&anything, errors.noise);
+        let seen_at_all = odds.moved_to_still > super::STRONG && above_noise(&seen_mm, errors.noise);
         let usual: Vec<f64> = self.prior[..self.own].iter().map(|p| p.mean).collect();
         let body = if seen_at_all { &descent.log_parameters[..self.own] } else { &usual };
         let pattern_mm = self.body.solve(body)?.outcome.displacement_mm;
