@@ -7,9 +7,7 @@ use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
 use super::verdict_of_fit::{Posed, verdict_of_fit};
-use super::{
-    Convergence, EstimateSettings, LogPrior, Posterior, Process, Z_95, estimate, information, laplace,
-};
+use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, Z_95, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::{Finding, Verdict};
@@ -483,10 +481,7 @@ mod tests {
     }
 
     /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.
-    fn seen_by_a_model_of_a_push_from_above(
-        force_n: Option<[f64; 3]>,
-        add: impl Fn([f64; 3]) -> [f64; 3],
-    ) -> Estimate {
+    fn seen_by_a_model_of_a_push_from_above(force_n: Option<[f64; 3]>, add: impl Fn([f64; 3]) -> [f64; 3]) -> Estimate {
         let (mesh, settings) = (block(5), settings());
         let u = match force_n {
             Some(two_tissue_force_n) => {
