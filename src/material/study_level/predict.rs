@@ -1,0 +1,97 @@
+//! What the model expects: a task's mean, the next study of it, the next person.
+
+use super::basis::{Basis, SIZE};
+use super::evidence::MeanPosterior;
+use super::spreads::{NUGGET, Part, Spreads};
+use super::study::{Coefficients, Square};
+use crate::material::form::first_uniaxial;
+use crate::material::random::CounterRng;
+use crate::material::task::Task;
+use crate::material::training::GP_LOG_OFFSET_PA;
+use nalgebra::linalg::Cholesky;
+use serde::{Deserialize, Serialize};
+
+/// What is predicted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Of {
+    /// The mean function of the task.
+    Mean,
+    /// A curve that another laboratory publishes.
+    Study,
+    /// The tissue of a person nobody has measured. Which laboratory is right is not known, and within one laboratory curves
+    /// differ by person and place: both spreads belong to it, the nugget does not.
+    #[default]
+    Person,
+}
+
+/// Prediction of whole functions ln g(l) of one task.
+#[derive(Clone, Debug)]
+pub struct StudyLevelPrior {
+    /// Stretches, in any order.
+    pub stretches: Vec<f64>,
+    /// Mean of ln g, ln Pa.
+    pub mean: Vec<f64>,
+    /// Sd at each stretch.
+    pub sd: Vec<f64>,
+    coefficients: Coefficients,
+    /// Lower triangle L of the coefficients' covariance.
+    factor: Square,
+    nugget: f64,
+}
+
+/// Predicts a task at these stretches.
+pub fn predict(means: &MeanPosterior, spreads: &Spreads, task: Task, of: Of, stretches: &[f64]) -> StudyLevelPrior {
+    let (coefficients, mut covariance) = means.of(task);
+    if of != Of::Mean {
+        for part in [Part::Publication, Part::Curve] {
+            let (deviations, _) = spreads.deviations(part, task);
+            for (f, sd) in deviations.iter().enumerate() {
+                covariance[(f, f)] += sd * sd;
+            }
+        }
+    }
+    let nugget = if of == Of::Study { NUGGET } else { 0.0 };
+    let row = |l: &f64| Coefficients::from(Basis.at(l.ln()));
+    let sd = |l: &f64| (row(l).dot(&(covariance * row(l))).max(0.0) + nugget * nugget).sqrt();
+    StudyLevelPrior {
+        stretches: stretches.to_vec(),
+        mean: stretches.iter().map(|l| row(l).dot(&coefficients)).collect(),
+        sd: stretches.iter().map(sd).collect(),
+        coefficients,
+        factor: lower_triangle(&covariance),
+        nugget,
+    }
+}
+
+/// Cholesky factor of a covariance that may be singular: rounding's worth is added to the diagonal.
+fn lower_triangle(covariance: &Square) -> Square {
+    let most = covariance.diagonal().max();
+    let mut added = 1e-14 * most;
+    loop {
+        if let Some(factor) = Cholesky::new(covariance + Square::identity() * added) {
+            return factor.l();
+        }
+        added *= 10.0;
+    }
+}
+
+impl StudyLevelPrior {
+    /// Draw `number` of a seed: ln g at the stretches, one whole function.
+    pub fn draw(&self, seed: u64, number: u64) -> Vec<f64> {
+        let rng = CounterRng::new(seed, number);
+        let normal = Coefficients::from_fn(|f, _| rng.normal(f as u64));
+        let coefficients = self.coefficients + self.factor * normal;
+        let point = |(n, l): (usize, &f64)| {
+            let rough = if self.nugget > 0.0 { self.nugget * rng.normal((SIZE + n) as u64) } else { 0.0 };
+            Coefficients::from(Basis.at(l.ln())).dot(&coefficients) + rough
+        };
+        self.stretches.iter().enumerate().map(point).collect()
+    }
+
+    /// A drawn function as meta-models take it: ln(W + offset), W = g (I1 - 3) / 2, Pa.
+    pub fn log_energies(&self, log_moduli: &[f64]) -> Vec<f64> {
+        let energy = |(l, y): (&f64, &f64)| (0.5 * y.exp() * first_uniaxial(*l) + GP_LOG_OFFSET_PA).ln();
+        self.stretches.iter().zip(log_moduli).map(energy).collect()
+    }
+}
