@@ -39,6 +39,8 @@ pub struct StudyLevelFit {
     pub log_sds: [f64; SPREADS],
     /// Log likelihood there.
     pub log_likelihood: f64,
+    /// Log probability of the studies with the spreads integrated out (Laplace); minus infinity where they are not bounded.
+    pub log_evidence: f64,
     /// Norm of the gradient of the log posterior density there, in logarithms.
     pub gradient_norm: f64,
 }
@@ -136,20 +138,20 @@ pub fn fit(studies: &Studies, start: &Spreads, seed: u64) -> Result<StudyLevelFi
     closed(studies, &best)
 }
 
-/// The fit from one start alone: for studies of which one is left out, near the fit of all.
+/// The fit from one start alone: for studies of which one is left out.
 ///
 /// # Errors
 /// [`FitError`].
-pub(super) fn refit(studies: &Studies, start: &Spreads) -> Result<Spreads, FitError> {
+pub fn refit(studies: &Studies, start: &Spreads) -> Result<StudyLevelFit, FitError> {
     let (at, _) = descend(studies, start.to_array().iter().map(|s| s.ln()).collect());
-    at.as_slice().try_into().map(Spreads::from_logs).map_err(|_| FitError::NotFinite)
+    closed(studies, &at)
 }
 
 fn closed(studies: &Studies, at: &[f64]) -> Result<StudyLevelFit, FitError> {
     let logs: [f64; SPREADS] = at.try_into().map_err(|_| FitError::NotFinite)?;
     let spreads = Spreads::from_logs(&logs);
     let evidence = Evidence::new(studies, &spreads).ok_or(FitError::NotFinite)?;
-    let (_, slope) = density(studies, at).ok_or(FitError::NotFinite)?;
+    let (density_there, slope) = density(studies, at).ok_or(FitError::NotFinite)?;
     let mut curvature = DMatrix::zeros(SPREADS, SPREADS);
     for n in 0..SPREADS {
         let beside = |step: f64| {
@@ -163,13 +165,15 @@ fn closed(studies: &Studies, at: &[f64]) -> Result<StudyLevelFit, FitError> {
         }
     }
     let symmetric = 0.5 * (&curvature + curvature.transpose());
-    let log_sds = match Cholesky::new(symmetric) {
+    let (log_sds, log_evidence) = match Cholesky::new(symmetric) {
         Some(factor) => {
             let covariance = factor.inverse();
-            std::array::from_fn(|n| covariance[(n, n)].sqrt())
+            let half_log: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+            let volume = 0.5 * SPREADS as f64 * std::f64::consts::TAU.ln() - half_log;
+            (std::array::from_fn(|n| covariance[(n, n)].sqrt()), density_there + volume)
         }
-        None => [f64::INFINITY; SPREADS],
+        None => ([f64::INFINITY; SPREADS], f64::NEG_INFINITY),
     };
     let gradient_norm = slope.iter().map(|s| s * s).sum::<f64>().sqrt();
-    Ok(StudyLevelFit { spreads, log_sds, log_likelihood: evidence.log_likelihood, gradient_norm })
+    Ok(StudyLevelFit { spreads, log_sds, log_likelihood: evidence.log_likelihood, log_evidence, gradient_norm })
 }

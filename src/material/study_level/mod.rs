@@ -26,14 +26,16 @@ mod evidence;
 mod fit;
 mod leave_one_out;
 mod predict;
+mod simulate;
 mod spreads;
 mod study;
 
 pub use basis::Basis;
 pub use evidence::{Evidence, MeanPosterior};
-pub use fit::{FitError, StudyLevelFit, fit};
-pub use leave_one_out::{LeftOut, leave_one_publication_out, published_log_density};
+pub use fit::{FitError, StudyLevelFit, fit, refit};
+pub use leave_one_out::{LeftOut, leave_one_publication_out, published_log_density, uniform_probability};
 pub use predict::{Of, StudyLevelPrior, predict};
+pub use simulate::simulate;
 pub use spreads::{SPREADS, Spreads};
 pub use study::{Studies, StudyCurve};
 

@@ -1,8 +1,10 @@
 //! The spreads of the study-level model and their priors.
 
 use super::basis::{BEND, Basis, LEVEL, REMAINDER, SIZE, SLOPE, STEP};
+use crate::material::random::CounterRng;
 use crate::material::task::{Region, StudyKind, TASKS, Task};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// How many spreads there are.
 pub const SPREADS: usize = 17;
@@ -87,6 +89,13 @@ impl Default for Spreads {
 }
 
 impl Spreads {
+    /// Drawn from their priors: number `number` of a seed.
+    pub fn from_prior(seed: u64, number: u64) -> Self {
+        let rng = CounterRng::new(seed, number);
+        let log = |n: usize| (PRIOR_SCALES[n] * rng.normal(n as u64).abs()).ln();
+        Self::from_logs(&std::array::from_fn(log))
+    }
+
     /// From their logarithms, in the order of the fields.
     pub fn from_logs(logs: &[f64; SPREADS]) -> Self {
         let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q] = logs.map(f64::exp);
@@ -134,13 +143,13 @@ impl Spreads {
         ]
     }
 
-    /// Log density of the half-normal priors in the spreads' logarithms, but for a constant, and its gradient there.
+    /// Log density of the half-normal priors in the spreads' logarithms, and its gradient there.
     pub(super) fn log_prior(&self) -> (f64, [f64; SPREADS]) {
         let values = self.to_array();
         let (mut density, mut slope) = (0.0, [0.0; SPREADS]);
         for n in 0..SPREADS {
             let ratio = values[n] / PRIOR_SCALES[n];
-            density += values[n].ln() - 0.5 * ratio * ratio;
+            density += ratio.ln() - 0.5 * ratio * ratio + 0.5 * (2.0 / PI).ln();
             slope[n] = 1.0 - ratio * ratio;
         }
         (density, slope)

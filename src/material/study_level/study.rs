@@ -1,15 +1,16 @@
-//! Curves of the literature as the study-level model takes them: sums over their points.
+//! Curves of the literature as the study-level model takes them: an orthogonal reduction of their points.
 
 use super::basis::{Basis, SIZE};
 use crate::material::form::first_uniaxial;
 use crate::material::literature::{Curves, LiteratureModel};
 use crate::material::task::Task;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 pub(super) type Coefficients = SVector<f64, SIZE>;
 pub(super) type Square = SMatrix<f64, SIZE, SIZE>;
 
-/// One curve: its points and the sums that a likelihood needs.
+/// One curve: its points, and what a likelihood needs of them. With F the functions at its points and F = Q T, only T and
+/// Q^T y matter, and what no function explains.
 #[derive(Clone, Debug)]
 pub struct StudyCurve {
     /// Number of the literature model.
@@ -20,22 +21,31 @@ pub struct StudyCurve {
     pub strains: Vec<f64>,
     /// ln of the effective shear modulus there, ln Pa.
     pub log_moduli: Vec<f64>,
-    pub(super) squares: Square,
-    pub(super) products: Coefficients,
-    pub(super) sum_of_squares: f64,
+    /// T, upper triangular.
+    pub(super) root: Square,
+    /// Q^T y.
+    pub(super) turned: Coefficients,
+    /// |y - Q Q^T y|^2.
+    pub(super) unexplained: f64,
 }
 
 impl StudyCurve {
     /// From points of a curve.
     pub fn new(id: u32, task: Task, strains: Vec<f64>, log_moduli: Vec<f64>) -> Self {
-        let (mut squares, mut products, mut sum_of_squares) = (Square::zeros(), Coefficients::zeros(), 0.0);
-        for (x, y) in strains.iter().zip(&log_moduli) {
-            let row = Coefficients::from(Basis.at(*x));
-            squares += row * row.transpose();
-            products += row * *y;
-            sum_of_squares += y * y;
+        // Rows of zeros change nothing, and make T square where there are few points.
+        let rows = strains.len().max(SIZE);
+        let mut functions = DMatrix::zeros(rows, SIZE);
+        for (i, x) in strains.iter().enumerate() {
+            functions.set_row(i, &Coefficients::from(Basis.at(*x)).transpose());
         }
-        Self { id, task, strains, log_moduli, squares, products, sum_of_squares }
+        let factors = functions.qr();
+        let values = DVector::from_fn(rows, |i, _| log_moduli.get(i).copied().unwrap_or(0.0));
+        let (orthogonal, triangle) = factors.unpack();
+        let turned = orthogonal.tr_mul(&values);
+        let unexplained = (values - &orthogonal * &turned).norm_squared();
+        let root = triangle.fixed_view::<SIZE, SIZE>(0, 0).into_owned();
+        let turned = turned.fixed_rows::<SIZE>(0).into_owned();
+        Self { id, task, strains, log_moduli, root, turned, unexplained }
     }
 }
 
