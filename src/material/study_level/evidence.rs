@@ -132,9 +132,14 @@ impl Grids {
 }
 
 /// The task that tells how widely a publication may differ: healthy tissue where it speaks of any.
+pub(super) fn leading(tasks: &[Task]) -> Task {
+    let healthy = tasks.iter().find(|task| task.region != Region::Abnormal);
+    *healthy.unwrap_or(&tasks[0])
+}
+
+/// The same of its curves.
 pub(super) fn leading_task(curves: &[StudyCurve]) -> Task {
-    let healthy = curves.iter().find(|curve| curve.task.region != Region::Abnormal);
-    healthy.unwrap_or(&curves[0]).task
+    leading(&curves.iter().map(|curve| curve.task).collect::<Vec<_>>())
 }
 
 fn read_publication(

@@ -7,7 +7,6 @@ use super::study::{Coefficients, Square};
 use crate::material::form::first_uniaxial;
 use crate::material::random::CounterRng;
 use crate::material::task::Task;
-use crate::material::training::GP_LOG_OFFSET_PA;
 use nalgebra::linalg::Cholesky;
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +75,27 @@ fn lower_triangle(covariance: &Square) -> Square {
     }
 }
 
+impl Of {
+    /// All, in the order of what they hold.
+    pub const ALL: [Self; 3] = [Self::Mean, Self::Person, Self::Study];
+
+    /// The word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mean => "mean",
+            Self::Study => "study",
+            Self::Person => "person",
+        }
+    }
+}
+
+impl std::str::FromStr for Of {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|of| of.name() == word).ok_or_else(|| "say mean, person or study".to_owned())
+    }
+}
+
 impl StudyLevelPrior {
     /// Draw `number` of a seed: ln g at the stretches, one whole function.
     pub fn draw(&self, seed: u64, number: u64) -> Vec<f64> {
@@ -89,9 +109,14 @@ impl StudyLevelPrior {
         self.stretches.iter().enumerate().map(point).collect()
     }
 
-    /// A drawn function as meta-models take it: ln(W + offset), W = g (I1 - 3) / 2, Pa.
-    pub fn log_energies(&self, log_moduli: &[f64]) -> Vec<f64> {
-        let energy = |(l, y): (&f64, &f64)| (0.5 * y.exp() * first_uniaxial(*l) + GP_LOG_OFFSET_PA).ln();
-        self.stretches.iter().zip(log_moduli).map(energy).collect()
+    /// Mean and this many standard deviations of ln g.
+    pub fn quantile(&self, sd_level: f64) -> Vec<f64> {
+        self.mean.iter().zip(&self.sd).map(|(mean, sd)| mean + sd_level * sd).collect()
     }
+}
+
+/// ln g as meta-models take it: ln(W + offset), W = g (I1 - 3) / 2, Pa.
+pub fn log_energies(stretches: &[f64], log_moduli: &[f64], offset_pa: f64) -> Vec<f64> {
+    let energy = |(l, y): (&f64, &f64)| (0.5 * y.exp() * first_uniaxial(*l) + offset_pa).ln();
+    stretches.iter().zip(log_moduli).map(energy).collect()
 }
