@@ -43,6 +43,8 @@ pub struct StudyLevelFit {
     pub log_evidence: f64,
     /// Norm of the gradient of the log posterior density there, in logarithms.
     pub gradient_norm: f64,
+    /// Minus the second derivatives of the log posterior density there, in logarithms.
+    pub(super) curvature: DMatrix<f64>,
 }
 
 struct Search<'a> {
@@ -73,7 +75,7 @@ impl Search<'_> {
 /// Logarithms beyond these leave nothing but rounding.
 const LOG_LIMIT: f64 = 12.0;
 
-fn density(studies: &Studies, logs: &[f64]) -> Option<(f64, [f64; SPREADS])> {
+pub(super) fn density(studies: &Studies, logs: &[f64]) -> Option<(f64, [f64; SPREADS])> {
     let logs: [f64; SPREADS] = logs.try_into().ok()?;
     if logs.iter().any(|x| !(x.abs() < LOG_LIMIT)) {
         return None;
@@ -164,8 +166,8 @@ fn closed(studies: &Studies, at: &[f64]) -> Result<StudyLevelFit, FitError> {
             curvature[(m, n)] = (down[m] - up[m]) / (2.0 * DIFFERENCE);
         }
     }
-    let symmetric = 0.5 * (&curvature + curvature.transpose());
-    let (log_sds, log_evidence) = match Cholesky::new(symmetric) {
+    let curvature = 0.5 * (&curvature + curvature.transpose());
+    let (log_sds, log_evidence) = match Cholesky::new(curvature.clone()) {
         Some(factor) => {
             let covariance = factor.inverse();
             let half_log: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
@@ -175,5 +177,12 @@ fn closed(studies: &Studies, at: &[f64]) -> Result<StudyLevelFit, FitError> {
         None => ([f64::INFINITY; SPREADS], f64::NEG_INFINITY),
     };
     let gradient_norm = slope.iter().map(|s| s * s).sum::<f64>().sqrt();
-    Ok(StudyLevelFit { spreads, log_sds, log_likelihood: evidence.log_likelihood, log_evidence, gradient_norm })
+    Ok(StudyLevelFit {
+        spreads,
+        log_sds,
+        log_likelihood: evidence.log_likelihood,
+        log_evidence,
+        gradient_norm,
+        curvature,
+    })
 }

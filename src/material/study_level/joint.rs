@@ -1,8 +1,7 @@
 //! Several tissues of one person, or one laboratory's curves of several tissues: they go together.
 
-use super::MeanPosterior;
 use super::basis::{Basis, SIZE};
-use super::evidence::leading;
+use super::evidence::{MeanPosterior, leading};
 use super::predict::Of;
 use super::spreads::{NUGGET, Part, Spreads};
 use super::study::Coefficients;
@@ -41,11 +40,11 @@ pub fn predict_jointly(
         coefficients.rows_mut(i * SIZE, SIZE).copy_from(&means.of(*one).0);
         for (j, other) in tasks.iter().enumerate() {
             covariance.view_mut((i * SIZE, j * SIZE), (SIZE, SIZE)).copy_from(&means.between(*one, *other));
-            if of != Of::Mean {
+            if of.parts().contains(&Part::Publication) {
                 (0..SIZE).for_each(|f| covariance[(i * SIZE + f, j * SIZE + f)] += shared[f] * shared[f]);
             }
         }
-        if of != Of::Mean {
+        if of.parts().contains(&Part::Curve) {
             let (own, _) = spreads.deviations(Part::Curve, *one);
             (0..SIZE).for_each(|f| covariance[(i * SIZE + f, i * SIZE + f)] += own[f] * own[f]);
         }

@@ -3,11 +3,12 @@
 use super::basis::Basis;
 use super::evidence::{Evidence, MeanPosterior, leading_task};
 use super::fit::{FitError, StudyLevelFit, refit};
-use super::predict::{Of, predict};
+use super::predict::{Of, StudyLevelPrior, predict};
 use super::spreads::{NUGGET, Part, Spreads};
 use super::study::{Coefficients, Studies, StudyCurve};
 use crate::material::form::first_uniaxial;
 use crate::material::gp::{Hyperparameters, negative_log_likelihood};
+use crate::material::task::Task;
 use crate::material::training::{GP_LOG_OFFSET_PA, TrainingData};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -37,6 +38,24 @@ pub struct LeftOut {
     pub mean_log_modulus: f64,
     /// See there.
     pub rank: f64,
+    /// Its curves and what the others expect of them.
+    #[serde(skip)]
+    pub curves: Vec<LeftOutCurve>,
+}
+
+/// A curve of a publication that was left out, and the prediction of a new study of its task at its stretches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOutCurve {
+    /// Kind and region.
+    pub task: Task,
+    /// Stretches.
+    pub stretches: Vec<f64>,
+    /// ln g there.
+    pub log_moduli: Vec<f64>,
+    /// Its expectation.
+    pub mean: Vec<f64>,
+    /// Sd about it.
+    pub sd: Vec<f64>,
 }
 
 /// Leaves out one publication after the other, fits the spreads to the rest from the same stated start, and predicts it.
@@ -56,6 +75,7 @@ fn leave_out(studies: &Studies, number: usize, all: &StudyLevelFit) -> Result<Le
     let with = Evidence::new(studies, &spreads).ok_or(FitError::NotFinite)?;
     let (name, curves) = &studies.publications[number];
     let (mut points, mut inside) = (0, [0usize; 2]);
+    let mut predicted = Vec::new();
     for curve in curves {
         let stretches: Vec<f64> = curve.strains.iter().map(|x| x.exp()).collect();
         let prior = predict(&known.means, &spreads, curve.task, Of::Study, &stretches);
@@ -65,6 +85,9 @@ fn leave_out(studies: &Studies, number: usize, all: &StudyLevelFit) -> Result<Le
             inside[0] += usize::from(away <= REACH_95);
             inside[1] += usize::from(away <= REACH_50);
         }
+        let StudyLevelPrior { mean, sd, .. } = prior;
+        let log_moduli = curve.log_moduli.clone();
+        predicted.push(LeftOutCurve { task: curve.task, stretches, log_moduli, mean, sd });
     }
     let (mean_log_modulus, away) = level(curves, &known.means, &spreads);
     Ok(LeftOut {
@@ -76,6 +99,7 @@ fn leave_out(studies: &Studies, number: usize, all: &StudyLevelFit) -> Result<Le
         inside_50: inside[1] as f64 / points as f64,
         mean_log_modulus,
         rank: normal_share(away),
+        curves: predicted,
     })
 }
 

@@ -24,8 +24,10 @@
 mod basis;
 mod evidence;
 mod fit;
+mod intervals;
 mod joint;
 mod leave_one_out;
+mod model_file;
 mod moduli;
 mod predict;
 mod simulate;
@@ -35,12 +37,14 @@ mod study;
 pub use basis::Basis;
 pub use evidence::{Evidence, MeanPosterior};
 pub use fit::{FitError, StudyLevelFit, fit, refit};
+pub use intervals::intervals;
 pub use joint::{JointPrediction, predict_jointly};
-pub use leave_one_out::{LeftOut, leave_one_publication_out, published_log_density, uniform_probability};
+pub use leave_one_out::{LeftOut, LeftOutCurve, leave_one_publication_out, published_log_density, uniform_probability};
+pub use model_file::StudyLevelFile;
 pub use moduli::{ModuliPrior, drawn_materials, materials_at_levels};
 pub use predict::{Of, StudyLevelPrior, log_energies, predict};
 pub use simulate::simulate;
-pub use spreads::{SPREADS, Spreads};
+pub use spreads::{SPREAD_NAMES, SPREADS, Spreads};
 pub use study::{Studies, StudyCurve};
 
 #[cfg(test)]

@@ -89,36 +89,31 @@ impl ModuliPrior {
         self.covariance_ln.iter().enumerate().map(|(i, row)| row[i].sqrt()).collect()
     }
 
-    /// From text as [`Self::to_toml`] writes it.
+    /// Refuses what is no normal law.
     ///
     /// # Errors
-    /// What is wrong with it, in words: a key, a length, a covariance that is none.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        let prior: Self = toml::from_str(text).map_err(|error| error.message().to_owned())?;
-        let n = prior.tasks.len();
-        if prior.mean_ln_pa.len() != n
-            || prior.covariance_ln.len() != n
-            || prior.covariance_ln.iter().any(|row| row.len() != n)
-        {
+    /// What is wrong with it, in words: a length, a covariance that is none.
+    pub fn check(&self) -> Result<(), String> {
+        let (n, rows) = (self.tasks.len(), &self.covariance_ln);
+        if self.mean_ln_pa.len() != n || rows.len() != n || rows.iter().any(|row| row.len() != n) {
             return Err(format!(
                 "`mean_ln_pa` and `covariance_ln` must have a number, and a row, for each of {n} `tasks`"
             ));
         }
-        let matrix = DMatrix::from_fn(n, n, |i, j| prior.covariance_ln[i][j]);
+        let matrix = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
         let symmetric = (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
-        if !symmetric || Cholesky::new(matrix).is_none() || prior.mean_ln_pa.iter().any(|m| !m.is_finite()) {
+        if !symmetric || Cholesky::new(matrix).is_none() || self.mean_ln_pa.iter().any(|m| !m.is_finite()) {
             return Err("`covariance_ln` must be symmetric and positive definite, `mean_ln_pa` finite".to_owned());
         }
-        Ok(prior)
+        Ok(())
     }
 
-    /// As a file.
+    /// As text.
     pub fn to_toml(&self) -> String {
         let numbers = |row: &[f64]| row.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", ");
         let rows: Vec<String> = self.covariance_ln.iter().map(|row| format!("    [{}],\n", numbers(row))).collect();
         format!(
-            "# Shear moduli of a person nobody has measured: normal in ln Pa, jointly over the tasks.\n\
-             tasks = {:?}\nmean_ln_pa = [{}]\ncovariance_ln = [\n{}]\n",
+            "tasks = {:?}\nmean_ln_pa = [{}]\ncovariance_ln = [\n{}]\n",
             self.tasks,
             numbers(&self.mean_ln_pa),
             rows.concat()

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub enum Of {
     /// The mean function of the task.
     Mean,
+    /// What one laboratory finds on average: the spread between studies without that within one.
+    Laboratory,
     /// A curve that another laboratory publishes.
     Study,
     /// The tissue of a person nobody has measured. Which laboratory is right is not known, and within one laboratory curves
@@ -27,6 +29,8 @@ pub enum Of {
 /// Prediction of whole functions ln g(l) of one task.
 #[derive(Clone, Debug)]
 pub struct StudyLevelPrior {
+    /// What is predicted.
+    pub task: Task,
     /// Stretches, in any order.
     pub stretches: Vec<f64>,
     /// Mean of ln g, ln Pa.
@@ -42,18 +46,17 @@ pub struct StudyLevelPrior {
 /// Predicts a task at these stretches.
 pub fn predict(means: &MeanPosterior, spreads: &Spreads, task: Task, of: Of, stretches: &[f64]) -> StudyLevelPrior {
     let (coefficients, mut covariance) = means.of(task);
-    if of != Of::Mean {
-        for part in [Part::Publication, Part::Curve] {
-            let (deviations, _) = spreads.deviations(part, task);
-            for (f, sd) in deviations.iter().enumerate() {
-                covariance[(f, f)] += sd * sd;
-            }
+    for part in of.parts() {
+        let (deviations, _) = spreads.deviations(*part, task);
+        for (f, sd) in deviations.iter().enumerate() {
+            covariance[(f, f)] += sd * sd;
         }
     }
     let nugget = if of == Of::Study { NUGGET } else { 0.0 };
     let row = |l: &f64| Coefficients::from(Basis.at(l.ln()));
     let sd = |l: &f64| (row(l).dot(&(covariance * row(l))).max(0.0) + nugget * nugget).sqrt();
     StudyLevelPrior {
+        task,
         stretches: stretches.to_vec(),
         mean: stretches.iter().map(|l| row(l).dot(&coefficients)).collect(),
         sd: stretches.iter().map(sd).collect(),
@@ -77,12 +80,22 @@ fn lower_triangle(covariance: &Square) -> Square {
 
 impl Of {
     /// All, in the order of what they hold.
-    pub const ALL: [Self; 3] = [Self::Mean, Self::Person, Self::Study];
+    pub const ALL: [Self; 4] = [Self::Mean, Self::Laboratory, Self::Person, Self::Study];
+
+    /// The random parts that belong to it.
+    pub(super) fn parts(self) -> &'static [Part] {
+        match self {
+            Self::Mean => &[],
+            Self::Laboratory => &[Part::Publication],
+            Self::Study | Self::Person => &[Part::Publication, Part::Curve],
+        }
+    }
 
     /// The word on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mean => "mean",
+            Self::Laboratory => "laboratory",
             Self::Study => "study",
             Self::Person => "person",
         }
@@ -92,7 +105,10 @@ impl Of {
 impl std::str::FromStr for Of {
     type Err = String;
     fn from_str(word: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|of| of.name() == word).ok_or_else(|| "say mean, person or study".to_owned())
+        Self::ALL
+            .into_iter()
+            .find(|of| of.name() == word)
+            .ok_or_else(|| "say mean, laboratory, person or study".to_owned())
     }
 }
 

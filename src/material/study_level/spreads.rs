@@ -61,6 +61,26 @@ pub struct Spreads {
     pub mean_shape: f64,
 }
 
+/// Names of the spreads, in the order of the fields.
+pub const SPREAD_NAMES: [&str; SPREADS] = [
+    "level_publication",
+    "level_publication_abnormal",
+    "level_curve",
+    "level_curve_abnormal",
+    "step_publication",
+    "slope_publication",
+    "bend_publication",
+    "step_curve",
+    "slope_curve",
+    "bend_curve",
+    "remainder_publication",
+    "remainder_curve",
+    "linear_scale",
+    "mean_kind",
+    "mean_region",
+    "mean_task",
+    "mean_shape",
+];
 /// Scales of the half-normal priors, in the order of the fields.
 const PRIOR_SCALES: [f64; SPREADS] =
     [1.0, 3.0, 1.0, 3.0, 1.0, 5.0, 5.0, 1.0, 5.0, 5.0, 0.5, 0.5, 0.3, 1.0, 1.0, 1.0, 1.0];
