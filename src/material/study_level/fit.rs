@@ -3,6 +3,7 @@
 use super::evidence::Evidence;
 use super::spreads::{SPREADS, Spreads};
 use super::study::Studies;
+use crate::material::meta_model;
 use crate::material::random::CounterRng;
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -20,7 +21,7 @@ const ITERATIONS: u64 = 200;
 const DIFFERENCE: f64 = 1e-4;
 
 /// Why there is no fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ThisError)]
+#[derive(Clone, Debug, PartialEq, ThisError)]
 pub enum FitError {
     /// No curve with a point away from rest.
     #[error("the studies have no curve with a positive energy away from rest: add at least one study")]
@@ -28,6 +29,9 @@ pub enum FitError {
     /// No start got anywhere.
     #[error("the likelihood of these studies is finite from no start: look for a curve with absurd moduli")]
     NotFinite,
+    /// A law that cannot be fitted to what is predicted.
+    #[error(transparent)]
+    Law(#[from] meta_model::FitError),
 }
 
 /// The fitted model.
