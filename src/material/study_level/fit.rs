@@ -51,11 +51,14 @@ pub struct StudyLevelFit {
     pub(super) curvature: DMatrix<f64>,
 }
 
+/// A point, its value and its gradient.
+type Seen = (Vec<f64>, f64, Vec<f64>);
+
 struct Search<'a> {
     studies: &'a Studies,
     /// Values are divided by it.
     scale: f64,
-    last: RefCell<Option<(Vec<f64>, f64, Vec<f64>)>>,
+    last: RefCell<Option<Seen>>,
 }
 
 impl Search<'_> {
@@ -81,7 +84,7 @@ const LOG_LIMIT: f64 = 12.0;
 
 pub(super) fn density(studies: &Studies, logs: &[f64]) -> Option<(f64, [f64; SPREADS])> {
     let logs: [f64; SPREADS] = logs.try_into().ok()?;
-    if logs.iter().any(|x| !(x.abs() < LOG_LIMIT)) {
+    if logs.iter().any(|x| x.is_nan() || x.abs() >= LOG_LIMIT) {
         return None;
     }
     let spreads = Spreads::from_logs(&logs);

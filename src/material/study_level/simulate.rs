@@ -11,7 +11,7 @@ use nalgebra::linalg::Cholesky;
 
 /// Draws the curves of a literature of this design under these spreads. A seed gives one literature.
 pub fn simulate(design: &Studies, spreads: &Spreads, seed: u64) -> Studies {
-    let means = task_means(spreads, &CounterRng::new(seed, 0));
+    let means = task_means(spreads, CounterRng::new(seed, 0));
     let mut drawn = design.clone();
     for (number, (_, curves)) in drawn.publications.iter_mut().enumerate() {
         let rng = CounterRng::new(seed, 1 + 2 * number as u64);
@@ -36,7 +36,7 @@ pub fn simulate(design: &Studies, spreads: &Spreads, seed: u64) -> Studies {
 }
 
 /// Coefficients of the tasks' means, drawn from their prior.
-fn task_means(spreads: &Spreads, rng: &CounterRng) -> Vec<Coefficients> {
+fn task_means(spreads: &Spreads, rng: CounterRng) -> Vec<Coefficients> {
     let mut means = vec![Coefficients::zeros(); TASKS];
     for f in 0..SIZE {
         let covariance = spreads.mean_covariance(f);
