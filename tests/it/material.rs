@@ -173,7 +173,7 @@ fn options_of_the_other_generative_model_are_refused_by_name() {
         (&["gp", "fit", "--model", "study-level", "--rank", "2"], "--rank belongs to --model published"),
         (&["gp", "show", "--model", "study-level", "--models", "44"], "--models belongs to --model published"),
     ] {
-        let (code, said) = refused(&[arguments, &["-o", out]].concat());
+        let (code, said) = refusal(&[arguments, &["-o", out]].concat());
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains(named), "{said}");
     }
