@@ -25,6 +25,7 @@ mod python;
 #[path = "../it/sequences.rs"]
 mod sequences;
 mod stale;
+mod study_level;
 
 use bar::Bar;
 
@@ -37,6 +38,7 @@ fn main() {
         ("corruptions", corruptions::bars),
         ("mesh", mesh::bars),
         ("material", material::bars),
+        ("study-level", study_level::bars),
         ("fem", fem::bars),
         ("contact", contact::bars),
         ("experiment", experiment::bars),

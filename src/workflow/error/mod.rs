@@ -30,6 +30,7 @@ use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
 use crate::material::literature::StudyError;
 use crate::material::meta_model::FitError;
+use crate::material::study_level;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
 use crate::overlay::OverlayError;
@@ -90,6 +91,10 @@ pub enum WorkflowError {
     Studies { file: String, source: StudyError },
     #[error("{file}: {source}")]
     Hyperparameters { file: String, source: HyperparametersError },
+    #[error("{file}: {reason}; make it with hgm gp fit --model study-level")]
+    StudyLevelFile { file: String, reason: String },
+    #[error(transparent)]
+    StudyLevel(#[from] study_level::FitError),
     #[error("there is no literature model {id}; ids go from 0 to {last}")]
     NoSuchModel { id: u32, last: u32 },
     #[error(transparent)]
