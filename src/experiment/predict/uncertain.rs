@@ -68,7 +68,7 @@ impl Uncertainty {
         let list: Vec<Uncertain> = list.into_iter().filter(|u| u.sd() > 0.0).collect();
         let priors: Vec<LogPrior> = list.iter().map(|u| u.prior.clone()).collect();
         let apart = || DMatrix::from_diagonal(&DVector::from_iterator(list.len(), list.iter().map(Uncertain::sd)));
-        let joint = joint_precision(&priors).try_inverse().and_then(nalgebra::DMatrix::cholesky);
+        let joint = joint_precision(&priors).try_inverse().and_then(DMatrix::cholesky);
         let factor = joint.map_or_else(apart, |cholesky| cholesky.l());
         Self { list, factor }
     }

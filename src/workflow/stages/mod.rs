@@ -30,8 +30,8 @@ pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
-pub(crate) use plan::{PlanFacts, PlannedHead, plan};
-pub(crate) use pose::{PoseFacts, pose};
+pub(crate) use plan::{PlannedHead, plan};
+pub(crate) use pose::pose;
 pub(crate) use predict::{PredictInput, predict};
 pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,

@@ -114,7 +114,7 @@ struct Patient<'a> {
 }
 
 impl<'a> Patient<'a> {
-    fn read(work: &Work<'a>, input: &'a PredictInput<'a>) -> Result<Self, WorkflowError> {
+    fn read(work: &'a Work<'_>, input: &'a PredictInput<'a>) -> Result<Self, WorkflowError> {
         let case = &work.case;
         let mni_from_pre = pose(case)?;
         let grid = spaced(grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?, work.settings.fields.spacing_mm);
@@ -252,7 +252,8 @@ impl Lying {
         let nodes = patient.input.mesh.0.nodes_mm().len();
         let (mut found, mut refused): (Vec<(&Posed, Forecast)>, Vec<String>) = (Vec::new(), Vec::new());
         // States of the surface and solved draws.
-        work.tell(|p| p.begin(&format!("prediction, {head}"), bodies.len() * (7 + checks)));
+        work.tell(|p| p.begin("prediction", bodies.len() * (7 + checks)));
+        work.tell(|p| p.doing(&head.to_string()));
         for posed in bodies {
             match forecast(posed, nodes, (settings.draws, checks), &|| work.tell(|p| p.step())) {
                 Ok(forecast) => found.push((posed, forecast)),
