@@ -227,6 +227,7 @@ impl CasePage {
         let figure = self.shift_figure.as_ref().map(shift_pictures);
         let landmarks = self.landmarks.as_ref();
         let expected = self.prediction_figure.as_ref();
+        let expected = expected.map(|f| html! { (shift_pictures(&f.shift)) (shift_pictures(&f.spread)) });
         add("expected", "Expected brain shift", self.prediction.as_ref().map(|p| prediction::section(p, expected)));
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         let compared = outcome.filter(|o| o.kind != ExperimentKind::Prediction);

@@ -1,19 +1,15 @@
 //! Before an operation: how the brain is expected to move, and how sure that is.
 
 use super::super::html::{fixed, number};
-use super::PredictionFigure;
 use super::results::{Row, table, words};
 use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, TargetPlace};
 use maud::{Markup, html};
 
 /// The section's body.
-pub fn section(prediction: &Prediction, figure: Option<&PredictionFigure>) -> Markup {
+pub fn section(prediction: &Prediction, figure: Option<Markup>) -> Markup {
     html! {
         p class="lead" { (in_a_sentence(prediction)) } "\n"
-        @if let Some(figure) = figure {
-            (super::shift_pictures(&figure.shift))
-            (super::shift_pictures(&figure.spread))
-        }
+        @if let Some(figure) = figure { (figure) }
         (heads(prediction))
         @for head in prediction.heads.iter().filter(|head| !head.targets.is_empty()) { (targets(prediction, head)) }
         h3 { "What is assumed" }
