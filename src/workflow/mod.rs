@@ -36,6 +36,8 @@ mod outcome;
 mod patient;
 mod phantom;
 mod plan;
+mod planned_scan;
+mod prediction;
 mod programs;
 mod progress;
 mod refusal;
@@ -54,8 +56,8 @@ pub mod cohort;
 
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, SimulationError,
-    WarpError, WorkflowError,
+    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, PredictError,
+    SimulationError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};
@@ -67,6 +69,8 @@ pub use maps::WarpTo;
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
+pub use planned_scan::{PlanInputs, PlannedResection};
+pub use prediction::predict;
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
@@ -196,6 +200,9 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
     let subject = Case::open(&place.folder)?.subject().unwrap_or(Subject::Patient);
     let work = Work::new(place, subject, settings, progress);
     prepared_case(&work, true)?;
+    if subject == Subject::Plan {
+        return Err(CaseError::Planned { folder: place.folder.clone() }.into());
+    }
     if subject == Subject::Patient {
         let patient = Patient::new(&work, Prepared::read(&work)?)?;
         outcome::keep_settings(&work)?;

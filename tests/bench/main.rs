@@ -19,6 +19,7 @@ mod material;
 mod mesh;
 mod pairs;
 mod patients;
+mod predict;
 #[path = "../it/python.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod python;
@@ -44,6 +45,7 @@ fn main() {
         ("experiment", experiment::bars),
         ("pairs", pairs::bars),
         ("patients", patients::bars),
+        ("predict", predict::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),
         ("stale", stale::bars),

@@ -100,6 +100,9 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("estimate", &["estimate", &case]);
     prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
+    let plan = sample("truth/resected_pre.nii.gz").display().to_string();
+    let planned = ["predict", pre, "-o", &at("planned"), "--resection", &plan, "--draws", "16", "--checks", "0"];
+    prints("predict", &[&planned[..], &CHEAP[..]].concat());
     for (name, points) in [("pre.csv", "x,y,z\n20,-10,30\n-20,-10,30\n"), ("post.csv", "x,y,z\n15,-5,31\n-23,-8,25\n")]
     {
         std::fs::write(at(name), points).unwrap();

@@ -107,6 +107,10 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
         "Simulations were made with hgm " (env!("CARGO_PKG_VERSION")) ", research software"
         @match outcome.kind {
             ExperimentKind::Phantom => { ", on the MNI152NLin2009aSym template " (cite(TEMPLATE)) ". " },
+            ExperimentKind::Prediction => {
+                ". The pre-operative image was registered rigidly to the MNI152NLin2009aSym template " (cite(TEMPLATE))
+                ", so that sizes stay the patient's. The tissue of the plan was removed from the mesh. "
+            },
             ExperimentKind::Resection => {
                 ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
                  MNI152NLin2009aSym template " (cite(TEMPLATE))
@@ -128,7 +132,12 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
             " " (cite(GENERATIVE_MODEL)) ". "
         }
         @if !outcome.loads.is_empty() { "Loads: " (list(&outcome.loads)) ". " }
+        @if outcome.kind == ExperimentKind::Prediction {
+            "Unknowns were drawn by Halton's sequence from the priors stated above " (cite(GENERATIVE_MODEL))
+            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities."
+        } @else {
         "Each static equilibrium was compared with " (outcome.reference)
         " by the root mean square over nodes of the distance, RMSE = √(Σ|u − u" sub { "ref" } "|² / S)."
+        }
     }
 }

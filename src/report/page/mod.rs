@@ -5,9 +5,11 @@ mod cohort;
 mod estimate;
 mod methods;
 mod parts;
+mod prediction;
 mod results;
 
 pub use methods::{Reference, references};
+pub use prediction::in_a_sentence as expected_in_a_sentence;
 pub use results::set_name;
 
 use super::chart;
@@ -18,6 +20,7 @@ use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use crate::experiment::predict::Prediction;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("../assets/page.css");
@@ -56,6 +59,15 @@ pub struct ShiftFigure {
     pub pictures: Vec<CaptionedPicture>,
 }
 
+/// A prediction on a slice: the expected shift, and how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictionFigure {
+    /// Expected shift and its reach, with the colours of both.
+    pub shift: ShiftFigure,
+    /// Its standard deviation.
+    pub spread: ShiftFigure,
+}
+
 /// Everything a page can show. What is absent is left out, and said so in `absent`.
 #[derive(Clone, Debug, Default)]
 pub struct CasePage {
@@ -69,6 +81,10 @@ pub struct CasePage {
     pub absent: Vec<String>,
     /// What the experiment found.
     pub outcome: Option<ExperimentOutcome>,
+    /// How the brain is expected to move.
+    pub prediction: Option<Prediction>,
+    /// The same on slices.
+    pub prediction_figure: Option<PredictionFigure>,
     /// The brain shift in numbers.
     pub brain_shift: Option<BrainShift>,
     /// The same on a slice.
@@ -210,8 +226,12 @@ impl CasePage {
         let shift = self.brain_shift.as_ref().filter(|shift| !shift.states.is_empty());
         let figure = self.shift_figure.as_ref().map(shift_pictures);
         let landmarks = self.landmarks.as_ref();
+        let expected = self.prediction_figure.as_ref();
+        let expected = expected.map(|f| html! { (shift_pictures(&f.shift)) (shift_pictures(&f.spread)) });
+        add("expected", "Expected brain shift", self.prediction.as_ref().map(|p| prediction::section(p, expected)));
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
-        add("summary", "Summary", outcome.map(results::summary));
+        let compared = outcome.filter(|o| o.kind != ExperimentKind::Prediction);
+        add("summary", "Summary", compared.map(results::summary));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
@@ -307,6 +327,7 @@ impl maud::Render for Given {
 pub fn title_of(kind: Option<ExperimentKind>) -> &'static str {
     match kind {
         Some(ExperimentKind::Phantom) => "Phantom: a known deformation, found again",
+        Some(ExperimentKind::Prediction) => "Brain shift expected of a planned resection",
         Some(ExperimentKind::Resection) => "Brain deformation after resection",
         None => "Prepared case",
     }

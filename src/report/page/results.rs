@@ -175,6 +175,7 @@ fn sentence(outcome: &ExperimentOutcome) -> String {
     let best_id = &best.id;
     let verdict = match outcome.kind {
         ExperimentKind::Phantom => format!("The sample nearest to the reference is {best_id}."),
+        ExperimentKind::Prediction => String::new(),
         ExperimentKind::Resection => {
             let sets = outcome.rmse_sets();
             let gain = sets.iter().find_map(|set| Some((set, outcome.rest_rmse_mm.get(set)?, best.rmse_mm.get(set)?)));

@@ -5,6 +5,7 @@ mod input;
 mod label_map;
 mod landmarks;
 mod mesh_file;
+mod predict;
 mod simulation;
 mod warp;
 
@@ -13,6 +14,7 @@ pub use input::{InputError, MaskRole};
 pub use label_map::LabelMapError;
 pub use landmarks::LandmarkError;
 pub use mesh_file::MeshFileError;
+pub use predict::PredictError;
 pub use simulation::SimulationError;
 pub use warp::WarpError;
 
@@ -134,6 +136,8 @@ pub enum WorkflowError {
     #[error(transparent)]
     Warp(#[from] WarpError),
     #[error(transparent)]
+    Predict(#[from] PredictError),
+    #[error(transparent)]
     Landmark(#[from] LandmarkError),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
@@ -179,6 +183,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Predict(PredictError::NoEquilibrium { .. })
             | Self::Synth(SynthError::Sag(_))
             | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })

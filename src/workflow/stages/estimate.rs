@@ -133,7 +133,7 @@ pub(super) fn held_by(work: &Work<'_>) -> serde_json::Value {
     let ResectionSettings { supports, falx, skull, .. } = &work.settings.resection;
     match work.subject {
         Subject::Patient => serde_json::json!({ "supports": supports, "falx": falx, "skull": skull }),
-        Subject::Phantom { .. } => serde_json::Value::Null,
+        Subject::Phantom { .. } | Subject::Plan => serde_json::Value::Null,
     }
 }
 
