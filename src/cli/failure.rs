@@ -51,6 +51,7 @@ impl Failure {
             let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
             if let Some(answer) = error.downcast_ref::<Answered>() {
                 told["answer"] = answer.answer.name().into();
+                told["verdict"] = serde_json::json!(answer.answer.verdict());
             }
             println!("{}", serde_json::json!({ "error": told }));
         }
@@ -85,7 +86,8 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
         if let Some(answer) = error.downcast_ref().and_then(WorkflowError::answer) {
-            return Self::QualityGate(Answered { answer, message: in_one_line(&with_remedy(error)) }.into());
+            let message = format!("{} {}", answer.verdict().sentence, in_one_line(&with_remedy(error)));
+            return Self::QualityGate(Answered { answer, message }.into());
         }
         let error = match (with_remedy(error), kind) {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),

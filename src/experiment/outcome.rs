@@ -42,14 +42,6 @@ impl Answer {
             Self::NotOnePerson => "not-one-person",
         }
     }
-
-    /// The sentence of pages.
-    pub fn sentence(self) -> &'static str {
-        match self {
-            Self::NoOperation => "No operation is seen: no stiffness is claimed.",
-            Self::NotOnePerson => "The two scans do not show one person: nothing was compared.",
-        }
-    }
 }
 
 /// One experiment: settings' worth of samples against one reference.

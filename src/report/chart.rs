@@ -325,8 +325,9 @@ pub(super) fn frame(svg: &mut String, x_axis: &Axis, y_axis: &Axis, x_label: &st
 /// A colour bar with ticks and its title, lying on its side, 320 units wide; the ends are the range, in numbers.
 pub fn colour_bar(scale: &ColourScale) -> String {
     let (width, x0, x1) = (340.0, 24.0, 316.0);
+    let above = if scale.and_above { " and above" } else { "" };
     let description = format!(
-        "Colour bar: {} from {} (dark) to {} (bright)",
+        "Colour bar: {} from {} (dark) to {} (bright){above}",
         scale.title,
         number(scale.low, 3),
         number(scale.high, 3)
@@ -355,7 +356,8 @@ pub fn colour_bar(scale: &ColourScale) -> String {
         marks.push((v, grouped(&tick_label(v, step))));
     }
     if span > 0.0 {
-        marks.push((scale.high, number(scale.high, 3)));
+        let and_above = if scale.and_above { "\u{2265}\u{2009}" } else { "" };
+        marks.push((scale.high, format!("{and_above}{}", number(scale.high, 3))));
     }
     for (value, text) in marks {
         let x = if span > 0.0 { x0 + (x1 - x0) * (value - scale.low) / span } else { x0 };

@@ -3,6 +3,7 @@
 use super::colour::ColourScale;
 use super::page::{CaptionedPicture, ShiftFigure};
 use super::picture::Picture;
+use super::slice::Plane;
 use crate::experiment::field::{at, in_tetrahedra};
 use crate::geometry::{Mni, Position};
 use crate::image::{Grid, Volume};
@@ -47,7 +48,7 @@ pub fn shift_figure(
         }),
     ];
     let sizes = (0..grid.len()).filter_map(shown).flat_map(|both| both.map(length));
-    let scale = ColourScale::over(sizes.chain([0.0]), "displacement (mm)")?;
+    let scale = ColourScale::to_95(sizes, "displacement (mm)")?;
     let brightest = (0..grid.len()).filter_map(|n| t1.trilinear(place(n))).fold(1.0f32, f32::max);
     let pictures = panels.into_iter().map(|(caption, what, of)| {
         let mut picture = Picture::filled(SCALE * size[0], SCALE * size[1], [0, 0, 0, 0]);
@@ -92,6 +93,7 @@ pub fn shift_figure(
                 "Axial slice at z = {level_mm} mm, the patient's right on the left: colour is the size of the displacement, {what}; \
                  lines lead from a dark dot the way the tissue went, {LONGER} times as far"
             ),
+            sides: Some(Plane::Axial.sides()),
         }
     });
     Some(ShiftFigure { pictures: pictures.collect(), scale })

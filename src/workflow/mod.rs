@@ -243,16 +243,6 @@ pub fn phantom(
     Ok(work.case.clone())
 }
 
-/// The name of the sample whose moduli are nearest to a phantom's known ones.
-///
-/// # Errors
-/// A prior that does not exist.
-pub fn nearest_sample(settings: &Settings, every_task: bool) -> Result<Option<String>, WorkflowError> {
-    let place = Place::default();
-    let mut silent = Silent;
-    phantom::nearest(&Work::new(&place, Subject::Phantom { every_task }, settings, &mut silent))
-}
-
 /// The page again from what is there.
 ///
 /// # Errors

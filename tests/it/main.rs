@@ -32,3 +32,4 @@ mod simulate;
 mod slicer_files;
 mod stale;
 mod transform_files;
+mod verdicts;
