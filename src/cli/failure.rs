@@ -1,6 +1,7 @@
 //! How a subcommand ends when it does not end well.
 
 use super::remedy::remedy;
+use super::session::print_line;
 use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
@@ -53,7 +54,7 @@ impl Failure {
                 told["answer"] = answer.answer.name().into();
                 told["verdict"] = serde_json::json!(answer.answer.verdict());
             }
-            println!("{}", serde_json::json!({ "error": told }));
+            print_line(&serde_json::json!({ "error": told }).to_string()).ok();
         }
     }
 }

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::io::IsTerminal;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -26,7 +26,7 @@ pub fn has_emitted() -> bool {
 /// Options of every command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct GlobalOptions {
-    /// Settings file (TOML, one table for each part: register, segment, mesh, gp, law ...)
+    /// Settings file (TOML, one table for each part; `hgm settings` prints one with every setting)
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Machine-readable result on stdout (see `hgm schema`), logs on stderr
@@ -150,9 +150,9 @@ impl Session {
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
         EMITTED.store(true, Ordering::Relaxed);
         if self.options.json {
-            println!("{}", serde_json::to_string_pretty(value)?);
+            print_line(&serde_json::to_string_pretty(value)?)?;
         } else if !text.is_empty() {
-            println!("{}", text.trim_end());
+            print_line(text.trim_end())?;
         }
         Ok(())
     }
@@ -160,6 +160,18 @@ impl Session {
     /// A progress bar of `steps` steps with time left; hidden when stderr is not a terminal or with `-q`.
     pub fn progress(&self, steps: u64, what: &'static str) -> ProgressBar {
         if self.shows_bars() { bar(steps, what) } else { ProgressBar::hidden() }
+    }
+}
+
+/// A line on stdout; a reader who has gone away (`hgm ... | head -1`) wants no more, and that is no fault.
+///
+/// # Errors
+/// A disk that is full, where stdout is a file.
+pub fn print_line(text: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("standard output cannot be written"),
+        _ => Ok(()),
     }
 }
 

@@ -7,10 +7,11 @@ use super::setting::{
 use crate::fem::{Loads, PatchLoad, Scenario, SolverSettings};
 use crate::material::law::Material;
 use crate::tag::SETS;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the phantom is made of and how it is loaded.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PhantomSettings {
     /// 1: the whole brain one material; 2: grey and white matter apart.

@@ -40,6 +40,7 @@ mod programs;
 mod progress;
 mod refusal;
 mod settings;
+mod settings_manual;
 mod simulation;
 mod stage_name;
 mod stages;
@@ -69,6 +70,7 @@ pub use plan::{Goal, Step, plan, samples, tissues};
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
+pub use settings_manual::{Setting, annotated, every_setting};
 pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
@@ -78,7 +80,9 @@ pub use warp::{PointCounts, Through, Warp, Warped, warp};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
+use crate::artefact::check_writable;
 use crate::experiment::compare::Comparison;
+use crate::layout;
 use lock::Lock;
 use patient::{Images, Patient, Prepared};
 use phantom::Phantom;
@@ -137,6 +141,7 @@ pub fn run_to(
 /// What would be refused after minutes is refused now.
 fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     work.settings.check()?;
+    check_writable(&work.case.path(layout::SETTINGS))?;
     if goal == Goal::Images {
         return Ok(());
     }

@@ -129,7 +129,10 @@ fn page_terminal_json_and_group_say_the_same_verdict_of_eight_outcomes() {
         // No other verdict anywhere: neither its sentence nor, where nothing is claimed, a modulus above all sections.
         for (other, elsewhere, _) in eight() {
             let sentence = elsewhere.with_verdict().verdict.sentence;
-            assert!(sentence == said || !page.contains(&sentence) && !terminal.contains(&sentence), "{name} says {other}");
+            assert!(
+                sentence == said || !page.contains(&sentence) && !terminal.contains(&sentence),
+                "{name} says {other}"
+            );
         }
         let first = page.split("id=\"glance\"").nth(1).unwrap().split("<section").next().unwrap();
         let shown = first.contains("> Pa<");
@@ -150,7 +153,10 @@ fn page_terminal_json_and_group_say_the_same_verdict_of_eight_outcomes() {
         let line = table.lines().find(|line| line.starts_with(name)).unwrap();
         assert_eq!(line.split('\t').nth(column), Some(verdict.finding.short()), "{name}");
         let row = group.split(&format!("data-subject=\"{name}\"")).nth(1).unwrap().split("</tr>").next().unwrap();
-        assert!(row.contains(&format!(">{}<", verdict.finding.short())) && row.contains(&verdict.sentence), "{name}: {row}");
+        assert!(
+            row.contains(&format!(">{}<", verdict.finding.short())) && row.contains(&verdict.sentence),
+            "{name}: {row}"
+        );
         let rows = document["subjects"].as_array().unwrap();
         let row = rows.iter().find(|row| row["participant_id"] == **name).unwrap();
         assert_eq!((&row["verdict"], &row["sentence"]), (&json!(verdict.finding.short()), &json!(verdict.sentence)));
