@@ -109,7 +109,7 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
         tiles.push(tile("Tetrahedra", &html! { (count(mesh.tets)) }, &note));
     }
     html! {
-        @for part in compared(outcome) { p { (part) } "\n" }
+        @if let Some(part) = compared(outcome) { p { (part) } "\n" }
         @if !outcome.verdict.reasons.is_empty() {
             p { "What speaks for the verdict:" }
             ul { @for reason in outcome.verdict.because() { li { (reason) } } } "\n"
