@@ -129,6 +129,10 @@ impl Axis {
                 }
             }
         }
+        if marks.len() < 2 {
+            // A range within a step of 1, 2, 5 is as good as linear.
+            return Self { log: false, ..*self }.ticks(count);
+        }
         marks
     }
 }
@@ -191,15 +195,16 @@ impl LineChart {
         let y_axis = Axis::over(ys, self.y_log, self.y_from_zero, [height - 52.0, top]);
         let mut svg = open(width, height, &self.description);
         frame(&mut svg, &x_axis, &y_axis, &self.x_label, &self.y_label);
-        for rule in &self.y_rules {
-            let (y, text) = (y_axis.at(rule.at), escape(&rule.name));
+        let levels: Vec<f64> = self.y_rules.iter().map(|rule| y_axis.at(rule.at)).collect();
+        for ((rule, &y), label) in self.y_rules.iter().zip(&levels).zip(apart(&levels, top)) {
+            let text = escape(&rule.name);
             let [x0, x1] = x_axis.pixels;
             let _ = write!(
                 svg,
                 "<path d=\"M{x0} {y:.1}H{x1}\" stroke=\"currentColor\" stroke-dasharray=\"6 4\" opacity=\".65\"/>\
                  <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"currentColor\">{text}</text>",
                 x1 - 4.0,
-                if y < top + 16.0 { y + 14.0 } else { y - 5.0 }
+                label
             );
         }
         for rule in &self.x_rules {
@@ -281,6 +286,22 @@ impl LineChart {
         self.series.iter().map(place).collect()
     }
 }
+
+/// Where the names of horizontal lines stand: above their line where there is room, and never over each other.
+fn apart(levels: &[f64], top: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..levels.len()).collect();
+    order.sort_by(|a, b| levels[*a].total_cmp(&levels[*b]));
+    let (mut places, mut above) = (vec![0.0; levels.len()], f64::NEG_INFINITY);
+    for n in order {
+        let wanted = if levels[n] < top + 16.0 { levels[n] + 14.0 } else { levels[n] - 5.0 };
+        above = wanted.max(above + LINE);
+        places[n] = above;
+    }
+    places
+}
+
+/// From one line of text to the next.
+const LINE: f64 = 14.0;
 
 /// The marker of series number `n`: where colours come round again the shape is another.
 fn shape(n: usize) -> Marker {
@@ -576,6 +597,17 @@ mod tests {
         let svg = colour_bar(&scale);
         well_formed(&svg);
         assert!(svg.contains("RMSE (mm)") && svg.contains(">0.123<") && svg.contains(">4.56<"));
+    }
+
+    #[test]
+    fn names_of_lines_stand_apart_and_every_axis_has_marks() {
+        let places = apart(&[100.0, 101.5, 250.0, 16.0], 14.0);
+        let mut sorted = places.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] >= LINE), "{places:?}");
+        assert_eq!((places[0], places[2]), (95.0, 245.0));
+        let narrow = Axis::over([310.0, 330.0].into_iter(), true, false, [0.0, 100.0]);
+        assert!(narrow.ticks(7).len() >= 2 && narrow.ticks(7).iter().all(|(v, _)| *v > 290.0 && *v < 360.0));
     }
 
     #[test]

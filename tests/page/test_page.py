@@ -356,6 +356,25 @@ def no_heading_hides_behind_the_bar_on_a_narrow_screen(page, _):
 
 
 @check
+def axe_finds_no_serious_fault_in_light_or_dark(page, options):
+    if not options.axe:
+        return "no axe-core given (--axe)"
+    script, said = options.axe.read_text(encoding="utf-8"), []
+    for dark in (False, True):
+        with Browser(dark=dark) as browser:
+            browser.open(page.as_uri())
+            browser.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+            browser.evaluate(script + "; 0")
+            found = browser.evaluate(
+                "axe.run(document, {resultTypes: ['violations']}).then((r) => r.violations.map((v) =>"
+                " ({id: v.id, impact: v.impact, nodes: v.nodes.length, first: v.nodes[0].html.slice(0, 160)})))")
+            grave = [fault for fault in found if fault["impact"] in ("serious", "critical")]
+            require(not grave, f"{'dark' if dark else 'light'}: {grave[:4]}")
+            said.append(f"{len(found)} lesser")
+    return f"0 serious ({', '.join(said)})"
+
+
+@check
 def subjects_are_sorted_and_filtered(page, _):
     with Browser() as browser:
         browser.open(page.as_uri())
@@ -450,6 +469,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path, metavar="REPORT.html")
     parser.add_argument("--pictures", type=pathlib.Path, help="folder for a picture of every section")
     parser.add_argument("--slack", type=float, default=1.0, help="factor on the time bars for a loaded machine")
+    parser.add_argument("--axe", type=pathlib.Path, help="axe.min.js of the npm package axe-core (MPL-2.0)")
     parser.add_argument("--only", help="run the checks whose name contains this")
     options = parser.parse_args()
     failed = 0

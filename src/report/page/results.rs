@@ -164,8 +164,11 @@ fn signed_fixed(percent: f64) -> String {
     if percent > 0.0 { format!("+{}", fixed(percent, 1)) } else { fixed(percent, 1) }
 }
 
+/// A level of the prior: two decimals at most, and none that say nothing.
 fn signed(level: f64) -> String {
-    if level > 0.0 { format!("+{level}") } else { format!("{}", level + 0.0).replace('-', "\u{2212}") }
+    let text = fixed(level, 2);
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if level > 0.0 { format!("+{text}") } else { text.to_owned() }
 }
 
 /// How many simulations there are, and what they were held against; nothing where none was made.

@@ -191,7 +191,7 @@ fn a_worse_best_sample_is_not_praised() {
     let mut outcome = outcome(ExperimentKind::Resection);
     outcome.rest_rmse_mm = map(vec![("margin", 0.1), ("ventricle", 0.1)]);
     let html = page(outcome).to_html();
-    assert!(html.contains("can be told from rest") && !html.contains("Better than rest"), "{html}");
+    assert!(html.contains("further away than rest") && !html.contains("Better than rest"), "{html}");
 }
 
 #[test]
