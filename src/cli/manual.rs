@@ -54,7 +54,7 @@ pub fn command() -> Command {
     let command = command.disable_version_flag(true).arg(version.help_heading(COMMON).display_order(COMMON_ORDER + 98));
     command
         .help_template(format!(
-            "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}\n{{options}}\n\n{{after-help}}"
+            "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}{COMMON}:\n{{options}}\n\n{{after-help}}"
         ))
         .after_help(after)
 }

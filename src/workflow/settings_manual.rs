@@ -26,7 +26,7 @@ pub struct Setting {
     pub description: String,
 }
 
-/// Units by the ends of names; the longest that fits counts.
+/// Units by the ends of names, the first one that fits.
 const UNITS: [(&str, &str); 15] = [
     ("_kg_per_m3", "kg/m3"),
     ("_m_per_s2", "m/s2"),
@@ -46,7 +46,6 @@ const UNITS: [(&str, &str); 15] = [
 ];
 
 fn unit(name: &str) -> Option<&'static str> {
-    // A voxel's number is no length ("sigma_voxels" before "_s").
     UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit)
 }
 

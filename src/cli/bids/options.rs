@@ -30,7 +30,7 @@ pub struct Args {
     /// Where the case folders go (sub-*/hgm), at both levels [default: into OUT]
     #[arg(short, long, alias = "work_dir", value_name = "DIR")]
     pub work_dir: Option<PathBuf>,
-    /// Threads to use, as --threads
+    /// Threads to use, as --threads, which wins
     #[arg(
         long,
         alias = "n-procs",
