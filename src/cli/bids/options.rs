@@ -31,15 +31,7 @@ pub struct Args {
     #[arg(short, long, alias = "work_dir", value_name = "DIR")]
     pub work_dir: Option<PathBuf>,
     /// Threads to use, as --threads, which wins
-    #[arg(
-        long,
-        alias = "n-procs",
-        alias = "n_procs",
-        alias = "n-cpus",
-        alias = "n_cpus",
-        value_name = "N",
-        conflicts_with = "threads"
-    )]
+    #[arg(long, alias = "n-procs", alias = "n_procs", alias = "n-cpus", alias = "n_cpus", value_name = "N")]
     pub nprocs: Option<usize>,
     /// Memory at hand in GB: a mesh engine that is a program of its own is held to it (setting mesh.limits.memory_mb)
     #[arg(long, alias = "mem_gb", value_name = "GB", value_parser = clap::value_parser!(u64).range(1..))]
