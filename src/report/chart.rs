@@ -593,7 +593,7 @@ mod tests {
 
     #[test]
     fn the_bar_names_its_unit_and_both_ends() {
-        let scale = ColourScale { low: 0.123, high: 4.56, title: "RMSE (mm)".to_owned() };
+        let scale = ColourScale { low: 0.123, high: 4.56, title: "RMSE (mm)".to_owned(), and_above: false };
         let svg = colour_bar(&scale);
         well_formed(&svg);
         assert!(svg.contains("RMSE (mm)") && svg.contains(">0.123<") && svg.contains(">4.56<"));
@@ -620,7 +620,7 @@ mod tests {
             rows: vec!["3".to_owned(), "4".to_owned()],
             values: vec![vec![0.5, 1.5], vec![f64::NAN, 2.5]],
             chosen: Some((0, 0)),
-            scale: ColourScale { low: 0.5, high: 2.5, title: "RMSE (mm)".to_owned() },
+            scale: ColourScale { low: 0.5, high: 2.5, title: "RMSE (mm)".to_owned(), and_above: false },
         };
         let svg = map.to_svg();
         well_formed(&svg);
