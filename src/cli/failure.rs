@@ -1,7 +1,7 @@
 //! How a subcommand ends when it does not end well.
 
+use super::output::print_line;
 use super::remedy::remedy;
-use super::session::print_line;
 use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};

@@ -40,11 +40,12 @@ fn pages(command: clap::Command, name: &str) -> std::io::Result<Vec<(String, Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::manual;
+    use crate::cli::{Hgm, manual};
+    use clap::CommandFactory;
 
     #[test]
     fn every_command_and_subcommand_has_a_page_with_an_example() {
-        let pages = pages(manual::command(), "hgm").unwrap();
+        let pages = pages(manual::command(Hgm::command()), "hgm").unwrap();
         assert!(pages.iter().any(|(name, _)| name == "hgm-gp-fit"));
         for (name, page) in &pages[1..] {
             let page = String::from_utf8(page.clone()).unwrap();

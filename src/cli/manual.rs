@@ -1,9 +1,8 @@
 //! The command line as help, man pages and completions show it: commands by task, options under headings, and what a script
 //! needs to know besides (exit codes, variables of the environment).
 
-use super::Hgm;
 use crate::workflow::known;
-use clap::{Arg, ArgAction, Command, CommandFactory};
+use clap::{Arg, ArgAction, Command};
 
 /// The commands by what one wants to do; one that stands in no list comes last, under [`OTHERS`].
 const TASKS: [(&str, &[&str]); 6] = [
@@ -39,8 +38,7 @@ Exit codes:
   128 + N  ended by signal N; the same command goes on where it was";
 
 /// The whole command line, as it is parsed and shown.
-pub fn command() -> Command {
-    let command = Hgm::command();
+pub fn command(command: Command) -> Command {
     let after =
         format!("{EXIT_CODES}\n\n{}\n\n{}", environment(), "`hgm COMMAND --help` shows all options with an example.");
     let commands = by_task(&command);
@@ -130,6 +128,12 @@ pub fn meant_below(command: &Command, word: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::Hgm;
+    use clap::CommandFactory;
+
+    fn command() -> Command {
+        super::command(Hgm::command())
+    }
 
     fn help_of(words: &[&str]) -> String {
         let words = ["hgm"].iter().chain(words).chain(&["--help"]);

@@ -20,6 +20,7 @@ mod listener;
 mod man;
 mod manual;
 mod mesh;
+mod output;
 mod phantom;
 mod prep;
 mod reduce;
@@ -85,7 +86,7 @@ enum Command {
 }
 
 fn parsed() -> Result<Hgm, clap::Error> {
-    let mut matches = manual::command().try_get_matches()?;
+    let mut matches = manual::command(Hgm::command()).try_get_matches()?;
     Hgm::from_arg_matches_mut(&mut matches)
 }
 
@@ -130,8 +131,8 @@ pub fn main() -> ExitCode {
         Command::Gp(args) => gp::run(&args, &session),
         Command::Law(args) => law::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
-        Command::Completions(args) => completions::run(&args, manual::command(), &session),
-        Command::Man(args) => man::run(&args, manual::command(), &session),
+        Command::Completions(args) => completions::run(&args, manual::command(Hgm::command()), &session),
+        Command::Man(args) => man::run(&args, manual::command(Hgm::command()), &session),
         Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
         Command::Segment(args) => segment::run(&args, &session),

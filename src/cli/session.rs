@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::flags::{Flags, word};
 use super::listener::{Listener, bar};
+use super::output::print_line;
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
 use crate::workflow::{Case, Place, Programs, Settings, read_text};
@@ -11,7 +12,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -160,18 +161,6 @@ impl Session {
     /// A progress bar of `steps` steps with time left; hidden when stderr is not a terminal or with `-q`.
     pub fn progress(&self, steps: u64, what: &'static str) -> ProgressBar {
         if self.shows_bars() { bar(steps, what) } else { ProgressBar::hidden() }
-    }
-}
-
-/// A line on stdout; a reader who has gone away (`hgm ... | head -1`) wants no more, and that is no fault.
-///
-/// # Errors
-/// A disk that is full, where stdout is a file.
-pub fn print_line(text: &str) -> anyhow::Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("standard output cannot be written"),
-        _ => Ok(()),
     }
 }
 
