@@ -3,7 +3,7 @@
 use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::landmarks::Evaluation;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
 use crate::experiment::resection::improvement;
 use crate::experiment::verdict_of_samples::nearest_to_reference;
 use crate::material::law::StabilityRange;
@@ -50,9 +50,9 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
         text += &estimate_figures(estimate);
         text += &outcome.comparison.as_ref().map_or_else(String::new, models_table);
     }
-    if let Some(best) = outcome.best() {
-        let state = if outcome.estimate.is_some() && best.id == "estimate" { "estimate" } else { "deformed" };
-        for (set, deformed) in &best.rmse_mm {
+    if let Some(judged) = outcome.judged() {
+        let state = if judged.id == ESTIMATE { "estimate" } else { "deformed" };
+        for (set, deformed) in &judged.rmse_mm {
             let against = outcome.rest_rmse_mm.get(set).map_or_else(String::new, |rest| {
                 format!("rest {rest:.3} mm, {state} {deformed:.3} mm: {}", improvement(*rest, *deformed, &floor))
             });
@@ -60,7 +60,7 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
             text += &format!("RMSE at {set}: {}\n", if against.is_empty() { alone() } else { against });
         }
         if outcome.estimate.is_none() && outcome.verdict.finding.has_stiffness() {
-            text += &format!("best sample {}\n", best.id);
+            text += &format!("best sample {}\n", judged.id);
         }
     }
     if let Some(floor_mm) = floor.combined_mm() {

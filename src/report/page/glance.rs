@@ -64,13 +64,13 @@ fn numbers(outcome: &ExperimentOutcome, shift: Option<&BrainShift>) -> Vec<Marku
     tiles
 }
 
-/// The error of the best state at the margin, or over all nodes of a phantom.
+/// The error of the judged state at the margin, or over all nodes of a phantom.
 fn errors(outcome: &ExperimentOutcome) -> Option<Markup> {
-    let best = outcome.best()?;
-    let set = ["margin", "all"].into_iter().find(|set| best.rmse_mm.contains_key(*set))?;
+    let judged = outcome.judged()?;
+    let set = ["margin", "all"].into_iter().find(|set| judged.rmse_mm.contains_key(*set))?;
     let rest = outcome.rest_rmse_mm.get(set).map(|rest| format!("undeformed: {} mm", number(*rest, 3)));
     let name = format!("RMSE, {}", set_name(set));
-    Some(tile(&name, &quantity(best.rmse_mm.get(set).copied(), 3, "mm"), &rest.unwrap_or_default()))
+    Some(tile(&name, &quantity(judged.rmse_mm.get(set).copied(), 3, "mm"), &rest.unwrap_or_default()))
 }
 
 fn volumes(v: &ResectionVolumes) -> Vec<Markup> {

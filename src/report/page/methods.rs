@@ -3,7 +3,7 @@
 use super::super::html::{count, number};
 use super::results::tissue_name;
 use crate::experiment::estimate::EstimateOutcome;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
+use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome, SampleOutcome};
 use maud::{Markup, html};
 
 /// A work to cite.
@@ -111,7 +111,7 @@ fn cite(references: &[Reference], wanted: Reference) -> Markup {
 fn paragraph(outcome: &ExperimentOutcome) -> Markup {
     let references = references(outcome);
     let cite = |wanted| cite(&references, wanted);
-    let is_estimate = |s: &&SampleOutcome| outcome.estimate.is_some() && s.id == "estimate";
+    let is_estimate = |s: &&SampleOutcome| outcome.estimate.is_some() && s.id == ESTIMATE;
     let swept = outcome.samples.iter().filter(|s| !is_estimate(s)).count();
     let simulated = swept > 0 || outcome.estimate.is_some();
     html! {
