@@ -12,4 +12,4 @@ mod write;
 pub use manifest::{Manifest, OutputRecord, Provenance};
 pub use reason::Reason;
 pub use stage::{Produced, Stage, StageError, StageOutcome};
-pub use write::{WriteError, no_more_writes, sha256_hex, write_whole};
+pub use write::{WriteError, check_writable, no_more_writes, sha256_hex, write_whole};

@@ -25,6 +25,32 @@ pub fn no_more_writes() -> RwLockWriteGuard<'static, ()> {
     WRITING.write().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Whether a file could be written at `path`, before the work that it is to hold: the folders that are there take a file. What
+/// is not there yet is not made.
+///
+/// # Errors
+/// [`WriteError`] when the system would refuse.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    let refuse = |source| WriteError { path: path.to_path_buf(), source };
+    if path.is_dir() {
+        return Err(refuse(std::io::ErrorKind::IsADirectory.into()));
+    }
+    let folder = |path: &Path| {
+        let parent = path.parent().unwrap_or(Path::new(""));
+        if parent.as_os_str().is_empty() { PathBuf::from(".") } else { parent.to_path_buf() }
+    };
+    let mut there = folder(path);
+    while !there.exists() && there != Path::new(".") {
+        there = folder(&there);
+    }
+    if !there.is_dir() {
+        return Err(refuse(std::io::ErrorKind::NotADirectory.into()));
+    }
+    let trial = there.join(format!(".hgm-{}.part", std::process::id()));
+    std::fs::File::create(&trial).map_err(refuse)?;
+    std::fs::remove_file(&trial).map_err(refuse)
+}
+
 /// Writes `bytes` so that `path` holds either all of them or what it held before: to `NAME.part`, flushed, renamed.
 /// Folders are made as needed.
 ///
@@ -80,6 +106,18 @@ mod tests {
         std::fs::create_dir(&taken).unwrap();
         let error = write_whole(&taken, b"bytes").unwrap_err();
         assert!(error.to_string().contains("a-folder: cannot be written"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_place_that_takes_no_file_is_known_before_there_is_one_and_nothing_is_left_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("file"), "").unwrap();
+        assert!(check_writable(&at("deep/down/x.bin")).is_ok() && check_writable(&at("file")).is_ok());
+        for wrong in ["file/x.bin", "file/deep/x.bin", ""] {
+            assert!(check_writable(&at(wrong)).unwrap_err().to_string().contains("cannot be written"), "{wrong}");
+        }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 

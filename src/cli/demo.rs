@@ -39,7 +39,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     mesh.over(&mut flags);
     let (phantom, text) = phantom::made(flags, false, &args.output.join("phantom"), session)?;
     let both = serde_json::json!({ "pair": pair.outcome()?, "phantom": phantom });
-    let words = run::in_words(&pair, Goal::Sweep)?;
+    let words = run::in_words(&pair)?;
     session.emit(&both, &format!("{words}\n{text}"))?;
     Ok(pair.quality_gate()?)
 }

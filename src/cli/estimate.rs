@@ -3,8 +3,7 @@
 use super::flags::Flags;
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::report::in_words::estimate_table;
-use crate::workflow::{self, Goal, Subject};
+use crate::workflow::{self, Subject};
 use std::path::PathBuf;
 
 /// Shear moduli by optimisation with solver sensitivities: most probable values, 95 % intervals, what limits them
@@ -28,8 +27,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let case = workflow::estimate(&session.place(&args.case), &settings, &mut session.listener())?;
     let facts = case.estimate()?;
     if case.subject() != Some(Subject::Patient) {
-        return session.emit(&facts.estimate, &(estimate_table(&facts.estimate) + &case.page().display().to_string()));
+        return session.emit(&facts.estimate, &in_words(&case)?);
     }
-    session.emit(&facts.estimate, &in_words(&case, Goal::Estimate)?)?;
+    session.emit(&facts.estimate, &in_words(&case)?)?;
     Ok(case.quality_gate()?)
 }

@@ -1,5 +1,6 @@
 //! How a subcommand ends when it does not end well.
 
+use super::output::print_line;
 use super::remedy::remedy;
 use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
@@ -51,8 +52,9 @@ impl Failure {
             let mut told = serde_json::json!({"kind": kind, "message": message, "exit_code": self.code()});
             if let Some(answer) = error.downcast_ref::<Answered>() {
                 told["answer"] = answer.answer.name().into();
+                told["verdict"] = serde_json::json!(answer.answer.verdict());
             }
-            println!("{}", serde_json::json!({ "error": told }));
+            print_line(&serde_json::json!({ "error": told }).to_string()).ok();
         }
     }
 }
@@ -85,7 +87,8 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
         let error: anyhow::Error = error.into();
         let kind = kind(&error);
         if let Some(answer) = error.downcast_ref().and_then(WorkflowError::answer) {
-            return Self::QualityGate(Answered { answer, message: in_one_line(&with_remedy(error)) }.into());
+            let message = format!("{} {}", answer.verdict().sentence, in_one_line(&with_remedy(error)));
+            return Self::QualityGate(Answered { answer, message }.into());
         }
         let error = match (with_remedy(error), kind) {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),

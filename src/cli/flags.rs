@@ -9,6 +9,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
+/// Headings of options in help and man pages.
+const MASKS: &str = "Masks";
+const MESH: &str = "Mesh";
+const MATERIAL: &str = "Material";
+
 /// The settings that were given as options: the last layer.
 #[derive(Clone, Debug, Default)]
 pub struct Flags(pub toml::Table);
@@ -48,19 +53,19 @@ pub fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct MeshOptions {
     /// Mesh engine [default: cgal where it is built, else lattice]
-    #[arg(long, value_name = "ENGINE", value_parser = engine)]
+    #[arg(long, help_heading = MESH, value_name = "ENGINE", value_parser = engine)]
     pub mesher: Option<Engine>,
     /// Target number of tetrahedra (within 15 %)
-    #[arg(long, value_name = "N")]
+    #[arg(long, help_heading = MESH, value_name = "N")]
     pub cells: Option<usize>,
     /// Target edge length in mm, instead of a number of tetrahedra
-    #[arg(long, value_name = "MM", conflicts_with = "cells")]
+    #[arg(long, help_heading = MESH, value_name = "MM", conflicts_with = "cells")]
     pub edge_mm: Option<f64>,
     /// Edges inside a label, times the target: white_matter=1.5 (again for more labels)
-    #[arg(long, value_name = "LABEL=FACTOR", value_parser = label_edge)]
+    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR", value_parser = label_edge)]
     pub edge_in: Vec<LabelEdge>,
     /// Edges at the wall of a label, times the target, and the distance to which that counts: ventricle=0.5@8
-    #[arg(long, value_name = "LABEL=FACTOR@MM", value_parser = wall_edge)]
+    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR@MM", value_parser = wall_edge)]
     pub edge_near: Vec<WallEdge>,
 }
 
@@ -107,9 +112,9 @@ fn engine(name: &str) -> Result<Engine, String> {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct PriorOptions {
     /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
-    #[arg(long, value_name = "KIND")]
+    #[arg(long, help_heading = MATERIAL, value_name = "KIND")]
     study: Option<StudyKind>,
-    #[arg(long, value_name = "LAW", help = laws("The law fitted to every sample: {} [default: neo-hookean]"))]
+    #[arg(long, help_heading = MATERIAL, value_name = "LAW", help = laws("The law fitted to every sample: {} [default: neo-hookean]"))]
     law: Option<MetaModel>,
 }
 
@@ -125,13 +130,13 @@ impl PriorOptions {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct AnalysisOptions {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(long, help_heading = MATERIAL, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub tissues: Option<u8>,
     #[command(flatten)]
     pub prior: PriorOptions,
     /// Estimate the moduli with their intervals instead of trying the prior's samples; on 160,000 tetrahedra unless
     /// --cells or --edge-mm says otherwise
-    #[arg(long)]
+    #[arg(long, help_heading = MATERIAL)]
     pub estimate: bool,
 }
 
@@ -154,25 +159,25 @@ impl AnalysisOptions {
 pub struct OwnMasks {
     /// A label map of the pre-operative scan made by another tool (.nii.gz, .mgz): wins over the computed labels, and the
     /// scans may then have another contrast than T1
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     dseg: Option<PathBuf>,
     /// Whose numbers the label map holds [default: found out from the numbers]
-    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
+    #[arg(long, help_heading = MASKS, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
     labels: Option<String>,
     /// The pose of the pre-operative scan by hand: a rigid transform to the MNI frame (4x4 text in RAS, or .tfm)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     pose: Option<PathBuf>,
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     brain_mask: Option<PathBuf>,
     /// A mask of the lateral and third ventricles before the operation, in the grid of either scan (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     ventricle_mask: Option<PathBuf>,
     /// A mask of the cavity, in the grid of either scan (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     cavity_mask: Option<PathBuf>,
     /// A mask of the resected tissue, in the grid of either scan (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     resected_mask: Option<PathBuf>,
 }
 

@@ -40,16 +40,17 @@ fn pages(command: clap::Command, name: &str) -> std::io::Result<Vec<(String, Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::Hgm;
+    use crate::cli::{Hgm, manual};
     use clap::CommandFactory;
 
     #[test]
     fn every_command_and_subcommand_has_a_page_with_an_example() {
-        let pages = pages(Hgm::command(), "hgm").unwrap();
+        let pages = pages(manual::command(Hgm::command()), "hgm").unwrap();
         assert!(pages.iter().any(|(name, _)| name == "hgm-gp-fit"));
         for (name, page) in &pages[1..] {
             let page = String::from_utf8(page.clone()).unwrap();
             assert!(page.contains("Example: "), "{name} has no example");
+            assert!(page.contains("input rejected") && page.contains("NO_COLOR"), "{name} tells no exit codes");
         }
     }
 }

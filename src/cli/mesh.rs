@@ -2,6 +2,7 @@
 
 use super::flags::{Flags, MeshOptions};
 use super::{Failure, Session};
+use crate::artefact::check_writable;
 use crate::workflow::{MeshFiles, MeshedFile, WorkflowError, mesh_file};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -48,6 +49,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.mesh.over(&mut flags);
     flags.list("mesh.without", &args.without);
     flags.switch("tag.tentorium", args.tentorium);
+    for file in [Some(&args.output), args.preview.as_ref()].into_iter().flatten() {
+        check_writable(file)?;
+    }
     let files = MeshFiles {
         labels: args.dseg.clone(),
         numbers: args.labels.clone(),

@@ -18,7 +18,9 @@ mod law;
 mod layout;
 mod listener;
 mod man;
+mod manual;
 mod mesh;
+mod output;
 mod phantom;
 mod predict;
 mod prep;
@@ -30,6 +32,7 @@ mod run;
 mod schema;
 mod segment;
 mod session;
+mod settings;
 mod simulate;
 mod sweep;
 mod synth;
@@ -39,7 +42,8 @@ mod why;
 pub use failure::{Failure, Reject};
 pub use session::{GlobalOptions, Session};
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// From a pre- and post-operative T1 pair to a biomechanical answer. Research software, not a medical device.
@@ -80,12 +84,39 @@ enum Command {
     Why(why::Args),
     Layout(layout::Args),
     Schema(schema::Args),
+    Settings(settings::Args),
+}
+
+fn parsed() -> Result<Hgm, clap::Error> {
+    let mut matches = manual::command(Hgm::command()).try_get_matches()?;
+    Hgm::from_arg_matches_mut(&mut matches)
+}
+
+/// Help, version, or what is wrong with the command line, with the commands that a mistyped word may mean.
+fn said(error: &clap::Error) -> ExitCode {
+    // Whoever reads no further (`hgm --help | head -1`) has what was wanted.
+    error.print().ok();
+    let word = error.get(ContextKind::InvalidSubcommand).and_then(|value| match value {
+        ContextValue::String(word) => Some(word.clone()),
+        _ => None,
+    });
+    let meant = word.map(|word| manual::meant_below(&Hgm::command(), &word)).unwrap_or_default();
+    if !meant.is_empty() {
+        eprintln!("hgm: there is `{}`", meant.join("` and `"));
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
 /// Entry point of the program: parses, runs, turns failures into exit codes.
 pub fn main() -> ExitCode {
-    let hgm = Hgm::parse();
+    let mut hgm = match parsed() {
+        Ok(hgm) => hgm,
+        Err(error) => return said(&error),
+    };
     let json = hgm.global.json;
+    if let Command::Bids(args) = &hgm.command {
+        hgm.global.threads = hgm.global.threads.or(args.nprocs);
+    }
     let outcome = Session::open(hgm.global).and_then(|session| match hgm.command {
         Command::Demo(args) => demo::run(&args, &session),
         Command::Prep(args) => prep::run(&args, &session),
@@ -103,8 +134,8 @@ pub fn main() -> ExitCode {
         Command::Gp(args) => gp::run(&args, &session),
         Command::Law(args) => law::run(&args, &session),
         Command::Doctor(args) => doctor::run(&args, &session),
-        Command::Completions(args) => completions::run(&args, Hgm::command(), &session),
-        Command::Man(args) => man::run(&args, Hgm::command(), &session),
+        Command::Completions(args) => completions::run(&args, manual::command(Hgm::command()), &session),
+        Command::Man(args) => man::run(&args, manual::command(Hgm::command()), &session),
         Command::Mesh(args) => mesh::run(&args, &session),
         Command::Register(args) => register::run(&args, &session),
         Command::Segment(args) => segment::run(&args, &session),
@@ -113,6 +144,7 @@ pub fn main() -> ExitCode {
         Command::Why(args) => why::run(&args, &session),
         Command::Layout(args) => layout::run(&args, &session),
         Command::Schema(args) => schema::run(&args, &session),
+        Command::Settings(args) => settings::run(&args, &session),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,9 +1,9 @@
 //! `hgm phantom`: known moduli go in and must come out.
 
 use super::flags::{Flags, MeshOptions, PriorOptions};
+use super::run::in_words;
 use super::{Failure, Session};
 use crate::experiment::outcome::ExperimentOutcome;
-use crate::report::in_words::phantom_summary;
 use crate::workflow;
 use std::path::PathBuf;
 
@@ -53,7 +53,5 @@ pub fn made(
 ) -> Result<(ExperimentOutcome, String), Failure> {
     let settings = session.settings(flags)?;
     let case = workflow::phantom(every_task, &session.place(folder), &settings, &mut session.listener())?;
-    let (outcome, nearest) = (case.outcome()?, workflow::nearest_sample(&settings, every_task)?);
-    let text = phantom_summary(&outcome, nearest.as_deref()) + &case.page().display().to_string();
-    Ok((outcome, text))
+    Ok((case.outcome()?, in_words(&case)?))
 }

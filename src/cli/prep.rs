@@ -1,6 +1,7 @@
 //! `hgm prep`: a T1 pair to registered images, masks and a tagged mesh.
 
 use super::flags::{Flags, PairOptions};
+use super::run::in_words;
 use super::{Failure, Session};
 use crate::workflow::{Goal, run_to};
 
@@ -22,6 +23,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let goal = if args.no_mesh { Goal::Images } else { Goal::Mesh };
     let (settings, place) = (session.settings(flags)?, session.place(&args.pair.output));
     let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut session.listener())?;
-    session.emit(&case.outcome()?, &case.page().display().to_string())?;
+    session.emit(&case.outcome()?, &in_words(&case)?)?;
     if goal == Goal::Mesh { Ok(case.quality_gate()?) } else { Ok(()) }
 }

@@ -3,7 +3,7 @@
 use super::flags::Flags;
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::workflow::{self, Goal};
+use crate::workflow;
 use std::path::PathBuf;
 
 /// Joins the shards of a sweep: outcome, table and page, the same bytes as one run
@@ -18,6 +18,6 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = session.settings_of(&args.case, Flags::default())?;
     let case = workflow::reduce(&session.place(&args.case), &settings, &mut session.listener())?;
-    session.emit(&case.outcome()?, &in_words(&case, Goal::Sweep)?)?;
+    session.emit(&case.outcome()?, &in_words(&case)?)?;
     Ok(case.quality_gate()?)
 }

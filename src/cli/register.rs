@@ -2,7 +2,7 @@
 
 use super::flags::Flags;
 use super::{Failure, Reject, Session};
-use crate::artefact::write_whole;
+use crate::artefact::{check_writable, write_whole};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
 use crate::image::nifti::{self, NiftiImage};
@@ -58,6 +58,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.output.is_dir() {
         return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", args.output.display())));
     }
+    check_writable(&text_path)?;
     let mut warnings = Vec::new();
     let (moving, moving_bytes) = image(&args.moving, &whole, &mut warnings)?;
     let moving_mask = args.moving_mask.as_deref();

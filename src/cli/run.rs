@@ -2,8 +2,8 @@
 
 use super::flags::{AnalysisOptions, Flags, MeshOptions, PairOptions};
 use super::{Failure, Session};
-use crate::report::in_words::{comparison, estimate_table, summary};
-use crate::workflow::{Case, Goal, Settings, run_to};
+use crate::report::in_words::summary;
+use crate::workflow::{Case, Settings, run_to};
 
 /// T1 pair -> everything: prep, a sweep over the prior, per-node errors, report; resumable
 ///
@@ -24,7 +24,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = settings(&args.analysis, &args.pair.mesh, session)?;
     let (goal, place) = (args.analysis.goal(), session.place(&args.pair.output));
     let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut session.listener())?;
-    session.emit(&case.outcome()?, &in_words(&case, goal)?)?;
+    session.emit(&case.outcome()?, &in_words(&case)?)?;
     Ok(case.quality_gate()?)
 }
 
@@ -39,12 +39,7 @@ pub fn settings(analysis: &AnalysisOptions, mesh: &MeshOptions, session: &Sessio
     session.settings_over(&own.0, flags)
 }
 
-/// What a patient's job has found, for a terminal.
-pub fn in_words(case: &Case, goal: Goal) -> Result<String, Failure> {
-    let (outcome, page) = (case.outcome()?, case.page().display().to_string());
-    if goal != Goal::Estimate {
-        return Ok(summary(&outcome) + &page);
-    }
-    let facts = case.estimate()?;
-    Ok(estimate_table(&facts.estimate) + &comparison(&outcome, &facts.record) + &page)
+/// What a job has found, for a terminal: the page's own verdict, its figures, and where the page is.
+pub fn in_words(case: &Case) -> Result<String, Failure> {
+    Ok(summary(&case.outcome()?) + &case.page().display().to_string())
 }

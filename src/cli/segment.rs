@@ -2,7 +2,7 @@
 
 use super::flags::Flags;
 use super::{Failure, Reject, Session};
-use crate::artefact::write_whole;
+use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
 use crate::workflow::{read_input, read_mask_of};
@@ -49,6 +49,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 path.display()
             )));
         }
+        check_writable(path)?;
     }
     let name = args.t1.display().to_string();
     let read = nifti::decode(&read_input(&args.t1)?, &name, &settings.image).reject()?;

@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::flags::{Flags, word};
 use super::listener::{Listener, bar};
+use super::output::print_line;
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
 use crate::workflow::{Case, Place, Programs, Settings, read_text};
@@ -26,7 +27,7 @@ pub fn has_emitted() -> bool {
 /// Options of every command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct GlobalOptions {
-    /// Settings file (TOML, one table for each part: register, segment, mesh, gp, law ...)
+    /// Settings file (TOML, one table for each part; `hgm settings` prints one with every setting)
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Machine-readable result on stdout (see `hgm schema`), logs on stderr
@@ -150,9 +151,9 @@ impl Session {
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
         EMITTED.store(true, Ordering::Relaxed);
         if self.options.json {
-            println!("{}", serde_json::to_string_pretty(value)?);
+            print_line(&serde_json::to_string_pretty(value)?)?;
         } else if !text.is_empty() {
-            println!("{}", text.trim_end());
+            print_line(text.trim_end())?;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! `hgm simulate MESH SCENARIO.toml -o OUT.vtu`: one deformation, or one motion.
 
 use super::{Failure, Session};
+use crate::artefact::check_writable;
 use crate::workflow::{self, Simulation, SimulationFiles, shown};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Args { mesh, scenario, output, start, reference } = args;
     let (mesh, scenario, output) = (mesh.clone(), scenario.clone(), output.clone());
     let files = SimulationFiles { mesh, scenario, output, start: start.clone(), reference: reference.clone() };
+    check_writable(&args.output)?;
     let (found, skipped) = workflow::simulate(&files, session.options.force, &mut session.listener())?;
     tracing::info!("{}: {}", shown(&args.output), if skipped { "already there, skipped" } else { "done" });
     for warning in &found.warnings {

@@ -3,7 +3,7 @@
 use super::flags::{Flags, PriorOptions};
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::workflow::{self, Goal, Shard};
+use crate::workflow::{self, Shard};
 use std::path::PathBuf;
 
 /// Samples of the prior simulated on a prepared case; --shard K/N runs a part, `hgm reduce` joins the parts
@@ -35,7 +35,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             "shard done; when all are, join them with `hgm reduce`",
         )?;
     } else {
-        session.emit(&case.outcome()?, &in_words(&case, Goal::Sweep)?)?;
+        session.emit(&case.outcome()?, &in_words(&case)?)?;
     }
     Ok(case.quality_gate()?)
 }

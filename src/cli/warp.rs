@@ -2,6 +2,7 @@
 
 use super::flags::{Flags, word};
 use super::{Failure, Session};
+use crate::artefact::check_writable;
 use crate::report::in_words::warped;
 use crate::workflow::{Through, Warp, WarpTo, warp};
 use std::path::PathBuf;
@@ -46,6 +47,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             return Err(Failure::Rejected(anyhow::anyhow!(said)));
         }
     };
+    check_writable(&args.output)?;
     let reading = session.settings(Flags::default())?.image;
     let asked = Warp { file: file.clone(), output: args.output.clone(), through, labels: args.labels, reading };
     let done = warp(&asked)?;

@@ -44,15 +44,10 @@ impl Answer {
             Self::NotOnePerson => "not-one-person",
         }
     }
-
-    /// The sentence of pages.
-    pub fn sentence(self) -> &'static str {
-        match self {
-            Self::NoOperation => "No operation is seen: no stiffness is claimed.",
-            Self::NotOnePerson => "The two scans do not show one person: nothing was compared.",
-        }
-    }
 }
+
+/// The name of an estimate's state among the samples.
+pub const ESTIMATE: &str = "estimate";
 
 /// One experiment: settings' worth of samples against one reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -333,6 +328,12 @@ impl ExperimentOutcome {
     pub fn best(&self) -> Option<&SampleOutcome> {
         let id = self.best_sample.as_ref()?;
         self.samples.iter().find(|s| &s.id == id)
+    }
+
+    /// The state that the verdict is about: the estimate's where there is one, else the best sample's.
+    pub fn judged(&self) -> Option<&SampleOutcome> {
+        let estimate = self.estimate.as_ref().and_then(|_| self.samples.iter().find(|s| s.id == ESTIMATE));
+        estimate.or_else(|| self.best())
     }
 
     /// Names of the node sets with an RMSE, `all` first, then in alphabetical order.

@@ -7,10 +7,11 @@ use super::setting::{
 use crate::fem::{Loads, PatchLoad, Scenario, SolverSettings};
 use crate::material::law::Material;
 use crate::tag::SETS;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the phantom is made of and how it is loaded.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PhantomSettings {
     /// 1: the whole brain one material; 2: grey and white matter apart.
@@ -114,7 +115,7 @@ impl PhantomSettings {
         };
         let tissues = self.tissue_list();
         let material = |t: &Tissue| (t.name.clone(), neo_hookean(0.0, modulus(t), self.poisson_ratio));
-        Sample { id: "reference".to_owned(), tissues: tissues.iter().map(material).collect(), task: None }
+        Sample { id: REFERENCE.to_owned(), tissues: tissues.iter().map(material).collect(), task: None }
     }
 }
 
@@ -123,6 +124,9 @@ pub fn neo_hookean(sd_level: f64, shear_modulus_pa: f64, poisson_ratio: f64) -> 
     let material = Material::neo_hookean(shear_modulus_pa, poisson_ratio);
     TissueSample { sd_level, shear_modulus_pa, material }
 }
+
+/// The name of the sample with a phantom's own moduli.
+pub const REFERENCE: &str = "reference";
 
 /// The sample whose moduli are nearest to the reference's, by the summed squares of the log-ratios.
 pub fn nearest_sample<'a>(samples: &'a [Sample], reference: &Sample) -> Option<&'a Sample> {

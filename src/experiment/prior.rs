@@ -10,11 +10,12 @@ use crate::material::literature::{Curves, LiteratureModel, table};
 use crate::material::meta_model::{FitError, MetaModel, MetaModelSettings};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry};
 use crate::material::{Region, StudyKind, Task};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Which prior.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
@@ -22,6 +23,7 @@ pub struct PriorSettings {
     /// Whose studies: elastography, linear elasticity or hyperelastic tests.
     pub study: StudyKind,
     /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
+    #[schemars(with = "String")]
     pub law: MetaModel,
 }
 

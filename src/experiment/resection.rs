@@ -11,10 +11,11 @@ use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Suppor
 use crate::geometry::Frame;
 use crate::image::LabelMap;
 use nalgebra::{UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The frame that gravity is given in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum GravityFrame {
     /// The MNI frame reached rigidly.
@@ -27,7 +28,7 @@ pub enum GravityFrame {
 }
 
 /// Cerebrospinal fluid that is left; the table `[resection.csf]` of the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CsfSettings {
     /// Density of the fluid.
@@ -64,7 +65,7 @@ impl CsfSettings {
 }
 
 /// How the skull holds a patient's brain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Supports {
     /// Not known: an estimate tries the others and weighs them by their evidence; samples are simulated as `fixed`.
@@ -93,7 +94,7 @@ impl Supports {
 }
 
 /// Loads, supports and samples of a patient's sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ResectionSettings {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples).

@@ -6,10 +6,11 @@ use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::{LabelMap, Mask};
 use crate::segment::{label, with_closed_sulci};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where the inside of the skull is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SkullFrom {
     /// `gap_mm` outside the cortex everywhere.
@@ -20,7 +21,7 @@ pub enum SkullFrom {
 }
 
 /// The skull of `supports = "sliding"`; the table `[resection.skull]` of the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SkullSettings {
     /// Where its inside is.

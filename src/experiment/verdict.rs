@@ -34,6 +34,16 @@ pub enum Finding {
     NotDistinguishable,
     /// Every sample is further from the surfaces than rest is.
     Worse,
+    /// A phantom's known moduli: the best of the samples is the one nearest to them.
+    Recovered,
+    /// A phantom's known moduli: another sample than the nearest one is the best.
+    NotRecovered,
+    /// No simulation has reached an equilibrium.
+    NoEquilibrium,
+    /// One head twice, and nothing was taken out.
+    NoOperation,
+    /// Two heads.
+    NotOnePerson,
     /// Nothing was simulated.
     #[default]
     Nothing,
@@ -42,7 +52,16 @@ pub enum Finding {
 impl Finding {
     /// Whether the figures of the stiffness may be read as an answer.
     pub fn has_stiffness(self) -> bool {
-        matches!(self, Self::Identified | Self::Widened | Self::PriorDominated | Self::CannotTell | Self::Better)
+        matches!(
+            self,
+            Self::Identified
+                | Self::Widened
+                | Self::PriorDominated
+                | Self::CannotTell
+                | Self::Better
+                | Self::Recovered
+                | Self::NotRecovered
+        )
     }
 
     /// In a few words, for a column of a table.
@@ -58,6 +77,11 @@ impl Finding {
             Self::Better => "better than rest",
             Self::NotDistinguishable => "not distinguishable from rest",
             Self::Worse => "worse than rest",
+            Self::Recovered => "found again",
+            Self::NotRecovered => "not found again",
+            Self::NoEquilibrium => "no equilibrium",
+            Self::NoOperation => "no operation seen",
+            Self::NotOnePerson => "not one person",
             Self::Nothing => "nothing simulated",
         }
     }
@@ -130,14 +154,28 @@ pub enum Reason {
         /// The parameter.
         name: String,
     },
+    /// Which sample explains a phantom's reference best, and which has the moduli nearest to its own.
+    Phantom {
+        /// The best one.
+        best: String,
+        /// The nearest one.
+        nearest: String,
+    },
+    /// Samples without an equilibrium, of all of them.
+    WithoutEquilibrium {
+        /// How many.
+        samples: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// Gravity fixes only a quotient.
     LoadAssumed,
     /// The descent was not finished.
     NotConverged,
 }
 
-/// A figure of three digits, with thousands apart.
-fn pa(value: f64) -> String {
+/// A modulus for readers: three digits, thousands apart.
+pub fn pa(value: f64) -> String {
     let digits = value.abs().max(1e-9).log10().floor() as i32;
     let step = 10f64.powi((digits - 2).max(0));
     let rounded = ((value / step).round() * step).round() as i64;
@@ -146,6 +184,24 @@ fn pa(value: f64) -> String {
     let mut parts: Vec<&str> = if head > 0 { vec![&text[..head]] } else { Vec::new() };
     parts.extend((head..text.len()).step_by(3).map(|n| &text[n..n + 3]));
     parts.join(",")
+}
+
+/// A modulus with its interval, or how near it is known where rounding leaves no interval: "1,370 Pa (to within 0.3 Pa)".
+pub fn with_interval(mode_pa: f64, [low, high]: [f64; 2]) -> String {
+    let [mode, low_text, high_text] = [mode_pa, low, high].map(pa);
+    if low_text != high_text {
+        return format!("{mode} Pa ({low_text} to {high_text})");
+    }
+    let reach = (high - mode_pa).max(mode_pa - low).max(1e-9);
+    let step = 10f64.powf(reach.log10().floor());
+    let decimals = (-step.log10()).clamp(0.0, 9.0) as usize;
+    format!("{mode} Pa (to within {:.decimals$} Pa)", (reach / step).ceil() * step)
+}
+
+/// A range of moduli; one value where rounding leaves no range.
+pub fn range([low, high]: [f64; 2]) -> String {
+    let [low, high] = [low, high].map(pa);
+    if low == high { format!("{low} Pa") } else { format!("{low} to {high} Pa") }
 }
 
 impl Reason {
@@ -176,8 +232,15 @@ impl Reason {
             Self::Surface { set, rest_mm, deformed_mm, floor_mm } => format!(
                 "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
             ),
-            Self::AsGood { tissue, pa: [low, high] } => {
-                format!("{tissue}: {} to {} Pa cannot be told apart", pa(*low), pa(*high))
+            Self::AsGood { tissue, pa } => format!("{}: {} cannot be told apart", words(tissue), range(*pa)),
+            Self::Phantom { best, nearest } if best == nearest => {
+                format!("{best} explains the reference best and has the moduli nearest to its own")
+            }
+            Self::Phantom { best, nearest } => {
+                format!("{best} explains the reference best, but {nearest} has the moduli nearest to its own")
+            }
+            Self::WithoutEquilibrium { samples, of } => {
+                format!("{samples} of {of} samples reached no equilibrium")
             }
             Self::LittleSaid { name } => format!("{name}: the interval comes from the prior, the data add little"),
             Self::LoadAssumed => {
@@ -262,9 +325,7 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         parts.collect::<Vec<_>>().join(", ")
     };
     let intervals = each(&|a| match a {
-        Claim::Interval { mode_pa, interval_95_pa: [low, high] } => {
-            Some(format!("{} Pa ({} to {})", pa(*mode_pa), pa(*low), pa(*high)))
-        }
+        Claim::Interval { mode_pa, interval_95_pa } => Some(with_interval(*mode_pa, *interval_95_pa)),
         _ => None,
     });
     let bounds = each(&|a| match a {
@@ -272,7 +333,7 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         _ => None,
     });
     let ranges = each(&|a| match a {
-        Claim::Range { range_pa: [low, high] } => Some(format!("{} to {} Pa", pa(*low), pa(*high))),
+        Claim::Range { range_pa } => Some(range(*range_pa)),
         _ => None,
     });
     let percent = share.map(|s| format!(" ({:.0} % of it)", 100.0 * s)).unwrap_or_default();
@@ -300,10 +361,21 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         ),
         Finding::Identified => format!("The model explains the shift{percent}: {intervals}."),
         Finding::Better if ranges.is_empty() => "A sample explains the surfaces better than rest does.".to_owned(),
-        Finding::Better => format!("Better than rest; samples as good as the best have {ranges}."),
+        Finding::Better => {
+            let against = |r: &&Reason| matches!(r, Reason::Surface { .. });
+            let rest = reasons.iter().find(against).map(|r| format!(" ({})", r.sentence())).unwrap_or_default();
+            let failed = reasons.iter().filter(|r| matches!(r, Reason::WithoutEquilibrium { .. }));
+            let failed: String = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
+            format!("Better than rest{rest}; samples as good as the best have {ranges}.{failed}")
+        }
         Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
         Finding::Worse => format!("Every sample is further away than rest ({first}). No stiffness is claimed."),
-        Finding::Nothing => "Nothing was simulated.".to_owned(),
+        Finding::Recovered => format!("The known moduli are found again: {first} ({ranges})."),
+        Finding::NotRecovered => format!("The known moduli are not found again: {first}; the best has {ranges}."),
+        Finding::NoEquilibrium => format!("No stiffness is claimed: {first}."),
+        Finding::NoOperation => "No operation is seen: no stiffness is claimed.".to_owned(),
+        Finding::NotOnePerson => "The two scans do not show one person: nothing was compared.".to_owned(),
+        Finding::Nothing => "Prepared only: nothing was simulated, and no stiffness is claimed.".to_owned(),
     }
 }
 
@@ -339,6 +411,13 @@ mod tests {
         let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
         let text = Verdict::new(Finding::NoShift, None, vec![bound], vec![reason]).sentence;
         assert!(text.contains("0.6 mm") && text.contains("grey matter is stiffer than 2,140 Pa"), "{text}");
+    }
+
+    #[test]
+    fn an_interval_below_rounding_is_told_as_what_it_is() {
+        assert_eq!(with_interval(1370.0, [1369.8, 1370.2]), "1,370 Pa (to within 0.3 Pa)");
+        assert_eq!(with_interval(1370.0, [1280.0, 1460.0]), "1,370 Pa (1,280 to 1,460)");
+        assert_eq!((range([317.4, 317.4]), range([300.0, 900.0])), ("317 Pa".into(), "300 to 900 Pa".into()));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The verdict of an outcome: its estimate's, else that of its samples against rest.
 
-use super::outcome::{ExperimentOutcome, NoiseFloor, SampleOutcome};
+use super::outcome::{Answer, ExperimentKind, ExperimentOutcome, NoiseFloor, SampleOutcome};
+use super::phantom::REFERENCE;
 use super::verdict::{Claim, Finding, Reason, Verdict};
 
 impl ExperimentOutcome {
@@ -16,28 +17,67 @@ impl ExperimentOutcome {
     }
 }
 
-/// The best sample against rest, and which moduli cannot be told from its own.
+impl Answer {
+    /// What two scans say by themselves.
+    pub fn verdict(self) -> Verdict {
+        let finding = match self {
+            Self::NoOperation => Finding::NoOperation,
+            Self::NotOnePerson => Finding::NotOnePerson,
+        };
+        Verdict::new(finding, None, Vec::new(), Vec::new())
+    }
+}
+
+/// The best sample against rest, and which moduli cannot be told from its own; or why there is none.
 fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
-    let floor = outcome.noise_floor.unwrap_or_default();
-    let Some(best) = outcome.best() else { return Verdict::new(Finding::Nothing, None, Vec::new(), Vec::new()) };
-    let set = if best.rmse_mm.contains_key("margin") { "margin" } else { "all" };
-    let (Some(&deformed_mm), floor_mm) = (best.rmse_mm.get(set), floor.combined_mm().unwrap_or(0.0)) else {
-        return Verdict::new(Finding::Nothing, None, Vec::new(), Vec::new());
+    let without = |finding, reasons| Verdict::new(finding, None, Vec::new(), reasons);
+    if let Some(answer) = outcome.answer {
+        return answer.verdict();
+    }
+    let (of, samples) = (outcome.samples.len(), outcome.samples.iter().filter(|s| !s.converged).count());
+    let failed = (samples > 0).then_some(Reason::WithoutEquilibrium { samples, of });
+    let Some(best) = outcome.best() else {
+        let finding = if failed.is_some() { Finding::NoEquilibrium } else { Finding::Nothing };
+        return without(finding, failed.into_iter().collect());
     };
+    let floor = outcome.noise_floor.unwrap_or_default();
+    let set = if best.rmse_mm.contains_key("margin") { "margin" } else { "all" };
+    let Some(&deformed_mm) = best.rmse_mm.get(set) else {
+        return without(Finding::NoEquilibrium, failed.into_iter().collect());
+    };
+    let floor_mm = floor.combined_mm().unwrap_or(0.0);
+    let moduli = as_good(outcome, set, deformed_mm + floor_mm);
+    if let Some(nearest) = nearest_to_reference(outcome).filter(|_| outcome.kind == ExperimentKind::Phantom) {
+        let finding = if nearest.id == best.id { Finding::Recovered } else { Finding::NotRecovered };
+        let reason = Reason::Phantom { best: best.id.clone(), nearest: nearest.id.clone() };
+        return Verdict::new(finding, None, moduli, std::iter::once(reason).chain(failed).collect());
+    }
     let Some(&rest_mm) = outcome.rest_rmse_mm.get(set) else {
-        // A phantom has no rest to be compared with: the samples are compared with each other.
-        let moduli = as_good(outcome, set, deformed_mm + floor_mm);
-        return Verdict::new(Finding::Better, None, moduli, Vec::new());
+        // Without rest to be compared with, the samples are compared with each other.
+        return Verdict::new(Finding::Better, None, moduli, failed.into_iter().collect());
     };
     let finding = compared(rest_mm, deformed_mm, &floor);
     let mut reasons = vec![Reason::Surface { set: set.to_owned(), rest_mm, deformed_mm, floor_mm }];
-    let moduli = as_good(outcome, set, deformed_mm + floor_mm);
     for (tissue, answer) in &moduli {
         if let Claim::Range { range_pa } = answer {
             reasons.push(Reason::AsGood { tissue: tissue.clone(), pa: *range_pa });
         }
     }
+    reasons.extend(failed);
+    // What is no better than rest says nothing of the stiffness.
+    let moduli = if finding == Finding::Better { moduli } else { Vec::new() };
     Verdict::new(finding, None, moduli, reasons)
+}
+
+/// The sample of the prior whose moduli are nearest to a phantom's own, by the summed squares of the log-ratios.
+pub fn nearest_to_reference(outcome: &ExperimentOutcome) -> Option<&SampleOutcome> {
+    let distance = |s: &SampleOutcome| -> f64 {
+        let truth = outcome.reference_shear_modulus_pa.iter();
+        truth.filter_map(|(name, pa)| Some((s.shear_modulus_pa.get(name)? / pa).ln().powi(2))).sum()
+    };
+    let of_prior =
+        outcome.samples.iter().filter(|s| s.id != REFERENCE && !outcome.reference_shear_modulus_pa.is_empty());
+    of_prior.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// A state against rest: a difference below the floor means nothing.
@@ -54,7 +94,7 @@ pub fn compared(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> Finding {
 
 /// The range of moduli of the samples whose error at `set` is not above `limit_mm`, tissue by tissue.
 fn as_good(outcome: &ExperimentOutcome, set: &str, limit_mm: f64) -> Vec<(String, Claim)> {
-    let near = |s: &&SampleOutcome| s.rmse_mm.get(set).is_some_and(|rmse| *rmse <= limit_mm);
+    let near = |s: &&SampleOutcome| s.id != REFERENCE && s.rmse_mm.get(set).is_some_and(|rmse| *rmse <= limit_mm);
     let near: Vec<&SampleOutcome> = outcome.samples.iter().filter(near).collect();
     let range = |tissue: &String| {
         let moduli = near.iter().filter_map(|s| s.shear_modulus_pa.get(tissue).copied());

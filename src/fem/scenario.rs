@@ -4,6 +4,7 @@ use super::contact::{Contact, Support, Tether};
 use super::element::ElementKind;
 use crate::material::law::Material;
 use crate::material::toml_text::line_of;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -109,7 +110,7 @@ pub struct PatchLoad {
 }
 
 /// A pressure on the facets of a set (found as for [`PatchLoad`]), positive pushing into the tissue.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PressureLoad {
     /// Facet set or node set.
@@ -130,7 +131,7 @@ pub struct CsfLevel {
 }
 
 /// Static equilibrium or motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Equilibrium under the full loads.
@@ -141,7 +142,7 @@ pub enum Method {
 }
 
 /// Linear solvers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearMethod {
     /// Chosen by size and Poisson's ratio.
@@ -156,7 +157,7 @@ pub enum LinearMethod {
 }
 
 /// How equilibrium is found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverSettings {
     /// Static or dynamic.
@@ -164,6 +165,7 @@ pub struct SolverSettings {
     /// Out-of-balance force over applied force at which a state counts as equilibrium.
     pub relative_residual: f64,
     /// Element.
+    #[schemars(with = "String")]
     pub element: ElementKind,
     /// Linear solver.
     pub linear: LinearMethod,

@@ -1,5 +1,6 @@
 //! The twelve tasks of the generative model: three kinds of study times four regions of the brain.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -7,7 +8,7 @@ use thiserror::Error;
 pub const TASKS: usize = 12;
 
 /// How a study found its parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyKind {
     /// Magnetic resonance elastography.

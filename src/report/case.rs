@@ -2,6 +2,7 @@
 
 use super::colour::ColourScale;
 use super::figure::CaseImages;
+use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
 use super::page::{CaptionedPicture, CasePage, ErrorMap, PredictionFigure, ShiftFigure, title_of};
@@ -154,7 +155,8 @@ fn expected_of(case: &Case<'_>, prediction: Option<&Prediction>) -> Result<Optio
 pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     let case = Case { folder };
     let outcome = match case.text(layout::OUTCOME)? {
-        Some(text) => Some(ExperimentOutcome::from_json(&text, layout::OUTCOME)?),
+        // A file of an earlier version holds no verdict.
+        Some(text) => Some(ExperimentOutcome::from_json(&text, layout::OUTCOME)?.with_verdict()),
         None => None,
     };
     let settings_toml = case.text(layout::SETTINGS)?;
@@ -165,7 +167,8 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         return Err(ReportError::NoCase { folder: folder.to_path_buf() });
     }
     let mut page = CasePage {
-        title: title_of(outcome.as_ref().map(|o| o.kind)).to_owned(),
+        subject: subject_of(folder),
+        title: title_of(outcome.as_ref()).to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         settings_toml,
         provenance_json,
@@ -175,6 +178,8 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         page.refused = Some(refused(png));
     }
     if let Some(images) = &images {
+        let seen = case.bytes(layout::SAG)?.map(|bytes| nifti::decode_displacement(&bytes, layout::SAG)).transpose()?;
+        page.glance = glance_figure(images, seen.map(Volume::relabelled).as_ref());
         page.registration = images.registration();
         page.mosaics = images.mosaics();
     }
@@ -198,6 +203,14 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     Ok(page)
 }
 
+/// Whose case it is: `sub-01` of `sub-01/hgm`, else the folder's name.
+fn subject_of(folder: &Path) -> String {
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let above = folder.parent().map(name).filter(|above| above.starts_with("sub-") && name(&folder) == "hgm");
+    above.unwrap_or_else(|| name(&folder))
+}
+
 /// The picture of a refusal on the page.
 fn refused(png: Vec<u8>) -> CaptionedPicture {
     // Width and height stand at the same place in every PNG.
@@ -206,6 +219,7 @@ fn refused(png: Vec<u8>) -> CaptionedPicture {
         size: [pixels(16), pixels(20)],
         caption: "Both scans in the template's frame: above before, below after surgery".to_owned(),
         description: "Axial, coronal and sagittal slices of both scans at the same places".to_owned(),
+        sides: None,
         png,
     }
 }
@@ -312,7 +326,7 @@ fn add_results(
     let mesh = &sample.mesh;
     let deformed = displaced(&file, &sample)?;
     let errors = observed_errors(&sample);
-    let scale = errors.as_ref().and_then(|e| ColourScale::over(e.iter().copied(), "error per node (mm)"));
+    let scale = errors.as_ref().and_then(|e| ColourScale::to_95(e.iter().copied(), "error per node (mm)"));
     if let (Some(errors), Some(scale)) = (&errors, &scale) {
         let sets = outcome.rmse_sets();
         let named: Vec<&str> = sets.iter().map(String::as_str).filter(|s| *s != "all").collect();
@@ -467,7 +481,7 @@ mod tests {
         assert_eq!(page.mesh_pictures.len(), 3);
         let map = page.error_map.as_ref().unwrap();
         // The node that no reference is there for is grey, not without error.
-        assert_eq!((map.scale.low, map.scale.high), (0.5, 3.75));
+        assert_eq!((map.scale.low, map.scale.high), (0.0, 3.75));
         assert_eq!(map.errors_mm, [("margin".to_owned(), vec![1.0, 2.0, 3.75])]);
         let deformed = &page.viewer.as_ref().unwrap().surfaces[1];
         assert_eq!(deformed.surface.nodes_mm[0], [0.5; 3]);

@@ -129,6 +129,10 @@ impl Axis {
                 }
             }
         }
+        if marks.len() < 2 {
+            // A range within a step of 1, 2, 5 is as good as linear.
+            return Self { log: false, ..*self }.ticks(count);
+        }
         marks
     }
 }
@@ -191,15 +195,16 @@ impl LineChart {
         let y_axis = Axis::over(ys, self.y_log, self.y_from_zero, [height - 52.0, top]);
         let mut svg = open(width, height, &self.description);
         frame(&mut svg, &x_axis, &y_axis, &self.x_label, &self.y_label);
-        for rule in &self.y_rules {
-            let (y, text) = (y_axis.at(rule.at), escape(&rule.name));
+        let levels: Vec<f64> = self.y_rules.iter().map(|rule| y_axis.at(rule.at)).collect();
+        for ((rule, &y), label) in self.y_rules.iter().zip(&levels).zip(apart(&levels, top)) {
+            let text = escape(&rule.name);
             let [x0, x1] = x_axis.pixels;
             let _ = write!(
                 svg,
                 "<path d=\"M{x0} {y:.1}H{x1}\" stroke=\"currentColor\" stroke-dasharray=\"6 4\" opacity=\".65\"/>\
                  <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"currentColor\">{text}</text>",
                 x1 - 4.0,
-                if y < top + 16.0 { y + 14.0 } else { y - 5.0 }
+                label
             );
         }
         for rule in &self.x_rules {
@@ -282,6 +287,22 @@ impl LineChart {
     }
 }
 
+/// Where the names of horizontal lines stand: above their line where there is room, and never over each other.
+fn apart(levels: &[f64], top: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..levels.len()).collect();
+    order.sort_by(|a, b| levels[*a].total_cmp(&levels[*b]));
+    let (mut places, mut above) = (vec![0.0; levels.len()], f64::NEG_INFINITY);
+    for n in order {
+        let wanted = if levels[n] < top + 16.0 { levels[n] + 14.0 } else { levels[n] - 5.0 };
+        above = wanted.max(above + LINE);
+        places[n] = above;
+    }
+    places
+}
+
+/// From one line of text to the next.
+const LINE: f64 = 14.0;
+
 /// The marker of series number `n`: where colours come round again the shape is another.
 fn shape(n: usize) -> Marker {
     MARKERS[(n + n / SERIES_COLOURS.len()) % MARKERS.len()]
@@ -325,8 +346,9 @@ pub(super) fn frame(svg: &mut String, x_axis: &Axis, y_axis: &Axis, x_label: &st
 /// A colour bar with ticks and its title, lying on its side, 320 units wide; the ends are the range, in numbers.
 pub fn colour_bar(scale: &ColourScale) -> String {
     let (width, x0, x1) = (340.0, 24.0, 316.0);
+    let above = if scale.and_above { " and above" } else { "" };
     let description = format!(
-        "Colour bar: {} from {} (dark) to {} (bright)",
+        "Colour bar: {} from {} (dark) to {} (bright){above}",
         scale.title,
         number(scale.low, 3),
         number(scale.high, 3)
@@ -355,7 +377,8 @@ pub fn colour_bar(scale: &ColourScale) -> String {
         marks.push((v, grouped(&tick_label(v, step))));
     }
     if span > 0.0 {
-        marks.push((scale.high, number(scale.high, 3)));
+        let and_above = if scale.and_above { "\u{2265}\u{2009}" } else { "" };
+        marks.push((scale.high, format!("{and_above}{}", number(scale.high, 3))));
     }
     for (value, text) in marks {
         let x = if span > 0.0 { x0 + (x1 - x0) * (value - scale.low) / span } else { x0 };
@@ -570,10 +593,21 @@ mod tests {
 
     #[test]
     fn the_bar_names_its_unit_and_both_ends() {
-        let scale = ColourScale { low: 0.123, high: 4.56, title: "RMSE (mm)".to_owned() };
+        let scale = ColourScale { low: 0.123, high: 4.56, title: "RMSE (mm)".to_owned(), and_above: false };
         let svg = colour_bar(&scale);
         well_formed(&svg);
         assert!(svg.contains("RMSE (mm)") && svg.contains(">0.123<") && svg.contains(">4.56<"));
+    }
+
+    #[test]
+    fn names_of_lines_stand_apart_and_every_axis_has_marks() {
+        let places = apart(&[100.0, 101.5, 250.0, 16.0], 14.0);
+        let mut sorted = places.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] >= LINE), "{places:?}");
+        assert_eq!((places[0], places[2]), (95.0, 245.0));
+        let narrow = Axis::over([310.0, 330.0].into_iter(), true, false, [0.0, 100.0]);
+        assert!(narrow.ticks(7).len() >= 2 && narrow.ticks(7).iter().all(|(v, _)| *v > 290.0 && *v < 360.0));
     }
 
     #[test]
@@ -586,7 +620,7 @@ mod tests {
             rows: vec!["3".to_owned(), "4".to_owned()],
             values: vec![vec![0.5, 1.5], vec![f64::NAN, 2.5]],
             chosen: Some((0, 0)),
-            scale: ColourScale { low: 0.5, high: 2.5, title: "RMSE (mm)".to_owned() },
+            scale: ColourScale { low: 0.5, high: 2.5, title: "RMSE (mm)".to_owned(), and_above: false },
         };
         let svg = map.to_svg();
         well_formed(&svg);

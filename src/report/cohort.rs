@@ -3,8 +3,7 @@
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
-use crate::experiment::verdict::Finding;
-use crate::experiment::verdict_of_samples::compared;
+use crate::experiment::verdict::Claim;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
@@ -54,8 +53,10 @@ pub struct Row {
     pub message: Option<String>,
     /// The sample that explains it best, or `estimate`.
     pub best_sample: Option<String>,
-    /// Rest against best sample at the resection margin.
+    /// What it comes down to, in a few words.
     pub verdict: Option<&'static str>,
+    /// The same in the sentence of its page.
+    pub sentence: Option<String>,
     /// Warnings on its page.
     pub warnings: usize,
     /// Numbers by the name of their column.
@@ -132,7 +133,7 @@ impl Cohort {
         Self { program, columns, subjects, median: median_of, mad: mad_of, median_samples, warnings }
     }
 
-    /// The table as BIDS writes one: tabs, `n/a` where there is no value, median and spread in the last lines.
+    /// The table as BIDS writes one: tabs, `n/a` where there is no value, a line for each subject and no other.
     pub fn to_tsv(&self) -> String {
         let cell = |value: Option<&f64>| value.map_or_else(|| "n/a".to_owned(), f64::to_string);
         let numbers = |from: &BTreeMap<String, f64>| -> Vec<String> {
@@ -150,10 +151,6 @@ impl Cohort {
                 row.warnings.to_string(),
             ];
             lines.push([&first[..], &numbers(&row.figures)].concat());
-        }
-        for (name, values) in [("median", &self.median), ("mad", &self.mad)] {
-            let first = [name, "n/a", "n/a", "n/a", "n/a"].map(str::to_owned);
-            lines.push([&first[..], &numbers(values)].concat());
         }
         lines.iter().map(|line| line.join("\t") + "\n").collect()
     }
@@ -180,6 +177,11 @@ impl Status {
             Self::Missing => "missing",
         }
     }
+
+    /// Whether the subject has a page.
+    pub fn has_page(&self) -> bool {
+        !matches!(self, Self::Failed | Self::Missing)
+    }
 }
 
 /// One subject's line; names of columns that are new are added to the end.
@@ -192,16 +194,27 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         }
         figures.insert(name, value);
     };
-    let mut verdict = None;
     if let Some(outcome) = &member.outcome {
         let best = outcome.best();
-        let found = outcome.verdict.finding;
         // A stiffness that is not claimed takes no part in a cohort's.
-        let claimed = found == Finding::Nothing || found.has_stiffness();
+        let claimed = outcome.verdict.finding.has_stiffness();
         for tissue in &outcome.tissues {
-            add(format!("{tissue}_sd_level"), best.and_then(|sample| sample.sd_levels.get(tissue).copied()));
-            let modulus = best.and_then(|sample| sample.shear_modulus_pa.get(tissue).copied());
-            add(format!("{tissue}_shear_modulus_pa"), modulus.filter(|_| claimed));
+            let level = best.and_then(|sample| sample.sd_levels.get(tissue).copied());
+            add(format!("{tissue}_sd_level"), level.filter(|_| claimed));
+        }
+        for (tissue, claim) in &outcome.verdict.moduli {
+            match claim {
+                Claim::Interval { mode_pa, .. } => add(format!("{tissue}_shear_modulus_pa"), Some(*mode_pa)),
+                Claim::Above { bound_pa } => add(format!("{tissue}_shear_modulus_above_pa"), Some(*bound_pa)),
+                Claim::Range { range_pa: [low, high] } if low == high => {
+                    add(format!("{tissue}_shear_modulus_pa"), Some(*low));
+                }
+                Claim::Range { range_pa: [low, high] } => {
+                    add(format!("{tissue}_shear_modulus_low_pa"), Some(*low));
+                    add(format!("{tissue}_shear_modulus_high_pa"), Some(*high));
+                }
+                Claim::Withheld => {}
+            }
         }
         for posterior in outcome.estimate.iter().map(|e| &e.posterior).filter(|_| claimed) {
             for (name, [low, high]) in posterior.names.iter().zip(&posterior.interval_95) {
@@ -230,17 +243,14 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         add("midline_shift_mm".to_owned(), volumes.midline_shift_mm);
         add("brain_cc".to_owned(), volumes.brain_cc);
         add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
-        let margin = (outcome.rest_rmse_mm.get("margin"), best.and_then(|sample| sample.rmse_mm.get("margin")));
-        if let (Some(rest), Some(deformed)) = margin {
-            verdict = Some(if found == Finding::Nothing { compared(*rest, *deformed, &floor) } else { found }.short());
-        }
     }
     Row {
         participant_id: member.participant_id.clone(),
         status: member.status.clone(),
         message: member.message.clone(),
         best_sample: member.outcome.as_ref().and_then(|o| o.best_sample.clone()),
-        verdict,
+        verdict: member.outcome.as_ref().map(|o| o.verdict.finding.short()),
+        sentence: member.outcome.as_ref().map(|o| o.verdict.sentence.clone()),
         warnings: member.outcome.as_ref().map_or(0, |o| o.warnings.len()),
         figures,
         outlying: Vec::new(),
@@ -266,6 +276,7 @@ mod tests {
             rest_rmse_mm: BTreeMap::from([("margin".to_owned(), 3.0)]),
             ..ExperimentOutcome::default()
         });
+        let outcome = outcome.map(ExperimentOutcome::with_verdict);
         let message = (status == Status::Failed).then(|| "no brain".to_owned());
         Member { participant_id: name.to_owned(), status, message, outcome, settings_sha256: None }
     }
@@ -303,8 +314,18 @@ mod tests {
     fn the_table_has_a_cell_for_every_column_of_every_line() {
         let text = cohort().to_tsv();
         let cells: Vec<usize> = text.lines().map(|line| line.split('\t').count()).collect();
-        assert!(cells.len() == 9 && cells.iter().all(|n| *n == cells[0]), "{cells:?}");
+        assert!(cells.len() == 7 && cells.iter().all(|n| *n == cells[0]), "{cells:?}");
         assert!(text.contains("sub-x\tfailed\tn/a"));
+    }
+
+    #[test]
+    fn every_line_of_the_table_is_a_subject_and_none_has_a_stiffness_that_is_not_claimed() {
+        let cohort = cohort();
+        let text = cohort.to_tsv();
+        assert!(text.lines().skip(1).all(|line| line.starts_with("sub-")), "{text}");
+        let worse = cohort.subjects.iter().find(|row| row.participant_id == "sub-2").unwrap();
+        assert_eq!(worse.verdict, Some("worse than rest"));
+        assert!(!worse.figures.contains_key("brain_shear_modulus_pa"));
     }
 
     #[test]

@@ -63,6 +63,8 @@ pub struct ColourScale {
     pub high: f64,
     /// What is shown, with its unit: `RMSE (mm)`.
     pub title: String,
+    /// Whether the bright end stands for all that is larger, too.
+    pub and_above: bool,
 }
 
 impl ColourScale {
@@ -73,7 +75,17 @@ impl ColourScale {
             low = low.min(v);
             high = high.max(v);
         }
-        (low <= high).then(|| Self { low, high, title: title.to_owned() })
+        (low <= high).then(|| Self { low, high, title: title.to_owned(), and_above: false })
+    }
+
+    /// A scale of sizes from nothing to the 95th percentile of the finite values, so that a few large ones do not darken
+    /// all others; `None` when there is no value.
+    pub fn to_95(values: impl IntoIterator<Item = f64>, title: &str) -> Option<Self> {
+        let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
+        let high = values[(0.95 * last as f64).ceil() as usize].max(0.0);
+        Some(Self { low: 0.0, high, title: title.to_owned(), and_above: values[last] > high })
     }
 
     /// Colour of a value.
@@ -133,6 +145,15 @@ mod tests {
         assert_eq!(scale.colour(2.5), [253, 231, 37]);
         assert!(ColourScale::over([f64::NAN], "x").is_none());
         assert_eq!(ColourScale::over([3.0], "x").unwrap().colour(3.0), viridis(0.0));
+    }
+
+    #[test]
+    fn a_scale_of_sizes_begins_at_nothing_and_a_few_large_ones_do_not_darken_the_others() {
+        let values: Vec<f64> = (0..=100).map(f64::from).chain([f64::NAN]).collect();
+        let scale = ColourScale::to_95(values, "shift (mm)").unwrap();
+        assert_eq!((scale.low, scale.high, scale.and_above), (0.0, 95.0, true));
+        assert_eq!(scale.colour(100.0), viridis(1.0));
+        assert!(!ColourScale::to_95([2.0, 2.0], "x").unwrap().and_above && ColourScale::to_95([], "x").is_none());
     }
 
     #[test]

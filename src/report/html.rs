@@ -53,9 +53,21 @@ pub fn png_address(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
 
-/// A whole number, thousands apart with a thin space.
+/// A whole number, thousands apart with a thin space; from a hundred thousand on to three digits.
 pub fn count(n: usize) -> String {
-    number(n as f64, n.max(1).ilog10() as usize + 1)
+    let digits = n.max(1).ilog10() as usize + 1;
+    let step = if digits > 5 { 10usize.pow(digits as u32 - 3) } else { 1 };
+    number(((n + step / 2) / step * step) as f64, digits)
+}
+
+/// A share with its standard deviation in per cent; one that rounding would make nothing is told as a bound.
+pub fn percent(share: f64, sd: f64) -> String {
+    let (share, sd) = (100.0 * share, 100.0 * sd);
+    match sd {
+        sd if sd >= 0.5 => format!("{} \u{b1} {} %", fixed(share, 0), fixed(sd, 0)),
+        sd if sd >= 0.05 => format!("{} \u{b1} {} %", fixed(share, 1), fixed(sd, 1)),
+        _ => format!("{} % (standard deviation below 0.1 %)", fixed(share, 1)),
+    }
 }
 
 /// A number with a fixed count of decimals and a true minus sign.
@@ -98,6 +110,13 @@ mod tests {
     }
 
     #[test]
+    fn no_share_is_told_without_an_error_because_of_rounding() {
+        assert_eq!(percent(0.8, 0.05), "80 \u{b1} 5 %");
+        assert_eq!(percent(0.9412, 0.003), "94.1 \u{b1} 0.3 %");
+        assert_eq!(percent(0.9412, 0.0001), "94.1 % (standard deviation below 0.1 %)");
+    }
+
+    #[test]
     fn control_characters_never_pass() {
         for pass in [escape as fn(&str) -> String, |text| without_control_characters(text.to_owned())] {
             assert_eq!(pass("a\u{0}b\u{1b}c\nd"), "a\u{fffd}b\u{fffd}c\nd");
@@ -112,7 +131,7 @@ mod tests {
         assert_eq!(number(-2.5, 2), "\u{2212}2.5");
         assert_eq!(number(f64::NAN, 3), "–");
         assert_eq!(number(0.0, 3), "0.00");
-        assert_eq!((count(0), count(644), count(152052)), ("0".into(), "644".into(), "152\u{2009}052".into()));
+        assert_eq!((count(0), count(644), count(152052)), ("0".into(), "644".into(), "152\u{2009}000".into()));
         assert_eq!((fixed(-0.04, 1), fixed(-1.25, 1)), ("0.0".into(), "\u{2212}1.2".into()));
     }
 }

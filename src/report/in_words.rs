@@ -4,9 +4,10 @@ use super::page::expected_in_a_sentence;
 use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::landmarks::Evaluation;
-use crate::experiment::outcome::{ExperimentOutcome, SampleOutcome};
+use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, TargetPlace};
 use crate::experiment::resection::improvement;
+use crate::experiment::verdict_of_samples::nearest_to_reference;
 use crate::material::law::StabilityRange;
 use crate::material::meta_model::Fit;
 use std::path::Path;
@@ -73,19 +74,28 @@ pub fn prediction_table(found: &Prediction) -> String {
     text
 }
 
-/// Best sample, errors and verdicts.
+/// What a job has found: the verdict, then the figures behind it.
 pub fn summary(outcome: &ExperimentOutcome) -> String {
     let mut text = format!("{}\n", outcome.verdict.sentence);
-    let floor = outcome.noise_floor.unwrap_or_default();
-    if let Some(best) = outcome.best().filter(|_| outcome.verdict.finding.has_stiffness()) {
-        let moduli: Vec<String> = best.shear_modulus_pa.iter().map(|(t, m)| format!("{t} {m:.0} Pa")).collect();
-        text += &format!("best sample {} ({})\n", best.id, moduli.join(", "));
+    if outcome.kind == ExperimentKind::Phantom && outcome.estimate.is_none() {
+        return text + &phantom_table(outcome);
     }
-    if let Some(best) = outcome.best() {
-        for (set, deformed) in &best.rmse_mm {
-            let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
-            let verdict = improvement(rest, *deformed, &floor);
-            text += &format!("RMSE at {set}: rest {rest:.3} mm, deformed {deformed:.3} mm: {verdict}\n");
+    let floor = outcome.noise_floor.unwrap_or_default();
+    if let Some(estimate) = &outcome.estimate {
+        text += &estimate_figures(estimate);
+        text += &outcome.comparison.as_ref().map_or_else(String::new, models_table);
+    }
+    if let Some(judged) = outcome.judged() {
+        let state = if judged.id == ESTIMATE { "estimate" } else { "deformed" };
+        for (set, deformed) in &judged.rmse_mm {
+            let against = outcome.rest_rmse_mm.get(set).map_or_else(String::new, |rest| {
+                format!("rest {rest:.3} mm, {state} {deformed:.3} mm: {}", improvement(*rest, *deformed, &floor))
+            });
+            let alone = || format!("{state} {deformed:.3} mm");
+            text += &format!("RMSE at {set}: {}\n", if against.is_empty() { alone() } else { against });
+        }
+        if outcome.estimate.is_none() && outcome.verdict.finding.has_stiffness() {
+            text += &format!("best sample {}\n", judged.id);
         }
     }
     if let Some(floor_mm) = floor.combined_mm() {
@@ -107,10 +117,10 @@ pub fn models_table(comparison: &Comparison) -> String {
 }
 
 /// Parameters with their intervals, and what limits them.
-pub fn estimate_table(estimate: &EstimateOutcome) -> String {
+fn estimate_figures(estimate: &EstimateOutcome) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         estimate;
-    let mut text = format!("{}\n", estimate.verdict.sentence);
+    let mut text = String::new();
     let shown = estimate.verdict.finding.has_stiffness();
     if shown {
         text += "parameter                            mode   95 % interval\n";
@@ -132,28 +142,15 @@ pub fn estimate_table(estimate: &EstimateOutcome) -> String {
     text
 }
 
-/// Rest against the estimate's state at every set.
-pub fn comparison(outcome: &ExperimentOutcome, estimate: &SampleOutcome) -> String {
-    let floor = outcome.noise_floor.unwrap_or_default();
-    let mut text = outcome.comparison.as_ref().map_or_else(String::new, models_table);
-    for (set, deformed) in &estimate.rmse_mm {
-        let rest = outcome.rest_rmse_mm.get(set).copied().unwrap_or(f64::NAN);
-        text += &format!(
-            "RMSE at {set}: rest {rest:.3} mm, estimate {deformed:.3} mm: {}\n",
-            improvement(rest, *deformed, &floor)
-        );
-    }
-    text
-}
-
 /// A phantom's samples with their errors; which is best, and which is nearest to what went in.
-pub fn phantom_summary(outcome: &ExperimentOutcome, nearest: Option<&str>) -> String {
+fn phantom_table(outcome: &ExperimentOutcome) -> String {
+    let nearest = nearest_to_reference(outcome).map(|sample| &sample.id);
     let mut text = String::from("sample                  shear modulus (Pa)          RMSE (mm)\n");
     for sample in &outcome.samples {
         let moduli: Vec<String> = sample.shear_modulus_pa.values().map(|m| format!("{m:.1}")).collect();
         let rmse = sample.rmse_mm.get("all").map_or("no equilibrium".to_owned(), |r| format!("{r:.6}"));
-        let mark = if outcome.best_sample.as_deref() == Some(&sample.id) { "  best" } else { "" };
-        let near = if nearest == Some(sample.id.as_str()) { "  nearest to the reference" } else { "" };
+        let mark = if outcome.best_sample.as_ref() == Some(&sample.id) { "  best" } else { "" };
+        let near = if nearest == Some(&sample.id) { "  nearest to the reference" } else { "" };
         text += &format!("{:<23} {:<27} {rmse}{mark}{near}\n", sample.id, moduli.join(" / "));
     }
     text

@@ -66,6 +66,7 @@ pub fn cut_views(mesh: &TetMesh, at_mm: [f64; 3], size: [usize; 2]) -> Vec<Capti
                 size,
                 caption: format!("{} cut at {place}", capitalised(view.name)),
                 description: format!("The mesh cut open at {place}; cells by label: {}", names.join(", ")),
+                sides: Some(camera(view).sides()),
             }
         })
         .collect()
@@ -136,7 +137,13 @@ pub fn value_views(
         let (picture, _) = scene.render(camera, size[0], size[1]);
         let description =
             format!("{seen}, colours: {} from {} to {}", scale.title, number(scale.low, 3), number(scale.high, 3));
-        pictures.push(CaptionedPicture { png: picture.to_png(), size, caption, description });
+        pictures.push(CaptionedPicture {
+            png: picture.to_png(),
+            size,
+            caption,
+            description,
+            sides: Some(camera.sides()),
+        });
     };
     let mut scene = Scene::default();
     scene.add_surface(&surface, &colours_of(&on_surface, scale), None, false);

@@ -7,6 +7,7 @@ pub mod cohort;
 pub mod colour;
 pub mod derivatives;
 pub mod figure;
+pub mod glance_figure;
 pub mod hand_off;
 pub mod html;
 pub mod in_words;

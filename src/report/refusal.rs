@@ -2,6 +2,8 @@
 //!
 //! No face: in the template's frame only what lies around the brain is shown, and a scan without a pose only in axial slices.
 
+use super::colour::Rgb;
+use super::lettering;
 use super::picture::Picture;
 use super::slice::{self, Plane, Tile};
 use crate::geometry::{Frame, Mni, RigidTransform};
@@ -16,9 +18,11 @@ const AROUND_MM: f64 = 8.0;
 const STEP_MM: f64 = 1.0;
 /// Pixels between the slices.
 const GAP: usize = 6;
+/// Of the letters that tell the patient's sides.
+const INK: Rgb = [201, 209, 216];
 
 /// Grey slices of one scan, left to right.
-type Row = Vec<([usize; 2], Vec<u8>)>;
+type Row = Vec<(Tile, Vec<u8>)>;
 
 /// Slices of a scan that has a pose, as the template lies; the same places for every scan.
 pub fn posed<F: Frame>(scan: &Volume<f32, F>, mni_from_scan: &RigidTransform<F, Mni>) -> Row {
@@ -44,22 +48,26 @@ pub fn as_scanned<F: Frame>(scan: &Volume<f32, F>) -> Row {
 
 fn row<F: Frame>(scan: &Volume<f32, F>, shown: &Mask<F>, tiles: impl Iterator<Item = Tile>) -> Row {
     let Some(window) = slice::window(scan, shown) else { return Row::new() };
-    tiles.map(|tile| (tile.size, slice::grey::<F, F>(&tile, scan, shown, window, |p| p))).collect()
+    tiles.map(|tile| (tile, slice::grey::<F, F>(&tile, scan, shown, window, |p| p))).collect()
 }
 
 /// The rows below each other as a PNG, with its size in pixels; `None` where nothing can be shown.
 pub fn picture(rows: &[Row]) -> Option<(Vec<u8>, [usize; 2])> {
-    let high = |row: &Row| row.iter().map(|t| t.0[1]).max().unwrap_or(0);
-    let wide = |row: &Row| row.iter().map(|t| t.0[0] + GAP).sum::<usize>();
+    let high = |row: &Row| row.iter().map(|t| t.0.size[1]).max().unwrap_or(0);
+    let wide = |row: &Row| row.iter().map(|t| t.0.size[0] + GAP).sum::<usize>();
     let width = rows.iter().map(wide).max()?.checked_sub(GAP)?;
     let height = (rows.iter().map(|r| high(r) + GAP).sum::<usize>()).checked_sub(GAP)?;
     let mut picture = Picture::filled(width, height, [0, 0, 0, 255]);
     let mut y = 0;
     for row in rows {
         let mut x = 0;
-        for ([w, h], grey) in row {
+        for (tile, grey) in row {
+            let ([w, h], [left, right]) = (tile.size, tile.plane.sides());
             let rgba = grey.iter().flat_map(|&g| [g, g, g, 255]).collect();
-            picture.paste(&Picture { width: *w, height: *h, rgba }, x, y);
+            picture.paste(&Picture { width: w, height: h, rgba }, x, y);
+            lettering::write(&mut picture, left, [x + 4, y + 4], 2, INK);
+            let far = (x + w).saturating_sub(4 + lettering::width(right, 2));
+            lettering::write(&mut picture, right, [far, y + 4], 2, INK);
             x += w + GAP;
         }
         y += high(row) + GAP;

@@ -60,6 +60,17 @@ impl Camera {
         Some(Self { from, up })
     }
 
+    /// Letters for the left and right side of the picture: what of the patient lies there most.
+    pub fn sides(&self) -> [&'static str; 2] {
+        let right = self.axes()[0];
+        match (right.x.abs() >= right.y.abs(), right.x > 0.0, right.y > 0.0) {
+            (true, true, _) => ["L", "R"],
+            (true, false, _) => ["R", "L"],
+            (false, _, true) => ["P", "A"],
+            (false, _, false) => ["A", "P"],
+        }
+    }
+
     /// Rows: right, up, towards the eye.
     fn axes(&self) -> [Vector3<f64>; 3] {
         let eye = self.from.normalize();

@@ -3,6 +3,7 @@
 use super::colour::ColourScale;
 use super::page::{CaptionedPicture, PredictionFigure, ShiftFigure};
 use super::picture::Picture;
+use super::slice::Plane;
 use crate::experiment::field::{at, in_tetrahedra};
 use crate::geometry::{Mni, Position};
 use crate::image::{Grid, Volume};
@@ -38,7 +39,7 @@ pub fn shift_figure(
         }),
     ];
     let sizes = (0..grid.len()).filter_map(shown).flat_map(|both| both.map(length));
-    let scale = ColourScale::over(sizes.chain([0.0]), "displacement (mm)")?;
+    let scale = ColourScale::to_95(sizes, "displacement (mm)")?;
     let pictures = panels.into_iter().map(|(caption, what, of)| {
         let picture = painted(t1, &grid, &scale, &|n| shown(n).map(of), Length::Shift);
         captioned(picture, &grid, caption, &format!("{} {what}; {}", COLOUR_OF_SHIFT, lines()))
@@ -181,6 +182,7 @@ fn captioned(picture: Picture, grid: &Grid<Mni>, caption: &str, what: &str) -> C
         size: [SCALE * grid.dims[0], SCALE * grid.dims[1]],
         caption: caption.to_owned(),
         description: format!("Axial slice at z = {level_mm} mm, the patient's right on the left: {what}"),
+        sides: Some(Plane::Axial.sides()),
     }
 }
 

@@ -52,10 +52,10 @@ impl Plane {
     }
 
     /// Letters on the left and right side of a tile.
-    pub fn sides(self) -> (&'static str, &'static str) {
+    pub fn sides(self) -> [&'static str; 2] {
         match self {
-            Self::Axial | Self::Coronal => ("R", "L"),
-            Self::Sagittal => ("A", "P"),
+            Self::Axial | Self::Coronal => ["R", "L"],
+            Self::Sagittal => ["A", "P"],
         }
     }
 }

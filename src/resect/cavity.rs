@@ -10,11 +10,12 @@ use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode, open};
 use crate::image::{LabelMap, Mask};
 use crate::segment::label;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// How the cavity is found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CavitySettings {
     /// Smoothness of the ratio between the scans' intensities, mm.

@@ -16,11 +16,12 @@ use crate::segment::{
     HeadError, Scale, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, fit_template_to_labels,
     label, segment_by_labels, segment_head, segment_with_priors,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Everything that steers [`take_pair_apart`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PairSettings {
     /// Fit of the template to each head.

@@ -9,7 +9,7 @@ use crate::image::morphology::{close, dilate, erode};
 use crate::image::{Mask, Volume};
 
 /// How the brain is told from its surroundings.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BrainSettings {
     /// How far the patient's pia may lie outside the template's, in mm.

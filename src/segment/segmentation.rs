@@ -14,7 +14,7 @@ use crate::image::{LabelMap, Mask, Volume};
 use thiserror::Error;
 
 /// Everything that steers [`segment_t1`].
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SegmentSettings {
     /// Brain mask.

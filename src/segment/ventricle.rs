@@ -10,7 +10,7 @@ use crate::image::morphology::{close, dilate, erode};
 use crate::image::{Mask, Volume};
 
 /// How the ventricles are told from the other CSF.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VentricleSettings {
     /// How far the patient's ventricles may reach beyond the template's, in mm.

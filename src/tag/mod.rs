@@ -13,6 +13,7 @@ use crate::mesh::engine::MidplaneSplit;
 use crate::segment::label;
 use landmark::{above_falx_edge, above_tentorium_mm, below_base_line};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use section::midsagittal_cut;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,7 +40,7 @@ pub use crate::mesh::engine::MIDSAGITTAL;
 const IN_PLANE_MM: f64 = 1e-3;
 
 /// What to tag and how. The defaults are those of the MNI152 template.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TagSettings {
     /// Tag the falx.

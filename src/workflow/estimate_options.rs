@@ -2,10 +2,11 @@
 
 use crate::experiment::estimate::{DisplacementSettings, EstimateSettings};
 use crate::fem::ElementKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a patient's estimate is fitted to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Observed {
     /// The displacement of the brain's depth, by deformable registration of the two scans.
@@ -16,7 +17,7 @@ pub enum Observed {
 }
 
 /// How the estimate is posed; the table `[estimate]` of the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[allow(clippy::struct_excessive_bools, reason = "independent switches of a table of settings")]
 pub struct EstimateOptions {
@@ -30,6 +31,7 @@ pub struct EstimateOptions {
     /// Errors of a segmented surface are alike over this distance, mm: nodes nearer to each other count as one.
     pub correlation_mm: f64,
     /// The element of a patient's body. Plain linear tetrahedra lock: with them grey matter came out a quarter softer.
+    #[schemars(with = "String")]
     pub element: ElementKind,
     /// Standard deviation of ln(modulus) that a patient's model adds. Measured on a synthetic patient: from 60,000 to
     /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of

@@ -42,6 +42,7 @@ mod programs;
 mod progress;
 mod refusal;
 mod settings;
+mod settings_manual;
 mod simulation;
 mod stage_name;
 mod stages;
@@ -74,6 +75,7 @@ pub use prediction::predict;
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
+pub use settings_manual::{Setting, annotated, every_setting};
 pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
@@ -84,7 +86,9 @@ pub use warp::{PointCounts, Through, Warp, Warped, warp};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
+use crate::artefact::check_writable;
 use crate::experiment::compare::Comparison;
+use crate::layout;
 use lock::Lock;
 use patient::{Images, Patient, Prepared};
 use phantom::Phantom;
@@ -143,6 +147,7 @@ pub fn run_to(
 /// What would be refused after minutes is refused now.
 fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     work.settings.check()?;
+    check_writable(&work.case.path(layout::SETTINGS))?;
     if goal == Goal::Images {
         return Ok(());
     }
@@ -250,16 +255,6 @@ pub fn phantom(
     phantom.samples()?;
     phantom.gather()?;
     Ok(work.case.clone())
-}
-
-/// The name of the sample whose moduli are nearest to a phantom's known ones.
-///
-/// # Errors
-/// A prior that does not exist.
-pub fn nearest_sample(settings: &Settings, every_task: bool) -> Result<Option<String>, WorkflowError> {
-    let place = Place::default();
-    let mut silent = Silent;
-    phantom::nearest(&Work::new(&place, Subject::Phantom { every_task }, settings, &mut silent))
 }
 
 /// The page again from what is there.

@@ -154,11 +154,3 @@ impl<'w, 'a> Phantom<'w, 'a> {
         }
     }
 }
-
-/// The sample of the prior whose moduli are nearest to the reference's.
-pub(crate) fn nearest(work: &Work<'_>) -> Result<Option<String>, WorkflowError> {
-    let truth = work.settings.phantom.reference_sample();
-    let mut list = plan::samples(work.settings, work.subject)?;
-    list.retain(|sample| sample.id != truth.id);
-    Ok(nearest_sample(&list, &truth).map(|s| s.id.clone()))
-}

@@ -17,6 +17,7 @@ use crate::register::deformable::DeformableSettings;
 use crate::resect::PairSettings;
 use crate::segment::SegmentSettings;
 use crate::tag::TagSettings;
+use schemars::JsonSchema;
 use serde::de::IntoDeserializer;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
@@ -25,7 +26,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 /// The settings of every room.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// Masks and labels of a pair.

@@ -69,6 +69,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("error", &["report", &at("nowhere")]);
     prints("doctor", &["doctor"]);
     prints("schema", &["schema"]);
+    prints("settings", &["settings"]);
     prints("layout", &["layout"]);
     prints("completions", &["completions", "fish"]);
     prints("man", &["man", "-o", &at("pages")]);
@@ -175,6 +176,46 @@ fn slow_an_interrupted_job_leaves_only_whole_files() {
             assert!(serde_json::from_slice::<serde_json::Value>(bytes).is_ok(), "{name} is cut");
         }
     }
+}
+
+#[test]
+fn a_reader_who_goes_away_is_no_fault() {
+    let script = format!("{} schema | head -c 10; echo \"${{PIPESTATUS[0]}}\"", program().display());
+    let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
+    assert!(String::from_utf8_lossy(&ended.stdout).ends_with("0\n"), "{ended:?}");
+    assert!(ended.stderr.is_empty(), "{}", String::from_utf8_lossy(&ended.stderr));
+}
+
+#[test]
+fn a_mistyped_command_is_told_what_may_be_meant() {
+    for (word, meant) in [("estimat", "'estimate'"), ("fit", "`hgm gp fit` and `hgm law fit`")] {
+        let said = output(&[word]);
+        assert_eq!(said.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&said.stderr).contains(meant), "{said:?}");
+    }
+}
+
+#[test]
+fn a_place_that_takes_no_file_is_told_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
+    let (pre, post) = (pre.to_str().unwrap(), post.to_str().unwrap());
+    let below = |name: &str| file.join(name).to_str().unwrap().to_owned();
+    let begin = Instant::now();
+    for words in [
+        &["run", pre, post, "-o", &below("case")][..],
+        &["register", pre, post, "-o", &below("x.txt")],
+        &["segment", pre, "-o", &below("dseg.nii.gz")],
+        &["phantom", "-o", &below("phantom")],
+    ] {
+        let said = output(words);
+        assert_eq!(said.status.code(), Some(1), "{said:?}");
+        assert!(String::from_utf8_lossy(&said.stderr).contains("cannot be written"), "{said:?}");
+    }
+    // A registration alone takes longer.
+    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
 }
 
 #[test]

@@ -67,7 +67,8 @@ fn kill_when_there(mut job: Child, file: &Path) {
 #[test]
 fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    // The page is headed by the folder's name.
+    let (whole, broken) = (folder.path().join("whole/case"), folder.path().join("broken/case"));
     copy(&finished_pair(), &whole);
     kill_when_there(start(&broken, "1"), &broken.join("anat/pre_space-MNI_T1w.nii.gz"));
     kill_when_there(start(&broken, "1"), &broken.join("sim/sample-02.vtu"));
@@ -85,7 +86,7 @@ fn slow_a_killed_job_goes_on_and_ends_with_the_same_bytes_on_any_number_of_threa
     let page = String::from_utf8(whole["report.html"].clone()).unwrap();
     assert!(page.len() < 10_000_000 && page.contains("not a medical device"));
     assert!(!page.contains(folder.path().to_str().unwrap()), "no path in the page");
-    asks_why(&folder.path().join("whole"));
+    asks_why(&folder.path().join("whole/case"));
 }
 
 /// Nothing would run again with the same options; a changed setting, file and scan are each named, and what follows too.
@@ -133,20 +134,20 @@ fn slow_shards_in_any_order_give_the_bytes_of_one_run_and_a_gap_is_named() {
     copy(&finished_phantom()[0], &folder.path().join("phantom"));
     // A phantom is no patient: it has no masks to sweep against.
     assert_eq!(output(&["sweep", &path("phantom")]).status.code(), Some(3));
-    for name in ["parts", "whole"] {
+    for name in ["parts/case", "whole/case"] {
         prepared_pair(&folder.path().join(name));
     }
-    assert!(output(&["sweep", &path("whole")]).status.success());
+    assert!(output(&["sweep", &path("whole/case")]).status.success());
     for part in ["3/3", "1/3"] {
-        assert!(output(&["sweep", &path("parts"), "--shard", part, "--threads", "1"]).status.success());
+        assert!(output(&["sweep", &path("parts/case"), "--shard", part, "--threads", "1"]).status.success());
     }
-    let gap = output(&["reduce", &path("parts")]);
+    let gap = output(&["reduce", &path("parts/case")]);
     assert_eq!(gap.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&gap.stderr).contains("sample-01 is not done"));
-    assert!(output(&["sweep", &path("parts"), "--shard", "2/3"]).status.success());
-    assert!(output(&["reduce", &path("parts")]).status.success());
-    assert!(contents(&folder.path().join("parts")) == contents(&folder.path().join("whole")));
-    let estimate = output(&["estimate", &path("whole"), "--json"]);
+    assert!(output(&["sweep", &path("parts/case"), "--shard", "2/3"]).status.success());
+    assert!(output(&["reduce", &path("parts/case")]).status.success());
+    assert!(contents(&folder.path().join("parts/case")) == contents(&folder.path().join("whole/case")));
+    let estimate = output(&["estimate", &path("whole/case"), "--json"]);
     let estimate: serde_json::Value = serde_json::from_slice(&estimate.stdout).unwrap();
     let [low, high] = [0, 1].map(|n| estimate["posterior"]["interval_95"][0][n].as_f64().unwrap());
     assert!(0.0 < low && low < estimate["posterior"]["mode"][0].as_f64().unwrap() && high.is_finite());

@@ -33,3 +33,4 @@ mod simulate;
 mod slicer_files;
 mod stale;
 mod transform_files;
+mod verdicts;

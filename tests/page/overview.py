@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 # Two columns of sections, top to bottom.
-COLUMNS = (("summary", "masks"), ("view", "error", "mesh"))
+COLUMNS = (("glance", "masks"), ("view", "error", "mesh"))
 WIDTH, GAP, HEIGHT = 760, 10, 1330
 
 

@@ -8,7 +8,8 @@ use crate::workflow::cohort::{Dataset, member};
 use anyhow::anyhow;
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    let members: Vec<Member> = dataset.subjects.iter().map(|name| member(&args.out, name)).collect::<Result<_, _>>()?;
+    let members: Vec<Member> =
+        dataset.subjects.iter().map(|name| member(&args.out, args.cases(), name)).collect::<Result<_, _>>()?;
     if members.iter().all(|m| m.outcome.is_none()) {
         return Err(Failure::Rejected(anyhow!(
             "{}: no subject has been run here; run `hgm bids BIDS_DIR OUT participant` first",

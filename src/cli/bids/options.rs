@@ -1,7 +1,7 @@
 //! The options of `hgm bids`.
 
 use crate::cli::flags::{AnalysisOptions, MeshOptions};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A BIDS data set (ses-preop, ses-postop) to derivatives: every subject as `hgm run`, then all in one table
 ///
@@ -16,7 +16,7 @@ pub struct Args {
     #[arg(value_enum)]
     pub level: Level,
     /// Only these subjects, with or without sub-
-    #[arg(long, value_name = "LABEL", num_args = 1.., value_delimiter = ',')]
+    #[arg(long, visible_alias = "participant_label", value_name = "LABEL", num_args = 1.., value_delimiter = ',')]
     pub participant_label: Vec<String>,
     /// Where a session has several T1 scans: take the one with this entity, such as run-2
     #[arg(long, value_name = "ENTITY")]
@@ -27,10 +27,29 @@ pub struct Args {
     /// Only tell what would be run
     #[arg(long)]
     pub dry_run: bool,
+    /// Where the case folders go (sub-*/hgm), at both levels [default: into OUT]
+    #[arg(short, long, alias = "work_dir", value_name = "DIR")]
+    pub work_dir: Option<PathBuf>,
+    /// Threads to use, as --threads, which wins
+    #[arg(long, alias = "n-procs", alias = "n_procs", alias = "n-cpus", alias = "n_cpus", value_name = "N")]
+    pub nprocs: Option<usize>,
+    /// Memory at hand in GB: a mesh engine that is a program of its own is held to it (setting mesh.limits.memory_mb)
+    #[arg(long, alias = "mem_gb", value_name = "GB", value_parser = clap::value_parser!(u64).range(1..))]
+    pub mem_gb: Option<u64>,
+    /// Taken because every BIDS App has it: hgm runs no validator, and refuses by name what it cannot use
+    #[arg(long, alias = "skip_bids_validation")]
+    pub skip_bids_validation: bool,
     #[command(flatten)]
     pub mesh: MeshOptions,
     #[command(flatten)]
     pub analysis: AnalysisOptions,
+}
+
+impl Args {
+    /// Below which the case folders lie.
+    pub fn cases(&self) -> &Path {
+        self.work_dir.as_deref().unwrap_or(&self.out)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -41,7 +41,7 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
             participant_id: subject.clone(),
             pre: pair.as_ref().map(|pair| dataset.folder.join(&pair.pre.0)),
             post: pair.as_ref().map(|pair| dataset.folder.join(&pair.post.0)),
-            case: case_folder(&args.out, subject),
+            case: case_folder(args.cases(), subject),
             message,
         }
     };
@@ -55,7 +55,7 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    let settings = run::settings(&args.analysis, &args.mesh, session)?;
+    let settings = settings(args, session)?;
     cohort::begin(dataset, &args.out)?;
     let mut done: Vec<Done> = Vec::new();
     let mut worst: Option<Failure> = None;
@@ -110,11 +110,20 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
     }
 }
 
+/// Those of `hgm run`, with the memory that the mesh engines may take.
+fn settings(args: &Args, session: &Session) -> Result<Settings, Failure> {
+    let mut settings = run::settings(&args.analysis, &args.mesh, session)?;
+    if let Some(gb) = args.mem_gb {
+        settings.mesh.limits.memory_mb = 1000 * gb;
+    }
+    Ok(settings)
+}
+
 /// One subject from scans to derivatives.
 fn one(args: &Args, dataset: &Dataset, subject: &str, settings: &Settings, session: &Session) -> Result<(), Failure> {
     let pair = dataset.pair(subject, &args.entity)?;
     tracing::info!("{subject}");
-    let (goal, place) = (args.analysis.goal(), session.place(&case_folder(&args.out, subject)));
+    let (goal, place) = (args.analysis.goal(), session.place(&case_folder(args.cases(), subject)));
     let case = cohort::subject(goal, (dataset, &pair), (&args.out, &place), settings, &mut session.listener())?;
     Ok(case.quality_gate()?)
 }

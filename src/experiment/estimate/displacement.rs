@@ -8,13 +8,14 @@ use super::{CorrelatedErrors, Process};
 use crate::experiment::setting::{SettingError, first_broken};
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
 /// Depth was chosen on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is known. Noise and
 /// length are what the registration shows of a pair that has not moved (docs/evidence/estimate.md).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplacementSettings {
     /// Nodes nearer than this to the brain's outside or to the margin are left out, mm.

@@ -29,7 +29,7 @@ pub trait Forward {
 }
 
 /// How to descend.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimateSettings {
     /// Standard deviation of one observation, mm.

@@ -1,10 +1,11 @@
 //! How displacement fields are made; the table `[fields]` of the settings.
 
 use crate::experiment::setting::{SettingError, first_broken};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whose displacement a field holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
     /// The model's: of the estimate, or of the best sample where none was made.
@@ -16,7 +17,7 @@ pub enum Source {
 }
 
 /// How displacement fields are made; the table `[fields]` of the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FieldSettings {
     /// Which fields are written with every result; any other is made when it is asked for.

@@ -2,14 +2,16 @@
 
 use crate::geometry::{Mni, Pre, RigidTransform};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
 /// The way down, as a word for how the patient lies or as a direction of the scanner.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "String", try_from = "String")]
+#[schemars(with = "String")]
 pub enum Head {
     /// On the back: down is towards the back of the head.
     Supine,

@@ -2,12 +2,13 @@
 
 use super::head::Head;
 use crate::experiment::setting::{SettingError, first_broken};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How a prediction is made; the table `[predict]` of the settings. What a patient's job has anyway (median of the effective
 /// density, Poisson's ratio, supports, skull, law and studies of the prior, element) is taken from `[resection]`, `[prior]`
 /// and `[estimate]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PredictSettings {
     /// How the head lies: supine, prone, left, right, sitting or the way down as `x,y,z` of the scanner. The first is the

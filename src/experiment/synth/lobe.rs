@@ -3,10 +3,11 @@
 
 use crate::geometry::{Mni, Position};
 use crate::segment::atlas::{Side, temporal_lobe};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A place of an operation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Lobe {
     /// From the temporal pole backwards.

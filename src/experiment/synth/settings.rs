@@ -2,11 +2,12 @@
 
 use super::lobe::Lobe;
 use crate::segment::atlas::Side;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// How the brain's sag after the resection is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SagKind {
     /// No movement: the post-operative brain is the pre-operative one with a hole.
@@ -18,7 +19,7 @@ pub enum SagKind {
 }
 
 /// Which scans were taken after gadolinium.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Contrast {
     /// Neither.
@@ -45,7 +46,7 @@ impl Contrast {
 }
 
 /// Everything that decides the bytes of a synthetic patient.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SynthSettings {
     /// Seed of anatomy, poses, bias and noise.

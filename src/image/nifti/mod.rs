@@ -22,10 +22,11 @@ use super::volume::{LabelMap, Mask, Volume};
 use crate::geometry::Native;
 use header::{Header, Layout};
 use nifti::{InMemNiftiVolume, IntoNdArray, NiftiType};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Choices that a file may leave open.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReadOptions {
     /// Which affine to believe when sform and qform disagree; `None` refuses such a file.

@@ -1,6 +1,7 @@
 //! A law on the uniaxial isochoric path, where it is fitted to measured curves and to samples of the prior: a meta-model.
 
 use super::stability::Stability;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The most parameters of a meta-model.
@@ -10,7 +11,7 @@ pub const MOST_PARAMETERS: usize = 3;
 pub type Slope = [f64; MOST_PARAMETERS];
 
 /// How to search for parameters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
     /// Exact Jacobians, tight tolerances, parameters where the law is stable at every stretch.

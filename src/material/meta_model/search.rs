@@ -4,6 +4,7 @@ use super::curve::MetaModel;
 use super::least_squares::{Bounds, Residuals, Solution, Tolerances, minimise};
 use crate::material::law::{Data, MOST_PARAMETERS, Material, Search, Slope, Stability, Start};
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -11,7 +12,7 @@ use thiserror::Error;
 pub const META_MODEL_LOG_OFFSET_PA: f64 = 1e-3;
 
 /// Settings of a fit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MetaModelSettings {
     /// How to search.

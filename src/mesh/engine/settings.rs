@@ -5,10 +5,11 @@ use super::error::EngineError;
 use super::process::Limits;
 use super::sizing::Sizing;
 use crate::mesh::optimise::OptimiseSettings;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How fine the mesh shall be.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshSize {
     /// About this many tets (within 15 %).
@@ -21,7 +22,7 @@ pub enum MeshSize {
 pub const MIDSAGITTAL: &str = "midsagittal";
 
 /// Labels that are cut in two by the plane x = 0 of the map's frame, so that tets conform to it: the falx.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MidplaneSplit {
     /// The labels.
@@ -31,10 +32,11 @@ pub struct MidplaneSplit {
 }
 
 /// Everything that decides a mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSettings {
     /// The engine; see [`super::EnginePrograms::preferred`].
+    #[schemars(with = "String")]
     pub engine: Engine,
     /// How fine.
     pub size: MeshSize,

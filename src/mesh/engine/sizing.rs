@@ -6,11 +6,12 @@ use crate::image::distance::signed_distance_mm;
 use crate::image::{Grid, Mask};
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::Point;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where edges shall be other than the target. With [`super::MeshSize::Cells`] the target itself is what gives that many
 /// tets. The lattice's cubes have these sizes to the nearest power of two; gmsh and TetGen follow inside a surface that does.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sizing {
     /// Inside labels.
@@ -20,7 +21,7 @@ pub struct Sizing {
 }
 
 /// Edges inside a label.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LabelEdge {
     /// The label.
@@ -30,7 +31,7 @@ pub struct LabelEdge {
 }
 
 /// Edges on both sides of the wall of a label.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallEdge {
     /// The label.

@@ -18,7 +18,7 @@ use super::label_field::LabelField;
 use flip::Limits;
 
 /// What the quality pass aims at.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OptimiseSettings {
     /// Dihedral angles are raised until all are at least this, in degrees.

@@ -11,6 +11,7 @@ use crate::geometry::{AffineTransform, Frame, Native, Position};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use velocity::{Cell, VectorField};
@@ -19,7 +20,7 @@ use velocity::{Cell, VectorField};
 const WIDE_MM: f64 = 6.0;
 
 /// How the atlas is deformed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeformableSettings {
     /// Resolutions in mm, coarse to fine.

@@ -1,10 +1,11 @@
 //! What steers a rigid registration.
 
 use super::RegisterError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How a rigid registration is done.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RigidSettings {
     /// Resolutions in mm, coarse to fine.

@@ -1,6 +1,6 @@
 //! The brain shift: how far, where, how much of it the model explains; landmarks against it.
 
-use super::super::html::{fixed, number};
+use super::super::html::{fixed, number, percent};
 use super::results::{Row, table, words};
 use crate::experiment::field::{BrainShift, Explained};
 use crate::experiment::landmarks::Evaluation;
@@ -34,7 +34,9 @@ pub fn in_a_sentence(shift: &BrainShift) -> String {
     let [x, y, z] = state.largest_at_mm.map(|v| fixed(v, 0));
     let share = shift.explained.as_ref().map_or_else(String::new, |e| format!(" {}", explained(e)));
     format!(
-        "The brain has moved by up to {} mm ({} mm in the median), most at ({x}, {y}, {z}) mm of the pre-operative scan.{share}",
+        "In the state {} the brain moves by up to {} mm ({} mm in the median), most at ({x}, {y}, {z}) mm of the pre-operative \
+         scan.{share}",
+        state.state,
         number(state.largest_mm, 2),
         number(state.median_mm, 2)
     )
@@ -42,11 +44,9 @@ pub fn in_a_sentence(shift: &BrainShift) -> String {
 
 fn explained(e: &Explained) -> String {
     match (e.share, e.share_sd) {
-        (Some(share), Some(sd)) => format!(
-            "The model explains {} \u{b1} {} % of the shift that the images show.",
-            fixed(100.0 * share, 0),
-            fixed(100.0 * sd, 0)
-        ),
+        (Some(share), Some(sd)) => {
+            format!("The model explains {} of the shift that the images show.", percent(share, sd))
+        }
         _ => format!(
             "Which share of the shift the model explains is not measurable: the images show {} mm, their noise is {} mm.",
             number(e.seen_rms_mm, 2),
@@ -106,7 +106,9 @@ mod tests {
         };
         assert!(said(None).contains("not measurable") && !said(None).contains('%'));
         assert!(
-            said(Some(0.8)).contains("80 \u{b1} 5 %") && said(Some(0.8)).contains("(10, \u{2212}20, 31)"),
+            said(Some(0.8)).contains("80 \u{b1} 5 %")
+                && said(Some(0.8)).contains("state estimate")
+                && said(Some(0.8)).contains("(10, \u{2212}20, 31)"),
             "{}",
             said(Some(0.8))
         );

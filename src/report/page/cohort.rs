@@ -4,10 +4,13 @@ use super::super::change_chart::{Change, ChangeChart, ChangePanel, Middle};
 use super::super::cohort::{Cohort, Row, Status};
 use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
-use super::results::{Row as Line, figures, set_name, table, words as cells};
+use super::results::{figures, set_name};
 use super::{Frame, Section, notice};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
+
+/// Sorting and filtering; without it the tables are as the program ordered them.
+const SCRIPT: &str = include_str!("../assets/cohort.js");
 
 impl Cohort {
     /// One HTML file beside the subjects' pages, to which it links.
@@ -18,15 +21,17 @@ impl Cohort {
             version: env!("CARGO_PKG_VERSION"),
         };
         let bodies = [
+            ("subjects", "Subjects", Some(self.subjects_section())),
             ("errors", "What deformation explains", self.errors_section()),
             ("samples", "Samples over the subjects", self.samples_section()),
-            ("subjects", "Subjects", Some(self.subjects_section())),
+            ("figures", "Figures", Some(self.figures_section())),
         ];
         let sections: Vec<Section> =
             bodies.into_iter().filter_map(|(id, heading, body)| Some(Section { id, heading, body: body? })).collect();
         let first = self.notices();
+        let scripts = html! { script { "\n" (PreEscaped(SCRIPT)) } "\n" };
         let above = html! { @if !first.is_empty() { (notice("warn", "Look here first", &first)) } };
-        frame.html(&above, &sections, "The page makes no request to any other place.", &html! {})
+        frame.html(&above, &sections, "The page makes no request to any other place.", &scripts)
     }
 
     /// Who did not end well, and who lies apart in what.
@@ -103,44 +108,107 @@ impl Cohort {
         })
     }
 
+    /// How every subject ended and what it comes down to, with the controls that hold for the figures, too.
     fn subjects_section(&self) -> Markup {
+        let mut verdicts: Vec<&str> = self.subjects.iter().map(said).collect();
+        verdicts.sort_unstable();
+        verdicts.dedup();
+        let head = ["subject", "ended", "verdict", "in a sentence", "warnings"].map(str::to_owned);
+        html! {
+            div class="controls" id="filters" hidden {
+                label for="filter-text" { "Subject or words" } input id="filter-text" type="search";
+                label for="filter-verdict" { "Verdict" }
+                select id="filter-verdict" {
+                    option value="" { "all" }
+                    @for verdict in &verdicts { option value=(verdict) { (verdict) } }
+                }
+                span {
+                    input id="filter-apart" type="checkbox";
+                    label for="filter-apart" { "Only those that lie apart or did not end well" }
+                }
+                output id="filter-said" for="filter-text filter-verdict filter-apart" {}
+            } "\n"
+            (sortable("Verdict of every subject", &head, &html! {
+                @for row in &self.subjects {
+                    tr data-subject=(row.participant_id) data-verdict=(said(row)) data-apart=(apart(row)) {
+                        th scope="row" { (linked(row)) }
+                        td class="words" { (row.status.name()) }
+                        td class="words" { (said(row)) }
+                        td class="words" { (row.sentence.as_deref().or(row.message.as_deref()).unwrap_or("–")) }
+                        td data-value=(row.warnings) { (row.warnings) }
+                    }
+                }
+            }, &html! {}))
+        }
+    }
+
+    /// All numbers of all subjects.
+    fn figures_section(&self) -> Markup {
         let mut head = vec!["subject".to_owned()];
         head.extend(self.columns.iter().map(|name| words(name)));
-        head.extend(["at the margin", "warnings"].map(str::to_owned));
-        let numbers = |from: &BTreeMap<String, f64>| -> Vec<String> {
-            let shown = |name: &String, v: f64| if name.ends_with("_sd_level") { fixed(v, 2) } else { number(v, 4) };
-            self.columns.iter().map(|name| from.get(name).map_or("–".to_owned(), |v| shown(name, *v))).collect()
+        let shown = |name: &String, v: f64| if name.ends_with("_sd_level") { fixed(v, 2) } else { number(v, 4) };
+        let cell = |from: &BTreeMap<String, f64>, name: &String| {
+            from.get(name).map_or_else(|| "–".to_owned(), |v| shown(name, *v))
         };
-        let line = |row: &Row| -> Line {
-            let name = &row.participant_id;
-            let linked = html! { a href={ (name) ".html" } { (name) } };
-            let answered = matches!(row.status, Status::NoOperation | Status::NotOnePerson);
-            let mut line = vec![if row.best_sample.is_some() || answered {
-                linked
-            } else {
-                html! { (name) }
-            }];
-            for (column, value) in self.columns.iter().zip(numbers(&row.figures)) {
-                let apart = row.outlying.contains(column);
-                line.push(html! { @if apart { strong { (value) " ▲" } } @else { (value) } });
+        let done = self.subjects.iter().filter(|row| !row.figures.is_empty()).count();
+        let body = html! {
+            @for row in &self.subjects {
+                tr data-subject=(row.participant_id) data-verdict=(said(row)) data-apart=(apart(row)) {
+                    th scope="row" { (linked(row)) }
+                    @for name in &self.columns {
+                        td data-value=[row.figures.get(name)] {
+                            @if row.outlying.contains(name) { strong { (cell(&row.figures, name)) " ▲" } }
+                            @else { (cell(&row.figures, name)) }
+                        }
+                    }
+                }
             }
-            let end = if row.status == Status::Done { row.verdict.unwrap_or("–") } else { row.status.name() };
-            line.extend(cells([end.replace(' ', "\u{a0}"), row.warnings.to_string()]));
-            (false, line)
         };
-        let mut rows: Vec<Line> = self.subjects.iter().map(line).collect();
-        for (name, values) in [("median", &self.median), ("MAD", &self.mad)] {
-            rows.push((true, cells([vec![name.to_owned()], numbers(values), vec!["–".to_owned(); 2]].concat())));
-        }
-        let done = self.subjects.iter().filter(|row| row.best_sample.is_some()).count();
+        let foot = html! {
+            @for (name, values) in [("median", &self.median), ("MAD", &self.mad)] {
+                tr class="best" {
+                    th scope="row" { (name) }
+                    @for column in &self.columns { td { (cell(values, column)) } }
+                }
+            }
+        };
         html! {
             p {
                 (done) " of " (self.subjects.len()) " subjects have figures. Subjects that did not end well come first, then \
                  those farthest from the median; ▲ marks a figure more than 3.5 robust standard deviations from it (1.483 times \
-                 the median absolute deviation, MAD). Moduli are those of the best sample."
+                 the median absolute deviation, MAD). A modulus stands only where the verdict claims one."
             } "\n"
-            (table("Best sample and errors per subject", &head, &rows))
+            (sortable("Figures of every subject", &head, &body, &foot))
         }
+    }
+}
+
+/// What a subject's row says it comes down to.
+fn said(row: &Row) -> &str {
+    row.verdict.unwrap_or_else(|| row.status.name())
+}
+
+fn apart(row: &Row) -> &'static str {
+    if row.status != Status::Done || !row.outlying.is_empty() { "yes" } else { "no" }
+}
+
+/// The subject's name, and the way to its page where it has one.
+fn linked(row: &Row) -> Markup {
+    let name = &row.participant_id;
+    html! { @if row.status.has_page() { a href={ (name) ".html" } { (name) } } @else { (name) } }
+}
+
+/// A table whose rows the page's script can sort and hide.
+fn sortable(caption: &str, head: &[String], body: &Markup, foot: &Markup) -> Markup {
+    html! {
+        div class="scroll" tabindex="0" role="region" aria-label=(caption) {
+            table class="sortable" {
+                caption { (caption) }
+                thead { tr { @for cell in head { th scope="col" { (cell) } } } }
+                tbody { (body) }
+                @if !foot.0.is_empty() { tfoot { (foot) } }
+            }
+        } "\n"
     }
 }
 

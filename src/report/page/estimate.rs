@@ -40,7 +40,6 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Marku
     let pair = |(name, along): (&String, &f64)| format!("{} {}", name.replace('_', " "), number(*along, 2));
     let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
     html! {
-        p { (estimate.verdict.sentence) }
         (table("Estimate", &head, &rows))
         @if let Some(models) = models { (table_of_models(models)) }
         p {

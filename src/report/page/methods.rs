@@ -1,7 +1,9 @@
 //! The methods paragraph, what to cite, and BibTeX.
 
-use super::super::html::count;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use super::super::html::{count, number};
+use super::results::tissue_name;
+use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome, SampleOutcome};
 use maud::{Markup, html};
 
 /// A work to cite.
@@ -57,25 +59,31 @@ const CGAL: Reference = Reference {
              {{CGAL Editorial Board}},\n  url    = {https://www.cgal.org}\n}",
 };
 
-/// What a reader of this outcome should cite, in the order of the text.
+/// What a reader of this outcome should cite, in the order of the text: the works whose methods were used.
 pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
-    let mut all = vec![GENERATIVE_MODEL, TEMPLATE];
+    let mut all = vec![TEMPLATE];
     if !outcome.registrations.is_empty() {
         all.push(MUTUAL_INFORMATION);
     }
     if outcome.mesh.as_ref().is_some_and(|m| m.engine == "cgal") {
         all.push(CGAL);
     }
+    if !outcome.samples.is_empty() || outcome.estimate.is_some() {
+        all.push(GENERATIVE_MODEL);
+    }
     all
 }
 
-/// The paragraph, the references and their BibTeX.
+/// The paragraph, what was found, the references and their BibTeX.
 pub fn section(outcome: &ExperimentOutcome) -> Markup {
     let references = references(outcome);
     let bibtex: Vec<&str> = references.iter().map(|r| r.bibtex).collect();
     html! {
         p { "Text that may be used as it stands:" }
-        blockquote { (paragraph(outcome)) } "\n"
+        blockquote id="methods-text" {
+            p { (paragraph(outcome)) }
+            p { "Result. " (outcome.verdict.sentence) }
+        } "\n"
         h3 { "References" }
         ol class="references" { @for r in &references { li id={ "ref-" (r.key) } { (r.text) } } }
         details {
@@ -93,18 +101,21 @@ fn list(words: &[String]) -> String {
     }
 }
 
+/// A mark that leads to a reference.
+fn cite(references: &[Reference], wanted: Reference) -> Markup {
+    let number = references.iter().position(|other| *other == wanted).map_or(0, |n| n + 1);
+    html! { a href={ "#ref-" (wanted.key) } { "[" (number) "]" } }
+}
+
+/// Only what was done: a step that was not reached has no sentence.
 fn paragraph(outcome: &ExperimentOutcome) -> Markup {
     let references = references(outcome);
-    let cite = |r: Reference| {
-        let number = references.iter().position(|other| *other == r).map_or(0, |n| n + 1);
-        html! { a href={ "#ref-" (r.key) } { "[" (number) "]" } }
-    };
-    let tissues: Vec<String> = outcome.tissues.iter().map(|t| t.replace('_', " ")).collect();
-    let mut laws: Vec<String> = outcome.samples.iter().flat_map(|s| s.laws.values().map(|l| l.law.clone())).collect();
-    laws.sort();
-    laws.dedup();
+    let cite = |wanted| cite(&references, wanted);
+    let is_estimate = |s: &&SampleOutcome| outcome.estimate.is_some() && s.id == ESTIMATE;
+    let swept = outcome.samples.iter().filter(|s| !is_estimate(s)).count();
+    let simulated = swept > 0 || outcome.estimate.is_some();
     html! {
-        "Simulations were made with hgm " (env!("CARGO_PKG_VERSION")) ", research software"
+        "Processing was done with hgm " (env!("CARGO_PKG_VERSION")) ", research software"
         @match outcome.kind {
             ExperimentKind::Phantom => { ", on the MNI152NLin2009aSym template " (cite(TEMPLATE)) ". " },
             ExperimentKind::Prediction => {
@@ -117,27 +128,78 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
                 @if !outcome.registrations.is_empty() {
                     ", maximising Mattes mutual information " (cite(MUTUAL_INFORMATION))
                 }
-                ", so that sizes stay the patient's. Resected tissue was removed from the mesh. "
+                ", so that sizes stay the patient's. "
+                @if outcome.answer.is_some() { "No mesh was made and nothing was simulated. " }
             },
         }
         @if let Some(mesh) = &outcome.mesh {
+            @if outcome.kind == ExperimentKind::Resection { "Resected tissue was removed from the mesh. " }
             "The brain was meshed with "
-            @if mesh.engine == "cgal" { "CGAL " (cite(CGAL)) } @else { "its engine " (mesh.engine) }
+            @if mesh.engine == "cgal" { "CGAL " (cite(CGAL)) } @else { "the engine " (mesh.engine) " of hgm" }
             " into " (count(mesh.tets)) " tetrahedra and " (count(mesh.nodes)) " nodes. "
         }
-        @if !tissues.is_empty() {
-            "Material parameters of " (list(&tissues)) " were sampled at " (outcome.samples.len())
-            " points of a Gaussian-process model of the literature"
-            @if !laws.is_empty() { " through " (list(&laws)) " meta-models" }
-            " " (cite(GENERATIVE_MODEL)) ". "
+        @if (simulated || outcome.kind == ExperimentKind::Prediction) && !outcome.loads.is_empty() {
+            "Loads: " (list(&outcome.loads)) ". "
         }
-        @if !outcome.loads.is_empty() { "Loads: " (list(&outcome.loads)) ". " }
         @if outcome.kind == ExperimentKind::Prediction {
             "Unknowns were drawn by Halton's sequence from the priors stated above " (cite(GENERATIVE_MODEL))
-            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities."
-        } @else {
+            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities. "
+        }
+        @if swept > 0 { (of_samples(outcome, swept, &cite(GENERATIVE_MODEL))) }
+        @if let Some(estimate) = &outcome.estimate { (of_estimate(outcome, estimate, &cite(GENERATIVE_MODEL))) }
+        @if !outcome.held_shear_modulus_pa.is_empty() && simulated {
+            "Held at the mean of the prior of abnormal tissue: "
+            (list(&outcome.held_shear_modulus_pa.keys().map(|name| tissue_name(name)).collect::<Vec<_>>())) ". "
+        }
+    }
+}
+
+fn tissues(outcome: &ExperimentOutcome) -> String {
+    list(&outcome.tissues.iter().map(|name| tissue_name(name)).collect::<Vec<_>>())
+}
+
+/// The laws that were fitted to the prior.
+fn laws(outcome: &ExperimentOutcome) -> String {
+    let mut laws: Vec<String> = outcome.samples.iter().flat_map(|s| s.laws.values().map(|l| l.law.clone())).collect();
+    laws.sort();
+    laws.dedup();
+    list(&laws)
+}
+
+fn of_samples(outcome: &ExperimentOutcome, samples: usize, model: &Markup) -> Markup {
+    let laws = laws(outcome);
+    let points = if samples == 1 { "point" } else { "points" };
+    let failed = outcome.samples.iter().filter(|s| !s.converged).count();
+    html! {
+        @if !outcome.reference_shear_modulus_pa.is_empty() {
+            "The reference is a simulation with known shear moduli: "
+            (list(&outcome.reference_shear_modulus_pa.iter()
+                .map(|(name, modulus)| format!("{} Pa for {}", number(*modulus, 4), tissue_name(name))).collect::<Vec<_>>()))
+            ". "
+        }
+        "Material parameters of " (tissues(outcome)) " were sampled at " (samples) " " (points)
+        " of a Gaussian-process model of the literature"
+        @if !laws.is_empty() { " through " (laws) " meta-models" }
+        " " (model) ". "
+        @if failed > 0 { (failed) " of the simulations reached no equilibrium. " }
         "Each static equilibrium was compared with " (outcome.reference)
-        " by the root mean square over nodes of the distance, RMSE = √(Σ|u − u" sub { "ref" } "|² / S)."
+        " by the root mean square over nodes of the distance, RMSE = √(Σ|u − u" sub { "ref" } "|² / S). "
+    }
+}
+
+fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &Markup) -> Markup {
+    let laws = laws(outcome);
+    html! {
+        "Shear moduli of " (tissues(outcome)) " were estimated by least squares with solver sensitivities from "
+        (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from a \
+         Gaussian-process model of the literature " (model)
+        @if !laws.is_empty() { ", with " (laws) " laws" }
+        "; intervals are 95 % intervals of the posterior. "
+        @if estimate.taken_out_rms_mm.is_some() {
+            "The registration's own error was measured on the estimate's state and taken out of what it saw. "
+        }
+        @if let Some(models) = &outcome.comparison {
+            (models.candidates.len()) " models were held against each other by their evidence. "
         }
     }
 }

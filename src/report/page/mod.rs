@@ -3,6 +3,7 @@
 mod brain_shift;
 mod cohort;
 mod estimate;
+mod glance;
 mod methods;
 mod parts;
 mod prediction;
@@ -15,6 +16,7 @@ pub use results::set_name;
 use super::chart;
 use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
+use super::glance_figure::GlanceFigure;
 use super::html::{png_address, without_control_characters};
 use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
@@ -37,6 +39,8 @@ pub struct CaptionedPicture {
     pub caption: String,
     /// One sentence for those who cannot see it.
     pub description: String,
+    /// What of the patient lies on the left and on the right side: `R`, `L`; absent where the picture itself says so.
+    pub sides: Option<[&'static str; 2]>,
 }
 
 /// The error at every node of the best sample.
@@ -71,6 +75,8 @@ pub struct PredictionFigure {
 /// Everything a page can show. What is absent is left out, and said so in `absent`.
 #[derive(Clone, Debug, Default)]
 pub struct CasePage {
+    /// Whose page it is: `sub-01`, or the name of the case folder.
+    pub subject: String,
     /// Heading: `Resection` or a name without any patient's data.
     pub title: String,
     /// Version of the program.
@@ -87,7 +93,9 @@ pub struct CasePage {
     pub prediction_figure: Option<PredictionFigure>,
     /// The brain shift in numbers.
     pub brain_shift: Option<BrainShift>,
-    /// The same on a slice.
+    /// Slices for the first screen.
+    pub glance: Option<GlanceFigure>,
+    /// The brain shift on a slice.
     pub shift_figure: Option<ShiftFigure>,
     /// Landmarks against it.
     pub landmarks: Option<Evaluation>,
@@ -207,14 +215,18 @@ fn notice(class: &str, heading: &str, items: &[String]) -> Markup {
 impl CasePage {
     /// The whole page.
     pub fn to_html(&self) -> String {
-        let frame = Frame { title: &self.title, kicker: "brain deformation report", version: &self.version };
+        let title =
+            if self.subject.is_empty() { self.title.clone() } else { format!("{} · {}", self.subject, self.title) };
+        let frame = Frame { title: &title, kicker: "brain deformation report", version: &self.version };
         let scripts = html! {
             script { "\n" (PreEscaped(RATING_SCRIPT)) } "\n"
             @if let Some(viewer) = &self.viewer { (viewer.scripts()) }
         };
-        let note = "The images are masked to the brain; the page holds no names, dates or places, and makes no request \
-                    to any other place.";
-        frame.html(&self.warnings_box(), &self.sections(), note, &scripts)
+        let note = "The images are masked to the brain; of the scans' headers the page holds no names, dates or places (the \
+                    heading is the folder's name), and it makes no request to any other place.";
+        let glance = glance::block(self.outcome.as_ref(), self.glance.as_ref(), self.brain_shift.as_ref());
+        let first = html! { (glance) (self.warnings_box()) };
+        frame.html(&first, &self.sections(), note, &scripts)
     }
 
     fn sections(&self) -> Vec<Section> {
@@ -229,9 +241,9 @@ impl CasePage {
         let expected = self.prediction_figure.as_ref();
         let expected = expected.map(|f| html! { (shift_pictures(&f.shift)) (shift_pictures(&f.spread)) });
         add("expected", "Expected brain shift", self.prediction.as_ref().map(|p| prediction::section(p, expected)));
-        add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         let compared = outcome.filter(|o| o.kind != ExperimentKind::Prediction);
         add("summary", "Summary", compared.map(results::summary));
+        add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
@@ -259,7 +271,7 @@ impl CasePage {
             0 => html! {
                 div class="notice calm" id="warnings" role="note" {
                     h2 { "No warnings" }
-                    p { "Every stage ran within its checks. Look at the registration and the masks all the same." }
+                    p { "No stage raised one. Look at the registration and the masks all the same." }
                 } "\n"
             },
             1 => notice("warn", "1 warning", &items),
@@ -324,12 +336,13 @@ impl maud::Render for Given {
 }
 
 /// Heading of a page by what was run.
-pub fn title_of(kind: Option<ExperimentKind>) -> &'static str {
-    match kind {
-        Some(ExperimentKind::Phantom) => "Phantom: a known deformation, found again",
-        Some(ExperimentKind::Prediction) => "Brain shift expected of a planned resection",
-        Some(ExperimentKind::Resection) => "Brain deformation after resection",
-        None => "Prepared case",
+pub fn title_of(outcome: Option<&ExperimentOutcome>) -> &'static str {
+    match outcome.map(|o| (o.kind, o.samples.is_empty(), o.answer)) {
+        Some((ExperimentKind::Phantom, ..)) => "A phantom: known moduli, looked for again",
+        Some((ExperimentKind::Prediction, ..)) => "Brain shift expected of a planned resection",
+        Some((ExperimentKind::Resection, true, Some(_))) => "Two scans compared",
+        Some((ExperimentKind::Resection, false, _)) => "Brain deformation after resection",
+        Some((ExperimentKind::Resection, true, None)) | None => "Prepared case",
     }
 }
 
@@ -347,7 +360,12 @@ fn pictures(pictures: &[CaptionedPicture]) -> Markup {
             div class="pictures" {
                 @for p in pictures {
                     figure {
-                        img src=(png_address(&p.png)) width=(p.size[0]) height=(p.size[1]) alt=(p.description);
+                        div class="picture" {
+                            img src=(png_address(&p.png)) width=(p.size[0]) height=(p.size[1]) alt=(p.description);
+                            @if let Some([left, right]) = p.sides {
+                                span class="side" { (left) } span class="side right" { (right) }
+                            }
+                        }
                         figcaption { (p.caption) }
                     }
                 }
@@ -358,7 +376,10 @@ fn pictures(pictures: &[CaptionedPicture]) -> Markup {
 
 fn error_section(map: &ErrorMap) -> Markup {
     html! {
-        p { "Distance at every node between the best sample and the target. Grey: no target there." } "\n"
+        p {
+            "Distance at every node between the best sample and the target. Grey: no target there. The colours end at the 95th \
+             percentile."
+        } "\n"
         (pictures(&map.pictures))
         div class="bar-row" { (PreEscaped(chart::colour_bar(&map.scale))) } "\n"
         div class="charts" {

@@ -10,13 +10,13 @@ fn axis_letter(plane: Plane) -> &'static str {
 }
 
 /// One tile as an SVG of its pictures and outlines; `layers` names the style class of every picture.
-fn tile(figure: &TileFigure, layers: &[&str], what: &str) -> Markup {
+pub fn tile_figure(figure: &TileFigure, layers: &[&str], what: &str) -> Markup {
     let [w, h] = figure.tile.size.map(|n| 10 * n);
     let plane = figure.tile.plane;
     let at = format!("{} = {} mm", axis_letter(plane), number_mm(figure.tile.at_mm));
     let seen: Vec<&str> = figure.outlines.iter().map(|o| o.0.name()).collect();
     let outlined = if seen.is_empty() { String::new() } else { format!(", outlined: {}", seen.join(", ")) };
-    let (left, right) = plane.sides();
+    let [left, right] = plane.sides();
     html! {
         figure class="tile" {
             svg viewBox={ "0 0 " (w) " " (h) } role="img" aria-label={ (plane.name()) " slice at " (at) ", " (what) (outlined) } {
@@ -38,7 +38,8 @@ fn number_mm(mm: f64) -> String {
     if mm < 0.0 { format!("\u{2212}{}", -mm) } else { format!("{}", mm + 0.0) }
 }
 
-fn legend(structures: &[Structure]) -> Markup {
+/// What the outlines are.
+pub fn legend(structures: &[Structure]) -> Markup {
     html! {
         ul class="legend" aria-label="Outlines" {
             @for s in structures {
@@ -70,7 +71,7 @@ fn rows(tiles: &[TileFigure], layers: &[&str], what: &str, heading: Heading) -> 
                     Heading::Third => h3 class="plane" { (plane.name()) },
                     Heading::Fourth => h4 class="plane" { (plane.name()) },
                 }
-                div class="tiles" { @for figure in row { (tile(figure, layers, what)) } }
+                div class="tiles" { @for figure in row { (tile_figure(figure, layers, what)) } }
             }
         }
     }
@@ -169,6 +170,16 @@ pub fn rating() -> Markup {
                 output id="rating-said" for="rating-note" {}
             }
         } "\n"
+    }
+}
+
+/// A key figure with its name and a note below it.
+pub fn tile(name: &str, value: &Markup, note: &str) -> Markup {
+    html! {
+        div {
+            dt { (name) }
+            dd { (value) @if !note.is_empty() { span class="note" { (note) } } }
+        }
     }
 }
 

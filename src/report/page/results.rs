@@ -3,11 +3,11 @@
 use super::super::chart::{DataPoint, HeatMap, LineChart, Rule, Series, colour_bar};
 use super::super::colour::ColourScale;
 use super::super::html::{count, fixed, number};
-use super::parts::quantity;
+use super::parts::{quantity, tile};
 use crate::experiment::outcome::{
-    ExperimentKind, ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
+    ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
 };
-use crate::experiment::verdict::Finding;
+use crate::experiment::verdict::{Claim, pa, range};
 use maud::{Markup, PreEscaped, html};
 
 /// A set's name for readers.
@@ -20,7 +20,8 @@ pub fn set_name(set: &str) -> String {
     }
 }
 
-fn tissue_name(tissue: &str) -> String {
+/// A tissue's name for readers.
+pub fn tissue_name(tissue: &str) -> String {
     tissue.replace('_', " ")
 }
 
@@ -62,17 +63,7 @@ pub fn table(caption: &str, head: &[String], rows: &[Row]) -> Markup {
     }
 }
 
-/// A key figure with its name and a note below it.
-fn tile(name: &str, value: &Markup, note: &str) -> Markup {
-    html! {
-        div {
-            dt { (name) }
-            dd { (value) @if !note.is_empty() { span class="note" { (note) } } }
-        }
-    }
-}
-
-/// Key figures and one sentence on what they say.
+/// Key figures, what speaks for the verdict, and what was compared.
 pub fn summary(outcome: &ExperimentOutcome) -> Markup {
     let mut tiles: Vec<Markup> = Vec::new();
     if let Some(best) = outcome.best() {
@@ -84,16 +75,12 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
                 .map_or_else(String::new, |rest| format!("undeformed: {} mm", number(*rest, 3)));
             tiles.push(tile(&format!("RMSE, {}", set_name(&set)), &quantity(Some(rmse), 3, "mm"), &note));
         }
-        // A stiffness that is not claimed is no key figure.
-        let claimed = outcome.kind == ExperimentKind::Phantom || outcome.verdict.finding.has_stiffness();
-        for (tissue, modulus) in best.shear_modulus_pa.iter().filter(|_| claimed) {
-            let truth = outcome.reference_shear_modulus_pa.get(tissue);
-            let truth = truth.map(|t| format!("reference: {} Pa", number(*t, 5)));
-            let level = best.sd_levels.get(tissue).map(|level| format!("{} SD of the prior", signed(*level)));
-            let note = truth.or(level).unwrap_or_default();
-            let name = format!("Shear modulus, {}", tissue_name(tissue));
-            tiles.push(tile(&name, &quantity(Some(*modulus), 4, "Pa"), &note));
-        }
+    }
+    // What the verdict says of them: a range where samples cannot be told apart, nothing where none is claimed.
+    tiles.extend(outcome.verdict.moduli.iter().filter_map(|(tissue, claim)| modulus(tissue, claim)));
+    for (tissue, truth) in &outcome.reference_shear_modulus_pa {
+        let name = format!("Shear modulus of the reference, {}", tissue_name(tissue));
+        tiles.push(tile(&name, &quantity(Some(*truth), 4, "Pa"), "what went in"));
     }
     for (tissue, modulus) in &outcome.held_shear_modulus_pa {
         let name = format!("Shear modulus, {}", tissue_name(tissue));
@@ -122,13 +109,31 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
         tiles.push(tile("Tetrahedra", &html! { (count(mesh.tets)) }, &note));
     }
     html! {
-        @if let Some(answer) = outcome.answer {
-            p class="lead" { strong { (answer.sentence()) } } "\n"
-        } @else {
-            p class="lead" { (sentence(outcome)) } "\n"
+        @if let Some(part) = compared(outcome) { p { (part) } "\n" }
+        @if !outcome.verdict.reasons.is_empty() {
+            p { "What speaks for the verdict:" }
+            ul { @for reason in outcome.verdict.because() { li { (reason) } } } "\n"
         }
         dl class="figures" { @for tile in tiles { (tile) } } "\n"
     }
+}
+
+/// What is said of a tissue's modulus; `None` where nothing is.
+pub fn modulus(tissue: &str, claim: &Claim) -> Option<Markup> {
+    let name = format!("Shear modulus, {}", tissue_name(tissue));
+    let (value, note) = match claim {
+        Claim::Interval { mode_pa, interval_95_pa } => {
+            (pa(*mode_pa), format!("95 % interval: {}", range(*interval_95_pa)))
+        }
+        Claim::Above { bound_pa } => (format!("> {}", pa(*bound_pa)), "with 95 % certainty".to_owned()),
+        Claim::Range { range_pa } => {
+            let said = range(*range_pa);
+            let note = if said.contains(" to ") { "cannot be told apart" } else { "the best sample" };
+            (said.trim_end_matches(" Pa").to_owned(), note.to_owned())
+        }
+        Claim::Withheld => return None,
+    };
+    Some(tile(&name, &html! { (value) span class="unit" { " Pa" } }, &note))
 }
 
 fn volume_tiles(v: &ResectionVolumes) -> Vec<Markup> {
@@ -159,38 +164,20 @@ fn signed_fixed(percent: f64) -> String {
     if percent > 0.0 { format!("+{}", fixed(percent, 1)) } else { fixed(percent, 1) }
 }
 
+/// A level of the prior: two decimals at most, and none that say nothing.
 fn signed(level: f64) -> String {
-    if level > 0.0 { format!("+{level}") } else { format!("{}", level + 0.0).replace('-', "\u{2212}") }
+    let text = fixed(level, 2);
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if level > 0.0 { format!("+{text}") } else { text.to_owned() }
 }
 
-fn sentence(outcome: &ExperimentOutcome) -> String {
+/// How many simulations there are, and what they were held against; nothing where none was made.
+fn compared(outcome: &ExperimentOutcome) -> Option<String> {
+    let all = outcome.samples.len();
     let converged = outcome.samples.iter().filter(|s| s.converged).count();
-    let tally = format!("{converged} of {} simulations converged.", outcome.samples.len());
-    if outcome.kind == ExperimentKind::Resection && outcome.verdict.finding != Finding::Nothing {
-        return format!("{} {tally} Compared with: {}.", outcome.verdict.sentence, outcome.reference);
-    }
-    let Some(best) = outcome.best() else {
-        return format!("{tally} There is no best sample. Compared with: {}.", outcome.reference);
-    };
-    let best_id = &best.id;
-    let verdict = match outcome.kind {
-        ExperimentKind::Phantom => format!("The sample nearest to the reference is {best_id}."),
-        ExperimentKind::Prediction => String::new(),
-        ExperimentKind::Resection => {
-            let sets = outcome.rmse_sets();
-            let gain = sets.iter().find_map(|set| Some((set, outcome.rest_rmse_mm.get(set)?, best.rmse_mm.get(set)?)));
-            gain.map_or_else(String::new, |(set, rest, rmse)| {
-                let percent = number((100.0 * (rest - rmse) / rest).abs(), 2);
-                let set = set_name(set);
-                if rmse < rest {
-                    format!("The best sample, {best_id}, takes away {percent} % of the error at the {set}.")
-                } else {
-                    format!("The best sample, {best_id}, does not come nearer than no deformation at the {set}.")
-                }
-            })
-        }
-    };
-    format!("{tally} {verdict} Compared with: {}.", outcome.reference)
+    let reference = &outcome.reference;
+    let simulations = if all == 1 { "simulation" } else { "simulations" };
+    (all > 0).then(|| format!("{converged} of {all} {simulations} converged. Compared with: {reference}."))
 }
 
 /// Registrations in numbers.

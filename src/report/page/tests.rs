@@ -49,14 +49,20 @@ fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
             ..RegistrationOutcome::default()
         }],
         loads: vec!["gravity 9.81 m/s² towards −z".to_owned()],
+        reference_shear_modulus_pa: match kind {
+            ExperimentKind::Phantom => map(vec![("grey_matter", 880.0)]),
+            ExperimentKind::Resection | ExperimentKind::Prediction => BTreeMap::new(),
+        },
         warnings: vec!["</script><img src=x>: the cavity touches the brain's edge".to_owned()],
         ..ExperimentOutcome::default()
     }
 }
 
 fn page(outcome: ExperimentOutcome) -> CasePage {
+    let outcome = outcome.with_verdict();
     CasePage {
-        title: title_of(Some(outcome.kind)).to_owned(),
+        subject: "sub-07".to_owned(),
+        title: title_of(Some(&outcome)).to_owned(),
         version: "0.1.0".to_owned(),
         outcome: Some(outcome),
         settings_toml: Some("a = \"</pre><script>alert(1)</script>\"".to_owned()),
@@ -72,6 +78,76 @@ fn warnings_come_before_the_summary_and_markup_in_them_is_text() {
     assert!(!html.contains("<img src=x>") && html.contains("&lt;img src=x&gt;"));
     assert!(!html.contains("<script>alert") && html.contains("surfaces &lt;after&gt; surgery"));
     assert!(html.contains("1 warning<"));
+}
+
+/// What a reader sees as text: no scripts, styles, data, and no works by other people.
+fn shown_texts(html: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    let mut rest = html;
+    while let Some(open) = rest.find('<') {
+        texts.push(rest[..open].trim().to_owned());
+        rest = &rest[open..];
+        let whole =
+            ["<script", "<style", "<pre", "<ol class=\"references\""].into_iter().find(|tag| rest.starts_with(tag));
+        let end = whole.map_or(rest.find('>').map(|at| at + 1), |tag| {
+            let close = format!("</{}", tag[1..].split(' ').next().unwrap_or_default());
+            rest.find(&close)
+        });
+        rest = &rest[end.unwrap_or(rest.len())..];
+    }
+    texts.retain(|text| !text.is_empty());
+    texts
+}
+
+/// Significant digits of every number in a text; zeros at the end of a whole number are none.
+fn digits(text: &str) -> Vec<usize> {
+    let joined = text.replace(['\u{2009}', ','], "");
+    let numbers = joined.split(|c: char| !c.is_ascii_digit() && c != '.').map(|n| n.trim_matches('.'));
+    let significant = |number: &str| {
+        let bare = number.trim_start_matches(['0', '.']);
+        let kept = if number.contains('.') { bare } else { bare.trim_end_matches('0') };
+        kept.chars().filter(char::is_ascii_digit).count()
+    };
+    numbers.filter(|n| !n.is_empty()).map(significant).collect()
+}
+
+#[test]
+fn no_number_of_the_page_has_more_than_five_significant_digits() {
+    assert_eq!(digits("152\u{2009}052 of 0.001234 and 1,370.0 or 2.579432"), [6, 4, 5, 7]);
+    let long = |n: usize| 1.234_567_891_2 * (n + 1) as f64;
+    for kind in [ExperimentKind::Phantom, ExperimentKind::Resection] {
+        let mut outcome = outcome(kind);
+        for (n, sample) in outcome.samples.iter_mut().enumerate() {
+            sample.sd_levels = map(vec![("grey_matter", -0.333_333_333_3 * long(n))]);
+            sample.shear_modulus_pa = map(vec![("grey_matter", 317.412_345_67 * long(n))]);
+            sample.rmse_mm = map(vec![("margin", long(n)), ("all", long(n)), ("ventricle", 0.1 * long(n))]);
+            sample.displacement_max_mm = Some(long(n));
+        }
+        outcome.noise_floor = Some(NoiseFloor { at_rest_mm: Some(2.579_123_4), ..NoiseFloor::default() });
+        outcome.volumes = Some(ResectionVolumes {
+            ventricle_before_cc: Some(20.123_456_7),
+            ventricle_after_cc: Some(24.987_654_3),
+            midline_shift_mm: Some(-1.753_219_8),
+            ..ResectionVolumes::default()
+        });
+        let html = page(outcome).to_html();
+        let texts = shown_texts(&html);
+        assert!(texts.len() > 100);
+        for text in texts {
+            assert!(digits(&text).iter().all(|n| *n <= 5), "{text}");
+        }
+    }
+}
+
+#[test]
+fn the_first_screen_has_subject_verdict_and_at_most_four_numbers_before_the_warnings() {
+    let html = page(outcome(ExperimentKind::Resection)).to_html();
+    let at = |what: &str| html.find(what).unwrap_or_else(|| panic!("{what} is not there"));
+    assert!(html.contains("<title>sub-07 · ") && html.contains("<h1>sub-07 · "));
+    assert!(at("<h1>") < at("id=\"verdict\"") && at("id=\"verdict\"") < at("id=\"warnings\""));
+    assert!(at("id=\"warnings\"") < at("<section"));
+    let first = &html[at("id=\"glance\"")..at("id=\"warnings\"")];
+    assert!((1..=4).contains(&first.matches("<dt>").count()), "{first}");
 }
 
 #[test]
@@ -91,7 +167,7 @@ fn every_sample_and_the_rest_state_are_in_the_table() {
         assert!(html.contains(&format!("sample-{n:02}")));
     }
     assert!(html.contains("undeformed") && html.contains("sample-04 · best"));
-    assert!(html.contains("takes away") && html.contains("10.1007/s11548-020-02284-y"));
+    assert!(html.contains("Better than rest") && html.contains("10.1007/s11548-020-02284-y"));
 }
 
 #[test]
@@ -115,7 +191,7 @@ fn a_worse_best_sample_is_not_praised() {
     let mut outcome = outcome(ExperimentKind::Resection);
     outcome.rest_rmse_mm = map(vec![("margin", 0.1), ("ventricle", 0.1)]);
     let html = page(outcome).to_html();
-    assert!(html.contains("does not come nearer than no deformation") && !html.contains("takes away"));
+    assert!(html.contains("further away than rest") && !html.contains("Better than rest"), "{html}");
 }
 
 #[test]
@@ -149,6 +225,7 @@ fn the_same_case_gives_the_same_bytes_and_every_id_once() {
 fn an_empty_case_still_gives_a_page_that_says_what_is_absent() {
     let page = CasePage {
         title: title_of(None).to_owned(),
+        // No case has been begun: there is no verdict either.
         absent: vec!["samples: sim/outcome.json is not there".to_owned()],
         ..CasePage::default()
     };

@@ -92,12 +92,12 @@ pub fn subject(
     Ok(case)
 }
 
-/// What is known of a subject for the table of all.
+/// What is known of a subject for the table of all; `cases` is below which the case folders lie.
 ///
 /// # Errors
 /// An outcome or a log that is damaged.
-pub fn member(out: &Path, subject: &str) -> Result<Member, MemberError> {
-    let case = case_folder(out, subject);
+pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, MemberError> {
+    let case = case_folder(cases, subject);
     let read = |file: &str| std::fs::read_to_string(case.join(file)).ok();
     let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
     let outcome = read(layout::OUTCOME).map(|text| ExperimentOutcome::from_json(&text, &shown));

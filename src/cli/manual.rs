@@ -1,0 +1,183 @@
+//! The command line as help, man pages and completions show it: commands by task, options under headings, and what a script
+//! needs to know besides (exit codes, variables of the environment).
+
+use crate::workflow::known;
+use clap::{Arg, ArgAction, Command};
+
+/// The commands by what one wants to do; one that stands in no list comes last, under [`OTHERS`].
+const TASKS: [(&str, &[&str]); 6] = [
+    (
+        "A patient, from scans to page",
+        &["run", "demo", "prep", "sweep", "reduce", "estimate", "compare", "predict", "report"],
+    ),
+    ("Many patients", &["bids"]),
+    ("Carry to the other scan, and check", &["warp", "evaluate"]),
+    ("One step alone", &["register", "segment", "mesh", "simulate"]),
+    ("Materials and validation", &["gp", "law", "phantom", "synth"]),
+    ("The program itself", &["doctor", "settings", "why", "layout", "schema", "completions", "man", "help"]),
+];
+const OTHERS: &str = "More";
+
+/// Heading of the options that every command has.
+pub const COMMON: &str = "Common";
+
+/// Where common options begin: behind all that a command has itself.
+const COMMON_ORDER: usize = 900;
+
+/// Columns of the list of commands.
+const WIDTH: usize = 100;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  failed: the computation broke down, or a file could not be written
+  2  usage: the command line cannot be understood
+  3  input rejected: the message names file, field and remedy; nothing was written
+  4  computed (outputs kept), but not to be believed: no operation is seen, the scans do not show one person, or a
+     boundary set is implausible
+  128 + N  ended by signal N; the same command goes on where it was";
+
+/// The whole command line, as it is parsed and shown.
+pub fn command(command: Command) -> Command {
+    let after =
+        format!("{EXIT_CODES}\n\n{}\n\n{}", environment(), "`hgm COMMAND --help` shows all options with an example.");
+    let commands = by_task(&command);
+    let mut place = COMMON_ORDER;
+    let command = command.mut_args(|arg| {
+        place += 1;
+        if arg.is_global_set() { arg.help_heading(COMMON).display_order(place) } else { arg }
+    });
+    let command = command.mut_subcommands(|sub| told_of_codes(sub, &after)).disable_help_flag(true).arg(help());
+    let version = Arg::new("version").short('V').long("version").action(ArgAction::Version).help("Print the version");
+    let command = command.disable_version_flag(true).arg(version.help_heading(COMMON).display_order(COMMON_ORDER + 98));
+    command
+        .help_template(format!(
+            "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}{COMMON}:\n{{options}}\n\n{{after-help}}"
+        ))
+        .after_help(after)
+}
+
+/// The variables that hgm reads.
+fn environment() -> String {
+    let mut text = String::from(
+        "Environment:\n  NO_COLOR  no colours on a terminal\n  PATH      where optional programs are looked for",
+    );
+    for (name, variable) in known().filter_map(|known| Some((known.name, known.variable?))) {
+        text += &format!("\n  {variable}  the program {name}, wherever it lies");
+    }
+    text
+}
+
+/// A subcommand with exit codes and variables at the end of its long help and its man page, and so on downwards.
+fn told_of_codes(command: Command, after: &str) -> Command {
+    let command = command.mut_subcommands(|sub| told_of_codes(sub, after));
+    command.after_long_help(after.to_owned()).disable_help_flag(true).arg(help())
+}
+
+/// The option that asks for this text.
+fn help() -> Arg {
+    let arg = Arg::new("help").short('h').long("help").action(ArgAction::Help).help("Print help (-h: a summary)");
+    arg.help_heading(COMMON).display_order(COMMON_ORDER + 99)
+}
+
+/// The list of commands, each with its one line.
+fn by_task(command: &Command) -> String {
+    let listed = |name: &str| TASKS.iter().any(|(_, names)| names.contains(&name));
+    let rest: Vec<&str> = command.get_subcommands().map(Command::get_name).filter(|name| !listed(name)).collect();
+    let mut text = String::new();
+    for (heading, names) in TASKS.into_iter().chain([(OTHERS, rest.as_slice())]) {
+        let lines: String = names.iter().filter_map(|name| line(command, name)).collect();
+        if !lines.is_empty() {
+            text += &format!("{heading}:\n{lines}\n");
+        }
+    }
+    text
+}
+
+fn line(command: &Command, name: &str) -> Option<String> {
+    let about = match name {
+        "help" => "Print the help of a command".to_owned(),
+        _ => command.find_subcommand(name)?.get_about()?.to_string(),
+    };
+    let indent = 14;
+    let mut text = format!("  {name:<12}");
+    let mut column = indent;
+    for (n, word) in about.split_whitespace().enumerate() {
+        if column + word.chars().count() + 1 > WIDTH {
+            text += &format!("\n{:indent$}", "");
+            column = indent;
+        } else if n > 0 {
+            text.push(' ');
+            column += 1;
+        }
+        text += word;
+        column += word.chars().count();
+    }
+    Some(text + "\n")
+}
+
+/// Where a mistyped command is the name of a command below another one: `fit` for `gp fit` and `law fit`.
+pub fn meant_below(command: &Command, word: &str) -> Vec<String> {
+    let below = |holder: &Command| {
+        let names = holder.get_subcommands().filter(|sub| sub.get_name() == word);
+        names.map(|sub| format!("hgm {} {}", holder.get_name(), sub.get_name())).collect::<Vec<_>>()
+    };
+    command.get_subcommands().flat_map(below).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::Hgm;
+    use clap::CommandFactory;
+
+    fn command() -> Command {
+        super::command(Hgm::command())
+    }
+
+    fn help_of(words: &[&str]) -> String {
+        let words = ["hgm"].iter().chain(words).chain(&["--help"]);
+        command().try_get_matches_from(words).unwrap_err().render().to_string()
+    }
+
+    #[test]
+    fn the_command_line_is_consistent_and_every_command_is_listed_once() {
+        command().debug_assert();
+        let help = help_of(&[]);
+        for sub in Hgm::command().get_subcommands() {
+            let lines = help.lines().filter(|line| line.starts_with(&format!("  {} ", sub.get_name())));
+            assert_eq!(lines.count(), 1, "{} in\n{help}", sub.get_name());
+        }
+        assert!(help.find("A patient").unwrap() < help.find("One step alone").unwrap());
+        assert!(help.lines().all(|line| line.chars().count() <= 120), "{help}");
+    }
+
+    #[test]
+    fn options_stand_under_headings_and_the_common_ones_come_last_and_together() {
+        let help = help_of(&["run"]);
+        let at = |what: &str| help.find(what).unwrap_or_else(|| panic!("no {what} in\n{help}"));
+        let headings = ["Options:", "Masks:", "Mesh:", "Material:", "Common:", "Exit codes:"];
+        assert!(headings.windows(2).all(|pair| at(pair[0]) < at(pair[1])), "{help}");
+        let common = &help[at("Common:")..];
+        for option in ["--config", "--json", "--threads", "--seed", "--force", "--verbose", "--quiet", "--help"] {
+            assert!(common.contains(option) && help.matches(&format!("{option} ")).count() <= 2, "{option} in\n{help}");
+        }
+        assert!(at("--cavity-mask") < at("Mesh:") && at("--cells") < at("Material:"));
+    }
+
+    #[test]
+    fn exit_codes_and_variables_stand_in_every_help() {
+        for words in [&[][..], &["run"], &["gp", "fit"]] {
+            let help = help_of(words);
+            assert!(help.contains("4  computed") && help.contains("HGM_CGAL_MESHER"), "{words:?}: {help}");
+        }
+    }
+
+    #[test]
+    fn a_word_that_is_a_command_below_another_is_known() {
+        assert_eq!(meant_below(&Hgm::command(), "fit"), ["hgm gp fit", "hgm law fit"]);
+        assert!(meant_below(&Hgm::command(), "nonsense").is_empty());
+        let said = command().try_get_matches_from(["hgm", "estimat"]).unwrap_err().to_string();
+        assert!(said.contains("'estimate'"), "{said}");
+    }
+}
