@@ -112,7 +112,8 @@ fn description(root: &Value, property: &Value) -> String {
     let text = property["description"].as_str().or_else(|| inner["description"].as_str()).unwrap_or_default();
     let mut words: Vec<&str> = inner["enum"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     words.extend(inner["oneOf"].as_array().into_iter().flatten().filter_map(|choice| choice["const"].as_str()));
-    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // Links are for the documentation of the library.
+    let text = text.replace("[`", "`").replace("`]", "`").split_whitespace().collect::<Vec<_>>().join(" ");
     if words.is_empty() { text } else { format!("{text} One of: {}.", words.join(", ")) }
 }
 
