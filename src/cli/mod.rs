@@ -22,6 +22,7 @@ mod manual;
 mod mesh;
 mod output;
 mod phantom;
+mod predict;
 mod prep;
 mod reduce;
 mod register;
@@ -61,6 +62,7 @@ enum Command {
     Prep(prep::Args),
     Run(run::Args),
     Phantom(phantom::Args),
+    Predict(predict::Args),
     Sweep(sweep::Args),
     Reduce(reduce::Args),
     Estimate(estimate::Args),
@@ -120,6 +122,7 @@ pub fn main() -> ExitCode {
         Command::Prep(args) => prep::run(&args, &session),
         Command::Run(args) => run::run(&args, &session),
         Command::Phantom(args) => phantom::run(&args, &session),
+        Command::Predict(args) => predict::run(&args, &session),
         Command::Sweep(args) => sweep::run(&args, &session),
         Command::Reduce(args) => reduce::run(&args, &session),
         Command::Estimate(args) => estimate::run(&args, &session),

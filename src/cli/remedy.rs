@@ -8,8 +8,8 @@ use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::{CohortError, DatasetError};
 use crate::workflow::{
-    CaseError, InputError, LabelMapError, MaskRole, MeshFileError, SettingsError, SimulationError, Subject,
-    WorkflowError,
+    CaseError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError, SettingsError, SimulationError,
+    Subject, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -70,6 +70,10 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
+        WorkflowError::Predict(PredictError::Plan(_) | PredictError::NoPlan | PredictError::Ellipsoid { .. }) => {
+            "see --resection and --resection-ellipsoid"
+        }
+        WorkflowError::Predict(PredictError::NoTarget { .. } | PredictError::TargetOutside { .. }) => "see --targets",
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
@@ -100,6 +104,7 @@ fn of_settings(error: &SettingsError) -> Option<String> {
 fn of_case(error: &CaseError) -> Option<String> {
     let again = |folder: &std::path::Path, subject: &Option<Subject>| match subject {
         Some(Subject::Phantom { .. }) => format!("run `hgm phantom -o {} --force` again", folder.display()),
+        Some(Subject::Plan) => format!("run `hgm predict PRE -o {} --force` again", folder.display()),
         _ => format!("run `hgm prep PRE POST -o {}` again (it takes masks of your own)", folder.display()),
     };
     Some(match error {
@@ -113,7 +118,10 @@ fn of_case(error: &CaseError) -> Option<String> {
                                       `hgm prep` or `hgm run` has made"
             .to_owned(),
         CaseError::OtherTissues { asked, .. } => format!("make another with `hgm phantom --tissues {asked}`"),
-        CaseError::Patient { .. } => "name another folder (-o)".to_owned(),
+        CaseError::Planned { .. } => {
+            "run `hgm run PRE POST -o CASE` on another folder once there is a second scan".to_owned()
+        }
+        CaseError::Patient { .. } | CaseError::NotPlanned { .. } => "name another folder (-o)".to_owned(),
         CaseError::OtherScan { .. } => {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
         }

@@ -4,6 +4,7 @@ use super::{Failure, Session};
 use crate::experiment::compare::Comparison;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::predict::Prediction;
 use crate::material::meta_model::MetaModel;
 use crate::report::cohort::Cohort;
 use schemars::generate::SchemaSettings;
@@ -30,6 +31,7 @@ fn schema() -> serde_json::Result<Value> {
     generator.subschema_for::<Cohort>();
     generator.subschema_for::<Evaluation>();
     generator.subschema_for::<Comparison>();
+    generator.subschema_for::<Prediction>();
     let mut schema: Value = serde_json::from_str(&with_names(COMMANDS))?;
     for (name, mut definition) in generator.take_definitions(true) {
         if name == "MeshOutcome" {

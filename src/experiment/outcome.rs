@@ -22,6 +22,8 @@ pub enum ExperimentKind {
     #[default]
     /// A patient: the rest mesh without the resected tissue against the post-operative surfaces.
     Resection,
+    /// A patient before an operation: how the brain will move.
+    Prediction,
 }
 
 /// What two scans say where no operation can be followed.

@@ -55,6 +55,8 @@ pub enum Maker {
     Fields,
     /// Models beside each other.
     Compare,
+    /// How a planned patient's brain will move.
+    Predict,
     /// The numbers gathered, with the settings and the provenance.
     Outcome,
     /// The page and the files for other viewers.

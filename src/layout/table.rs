@@ -90,6 +90,14 @@ pub const PRE_FROM_POST_FIELD: Family = Family("xfm/from-post_to-pre_desc-{state
 pub const SHIFT_SD: Family = Family("xfm/from-pre_to-deformed_desc-{state}_sd.nii.gz");
 /// Its 95 % reach, mm.
 pub const SHIFT_REACH: Family = Family("xfm/from-pre_to-deformed_desc-{state}_reach95.nii.gz");
+/// The reach that half of a prediction's draws do not exceed, mm.
+pub const SHIFT_REACH_50: Family = Family("xfm/from-pre_to-deformed_desc-{state}_reach50.nii.gz");
+/// Probability of a prediction that tissue moves by more than the threshold.
+pub const SHIFT_PROBABILITY: Family = Family("xfm/from-pre_to-deformed_desc-{state}_probability.nii.gz");
+/// The mean state of a prediction.
+pub const PREDICTED_STATE: Family = Family("sim/{state}.vtu");
+/// A prediction's numbers.
+pub const PREDICTION_JSON: &str = "sim/prediction.json";
 /// Where it is believed.
 pub const SHIFT_MASK: Family = Family("xfm/from-pre_to-deformed_desc-{state}_mask.nii.gz");
 /// The numbers of the fields.
@@ -273,6 +281,10 @@ pub const TABLE: &[Entry] = &[
         (Scan::Pre, "desc-warped_dseg.nii.gz", "Tissue labels carried by the brain shift"),
         None,
     ),
+    file(SHIFT_REACH_50.0, "reach that half of a prediction's draws do not exceed, mm", Space::Pre, Maker::Predict),
+    file(SHIFT_PROBABILITY.0, "probability of moving by more than the threshold", Space::Pre, Maker::Predict),
+    file(PREDICTED_STATE.0, "mean state of a prediction with its spread", Space::Mni, Maker::Predict),
+    file(PREDICTION_JSON, "the prediction's numbers", Space::None, Maker::Predict),
     file(COMPARISON, "models beside each other, by their evidence", Space::None, Maker::Compare),
     file(OUTCOME, "the experiment's numbers", Space::None, Maker::Outcome),
     file(SAMPLES_TABLE, "a line per sample", Space::None, Maker::Outcome),

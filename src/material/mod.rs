@@ -10,6 +10,7 @@ pub mod meta_model;
 pub mod random;
 pub mod rheometry;
 pub mod statistics;
+pub mod study_level;
 pub mod task;
 pub mod toml_text;
 pub mod training;

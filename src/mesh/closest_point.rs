@@ -102,11 +102,11 @@ fn split(order: &mut [([Point3<f64>; 3], u32)], first: usize, end: usize, boxes:
     }
     let axis = (high - low).imax();
     let centre = |t: &([Point3<f64>; 3], u32)| (t.0[0][axis] + t.0[1][axis] + t.0[2][axis], t.1);
-    part.sort_unstable_by(|a, b| {
+    let middle = usize::midpoint(first, end);
+    part.select_nth_unstable_by(middle - first, |a, b| {
         let (a, b) = (centre(a), centre(b));
         a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
     });
-    let middle = usize::midpoint(first, end);
     split(order, first, middle, boxes);
     boxes[me].right = boxes.len() as u32;
     split(order, middle, end, boxes);

@@ -4,7 +4,7 @@ use super::TriMesh;
 use crate::geometry::Frame;
 use crate::image::Volume;
 use nalgebra::Point3;
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 /// The six tetrahedra of a cube around its main diagonal (Kuhn): neighbouring cubes agree on shared faces, so the
 /// surface has no cracks and no edge with more than two triangles. Corner number = i + 2 j + 4 k.
@@ -29,18 +29,26 @@ pub fn isosurface<F: Frame>(image: &Volume<f32, F>, level: f32) -> TriMesh {
     let value = |p: [isize; 3]| image.get(p[0], p[1], p[2]).filter(|v| v.is_finite()).map_or(-1.0, |v| v - level);
     let id =
         |p: [isize; 3]| (p[0] + 1) as u64 + (nx as u64 + 2) * ((p[1] + 1) as u64 + (ny as u64 + 2) * (p[2] + 1) as u64);
-    let mut numbers: BTreeMap<(u64, u64), u32> = BTreeMap::new();
+    let mut numbers: HashMap<(u64, u64), u32> = HashMap::new();
     let mut surface = TriMesh::default();
+    let above = above_with_a_border(image, level);
     for k in -1..nz as isize {
         for j in -1..ny as isize {
+            let row = |up: usize| {
+                let (j, k) = ((j + 1) as usize + (up & 1), (k + 1) as usize + (up >> 1));
+                &above[(nx + 2) * (j + (ny + 2) * k)..][..nx + 2]
+            };
+            let rows = [row(0), row(1), row(2), row(3)];
             for i in -1..nx as isize {
-                let corners: [[isize; 3]; 8] =
-                    std::array::from_fn(|c| [i + (c & 1) as isize, j + (c >> 1 & 1) as isize, k + (c >> 2) as isize]);
-                let values = corners.map(value);
-                let inside = values.iter().filter(|v| **v >= 0.0).count();
+                // Most cubes lie on one side.
+                let at = (i + 1) as usize;
+                let inside: u8 = rows.iter().map(|row| row[at] + row[at + 1]).sum();
                 if inside == 0 || inside == 8 {
                     continue;
                 }
+                let corners: [[isize; 3]; 8] =
+                    std::array::from_fn(|c| [i + (c & 1) as isize, j + (c >> 1 & 1) as isize, k + (c >> 2) as isize]);
+                let values = corners.map(value);
                 for tet in KUHN {
                     let (within, without): (Vec<usize>, Vec<usize>) = tet.iter().partition(|&&c| values[c] >= 0.0);
                     let mut node = |a: usize, b: usize| {
@@ -83,12 +91,25 @@ pub fn isosurface<F: Frame>(image: &Volume<f32, F>, level: f32) -> TriMesh {
     surface
 }
 
+/// 1 where the image is not below the level, voxel by voxel with one of zeros all round.
+fn above_with_a_border<F: Frame>(image: &Volume<f32, F>, level: f32) -> Vec<u8> {
+    let [nx, ny, nz] = image.grid.dims;
+    let mut above = vec![0; (nx + 2) * (ny + 2) * (nz + 2)];
+    for (row, data) in image.data.chunks_exact(nx.max(1)).enumerate() {
+        let (j, k) = (row % ny, row / ny);
+        let out = &mut above[1 + (nx + 2) * (j + 1 + (ny + 2) * (k + 1))..][..nx];
+        out.iter_mut().zip(data).for_each(|(out, v)| *out = u8::from(v.is_finite() && v - level >= 0.0));
+    }
+    above
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Pre;
     use crate::image::Grid;
     use nalgebra::{Matrix4, Vector3};
+    use std::collections::BTreeMap;
 
     fn ball(grid: Grid<Pre>, radius: f64) -> TriMesh {
         let data = (0..grid.len()).map(|n| {

@@ -5,12 +5,13 @@ use super::figure::CaseImages;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
-use super::page::{CaptionedPicture, CasePage, ErrorMap, ShiftFigure, title_of};
-use super::shift_figure::shift_figure;
+use super::page::{CaptionedPicture, CasePage, ErrorMap, PredictionFigure, ShiftFigure, title_of};
+use super::shift_figure::{prediction_figure, shift_figure};
 use super::viewer::{ViewedSurface, Viewer};
 use crate::artefact::{WriteError, write_whole};
 use crate::experiment::field::BrainShift;
-use crate::experiment::outcome::{ExperimentOutcome, OutcomeError};
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, OutcomeError};
+use crate::experiment::predict::Prediction;
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, NiftiError, ReadOptions};
 use crate::image::{LabelMap, Mask, Volume};
@@ -133,6 +134,20 @@ fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftF
     Ok(displacement.and_then(|u| shift_figure(&t1, &seen, &state.mesh, &u)))
 }
 
+/// The first head of a prediction on a slice.
+fn expected_of(case: &Case<'_>, prediction: Option<&Prediction>) -> Result<Option<PredictionFigure>, ReportError> {
+    let Some(head) = prediction.and_then(|prediction| prediction.heads.first()) else { return Ok(None) };
+    let file = layout::PREDICTED_STATE.of(&head.state);
+    let (Some(state), Some(t1)) = (case.mesh(&file)?, case.bytes(layout::PRE_T1)?) else { return Ok(None) };
+    let t1: Volume<f32, Mni> = nifti::decode(&t1, layout::PRE_T1, &ReadOptions::default())?.volume.relabelled();
+    let scalar = |name: &str| state.point_field(name).map(|field| field.values.clone());
+    let mean = state.point_field("displacement").and_then(Field::vectors);
+    let (Some(mean), Some(reach), Some(sd)) = (mean, scalar("displacement_95"), scalar("displacement_sd")) else {
+        return Ok(None);
+    };
+    Ok(prediction_figure(&t1, &state.mesh, &mean, &reach, &sd))
+}
+
 /// The page of a case directory.
 ///
 /// # Errors
@@ -175,9 +190,12 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         page.absent.push(format!("the mesh ({} is not there)", layout::REST_MESH));
     }
     match &outcome {
+        Some(outcome) if outcome.kind == ExperimentKind::Prediction => {}
         Some(outcome) => add_results(&case, outcome, rest.as_ref(), &mut page)?,
         None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
     }
+    page.prediction = case.numbers(layout::PREDICTION_JSON)?;
+    page.prediction_figure = expected_of(&case, page.prediction.as_ref())?;
     page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
     page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
     page.shift_figure = shift_of(&case, page.brain_shift.as_ref())?;

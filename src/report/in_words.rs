@@ -1,9 +1,11 @@
 //! What was found in a few lines of text.
 
+use super::page::expected_in_a_sentence;
 use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
+use crate::experiment::predict::{Prediction, TargetPlace};
 use crate::experiment::resection::improvement;
 use crate::experiment::verdict_of_samples::nearest_to_reference;
 use crate::material::law::StabilityRange;
@@ -35,6 +37,39 @@ pub fn landmark_table(found: &Evaluation) -> String {
     for l in &found.landmarks {
         let errors: Vec<String> = l.error_mm.iter().map(|e| format!("{e:>7.2}")).collect();
         text += &format!("{:<14} {:<9} {}\n", l.name, l.place, errors.join(" "));
+    }
+    text
+}
+
+/// The headline of a prediction, a row for each head, then one for each target.
+pub fn prediction_table(found: &Prediction) -> String {
+    let mut text = expected_in_a_sentence(found) + "\n";
+    text += "head         largest (mm)  median   SD    95 % reach  over the threshold (cc)\n";
+    for h in &found.heads {
+        text += &format!(
+            "{:<12} {:>12.2}  {:>6.2}  {:>5.2}  {:>9.2}  {:>8.1}\n",
+            h.head, h.largest_mm, h.median_mm, h.sd_median_mm, h.reach95_largest_mm, h.over_threshold_cc
+        );
+    }
+    for h in found.heads.iter().filter(|h| !h.targets.is_empty()) {
+        text += &format!(
+            "\ntarget (head {})  expected at (mm)            shift (mm)  SD    P(over {} mm)\n",
+            h.head, found.threshold_mm
+        );
+        for t in &h.targets {
+            let [x, y, z] = t.expected_mm;
+            text += &match t.place {
+                TargetPlace::Removed => format!("{:<8} {:<8} is to be taken\n", t.target, t.place.name()),
+                _ => format!(
+                    "{:<8} {:<8} {x:>8.1} {y:>8.1} {z:>8.1}  {:>9.2}  {:>5.2}  {:>6.2}\n",
+                    t.target,
+                    t.place.name(),
+                    t.shift_mm,
+                    t.sd_mm,
+                    t.over_threshold
+                ),
+            };
+        }
     }
     text
 }

@@ -21,19 +21,19 @@ pub struct FittedCurve {
 }
 
 /// Width and height of a panel, and where its axes stand.
-struct Layout {
-    panel: [f64; 2],
-    x: [f64; 2],
-    y: [f64; 2],
-    columns: usize,
+pub(super) struct Layout {
+    pub(super) panel: [f64; 2],
+    pub(super) x: [f64; 2],
+    pub(super) y: [f64; 2],
+    pub(super) columns: usize,
 }
 
 /// Thin dark lines, seen on the mean's blue.
-const STUDIES: &str = "#1c1c1c";
-const SMALL: Layout = Layout { panel: [300.0, 236.0], x: [58.0, 290.0], y: [188.0, 26.0], columns: 4 };
+pub(super) const STUDIES: &str = "#1c1c1c";
+pub(super) const SMALL: Layout = Layout { panel: [300.0, 236.0], x: [58.0, 290.0], y: [188.0, 26.0], columns: 4 };
 const LARGE: Layout = Layout { panel: [480.0, 330.0], x: [66.0, 466.0], y: [280.0, 26.0], columns: 2 };
 
-fn document(layout: &Layout, description: &str, legend: &str, panels: &[String]) -> String {
+pub(super) fn document(layout: &Layout, description: &str, legend: &str, panels: &[String]) -> String {
     let rows = panels.len().div_ceil(layout.columns).max(1);
     let width = layout.panel[0] * layout.columns.min(panels.len().max(1)) as f64;
     let height = layout.panel[1] * rows as f64 + 26.0;
@@ -52,7 +52,7 @@ fn document(layout: &Layout, description: &str, legend: &str, panels: &[String])
     svg
 }
 
-fn title(layout: &Layout, text: &str) -> String {
+pub(super) fn title(layout: &Layout, text: &str) -> String {
     let middle = f64::midpoint(layout.x[0], layout.x[1]);
     format!(
         "<text x=\"{middle}\" y=\"16\" text-anchor=\"middle\" font-weight=\"bold\" fill=\"currentColor\">{}</text>",
@@ -60,7 +60,7 @@ fn title(layout: &Layout, text: &str) -> String {
     )
 }
 
-fn path(axes: &(Axis, Axis), points: impl Iterator<Item = (f64, f64)>) -> String {
+pub(super) fn path(axes: &(Axis, Axis), points: impl Iterator<Item = (f64, f64)>) -> String {
     let mut line = String::new();
     for (x, y) in points {
         let pen = if line.is_empty() { "M" } else { "L" };

@@ -22,4 +22,6 @@ pub mod refusal;
 pub mod render;
 pub mod shift_figure;
 pub mod slice;
+pub mod study_level_figure;
+pub mod study_level_tables;
 pub mod viewer;

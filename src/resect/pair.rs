@@ -164,17 +164,7 @@ pub fn take_pair_apart(
     }
 
     step("pre-operative tissue");
-    let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
-    let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
-    let (before, pre_fit, scale) = if let Some(labels) = &given.labels {
-        let (before, scale) = segment_by_labels(pre, mni_from_pre, labels);
-        let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
-        (before, fit, scale)
-    } else {
-        let head = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment);
-        let (before, fit) = head.map_err(in_pre)?;
-        (before, fit, Scale { turned_at: None })
-    };
+    let (before, pre_fit, scale) = take_head_apart(pre, mni_from_pre, given, settings)?;
 
     step("cavity");
     let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
@@ -267,6 +257,29 @@ pub fn take_pair_apart(
         post_ventricle,
         post_brain,
     })
+}
+
+/// Labels the pre-operative scan with the template's maps carried onto the head, or by a label map that was given; with the
+/// template's fit and how intensities go with tissue.
+///
+/// # Errors
+/// [`PairError::Head`].
+pub fn take_head_apart(
+    pre: &Volume<f32, Pre>,
+    mni_from_pre: &RigidTransform<Pre, Mni>,
+    given: &GivenMasks,
+    settings: &PairSettings,
+) -> Result<(Segmentation<Pre>, AtlasFit<Mni>, Scale), PairError> {
+    let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
+    let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
+    if let Some(labels) = &given.labels {
+        let (before, scale) = segment_by_labels(pre, mni_from_pre, labels);
+        let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
+        return Ok((before, fit, scale));
+    }
+    let head = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment);
+    let (before, fit) = head.map_err(in_pre)?;
+    Ok((before, fit, Scale { turned_at: None }))
 }
 
 /// What lies further from the cavity than this has no part in it, mm: more than any brain sags, and more than the windows

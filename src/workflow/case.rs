@@ -64,6 +64,8 @@ impl Case {
         let has = |stage: StageName| Manifest::path_of_stage(&self.folder, &stage.to_string()).exists();
         if has(StageName::Registration) {
             Some(Subject::Patient)
+        } else if has(StageName::Pose) {
+            Some(Subject::Plan)
         } else if has(StageName::Labels) {
             let every_task = StageName::Sample(String::new()).to_string() + "hyperelastic-";
             let of_task = |manifest: &Manifest| manifest.stage.starts_with(&every_task);

@@ -133,6 +133,12 @@ impl Case {
         match (self.subject(), subject) {
             (Some(Subject::Phantom { .. }), Subject::Patient) => Err(CaseError::Phantom { folder }.into()),
             (Some(Subject::Patient), Subject::Phantom { .. }) => Err(CaseError::Patient { folder }.into()),
+            (Some(Subject::Plan), Subject::Patient | Subject::Phantom { .. }) => {
+                Err(CaseError::Planned { folder }.into())
+            }
+            (Some(_), Subject::Plan) if self.subject() != Some(Subject::Plan) => {
+                Err(CaseError::NotPlanned { folder }.into())
+            }
             _ => Ok(()),
         }
     }

@@ -59,7 +59,7 @@ impl Studies {
     }
 
     /// The stage with the user's table among its inputs.
-    fn input(&self, stage: Stage) -> Stage {
+    pub(super) fn input(&self, stage: Stage) -> Stage {
         match &self.bytes {
             Some(bytes) => stage.input("studies", bytes),
             None => stage,
@@ -249,7 +249,7 @@ fn fitted(model: &LiteratureModel, studies: &Studies, settings: &SampleSettings)
 }
 
 /// The figures of a stage.
-fn facts<E>(outcome: Result<StageOutcome, StageError<E>>) -> Result<Value, WorkflowError>
+pub(super) fn facts<E>(outcome: Result<StageOutcome, StageError<E>>) -> Result<Value, WorkflowError>
 where
     WorkflowError: From<E>,
 {

@@ -125,11 +125,8 @@ impl OwnMasks {
         let read = |role: MaskRole, path: &Option<PathBuf>| {
             path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
         };
-        let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), scans, work));
-        let pose = inputs.pose.as_deref().map(|path| -> Result<_, WorkflowError> {
-            let text = read_text(path)?;
-            Ok((rigid_from_text(&text, &shown(path))?, text.into_bytes()))
-        });
+        let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), &scans.pre, work));
+        let pose = inputs.pose.as_deref().map(given_pose);
         Ok(Self {
             pose: pose.transpose()?,
             labels: labels.transpose()?,
@@ -160,12 +157,18 @@ impl OwnMasks {
     }
 }
 
+/// Reads a pose of the pre-operative scan in the MNI frame.
+pub(super) fn given_pose(path: &Path) -> Result<(RigidTransform<Pre, Mni>, Vec<u8>), WorkflowError> {
+    let text = read_text(path)?;
+    Ok((rigid_from_text(&text, &shown(path))?, text.into_bytes()))
+}
+
 /// Reads a label map of the pre-operative scan. Another grid in the scanner's coordinates will do: FreeSurfer and SynthSeg
 /// write their own.
-fn given_labels(
+pub(super) fn given_labels(
     path: &Path,
     whose: Option<&str>,
-    scans: &Scans,
+    pre: &Volume<f32, Pre>,
     work: &Work<'_>,
 ) -> Result<(LabelMap<Pre>, Vec<u8>), WorkflowError> {
     /// A map of this scan lies in its field of view, but for a rim.
@@ -177,7 +180,7 @@ fn given_labels(
     for n in labelled {
         let p = labels.grid.position(labels.grid.voxel(n).map(|v| v as f64).into());
         all += 1.0;
-        seen += f64::from(u8::from(scans.pre.nearest(p).is_some()));
+        seen += f64::from(u8::from(pre.nearest(p).is_some()));
     }
     let percent = 100.0 * seen / f64::max(all, 1.0);
     if percent < LEAST_PERCENT {

@@ -36,6 +36,8 @@ mod outcome;
 mod patient;
 mod phantom;
 mod plan;
+mod planned_scan;
+mod prediction;
 mod programs;
 mod progress;
 mod refusal;
@@ -44,6 +46,7 @@ mod settings_manual;
 mod simulation;
 mod stage_name;
 mod stages;
+mod study_level;
 mod synthetic;
 mod user_file;
 mod warp;
@@ -54,8 +57,8 @@ pub mod cohort;
 
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, SimulationError,
-    WarpError, WorkflowError,
+    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, PredictError,
+    SimulationError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};
@@ -67,6 +70,8 @@ pub use maps::WarpTo;
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
+pub use planned_scan::{PlanInputs, PlannedResection};
+pub use prediction::predict;
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
@@ -74,6 +79,7 @@ pub use settings_manual::{Setting, annotated, every_setting};
 pub use simulation::{Simulation, SimulationFiles, simulate};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
+pub use study_level::{Expected, fit_study_level, sample_study_level, show_study_level, study_level_file};
 pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use user_file::{read_input, read_text, shown};
 pub use warp::{PointCounts, Through, Warp, Warped, warp};
@@ -199,6 +205,9 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
     let subject = Case::open(&place.folder)?.subject().unwrap_or(Subject::Patient);
     let work = Work::new(place, subject, settings, progress);
     prepared_case(&work, true)?;
+    if subject == Subject::Plan {
+        return Err(CaseError::Planned { folder: place.folder.clone() }.into());
+    }
     if subject == Subject::Patient {
         let patient = Patient::new(&work, Prepared::read(&work)?)?;
         outcome::keep_settings(&work)?;

@@ -19,6 +19,8 @@ pub enum Goal {
     Sweep,
     /// The most probable moduli.
     Estimate,
+    /// How a planned patient's brain will move.
+    Predict,
 }
 
 /// One stage of a job and the stages before it.
@@ -37,8 +39,18 @@ pub struct Step {
 pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Step>, WorkflowError> {
     let mut stages = match subject {
         Subject::Patient => vec![StageName::Registration, StageName::Anat],
+        Subject::Plan => vec![StageName::Pose, StageName::Plan],
         Subject::Phantom { .. } => vec![StageName::Labels],
     };
+    if subject == Subject::Plan {
+        if goal != Goal::Images {
+            stages.push(StageName::Mesh);
+        }
+        if goal == Goal::Predict {
+            stages.push(StageName::Predict);
+        }
+        return Ok(steps(stages, subject));
+    }
     if goal != Goal::Images {
         stages.extend([StageName::Mesh, StageName::Reference]);
     }
@@ -47,18 +59,22 @@ pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Ste
             stages.extend(samples(settings, subject)?.into_iter().map(|sample| StageName::Sample(sample.id)));
         }
         Goal::Estimate => stages.push(StageName::Estimate),
-        Goal::Images | Goal::Mesh => {}
+        Goal::Images | Goal::Mesh | Goal::Predict => {}
     }
     if subject == Subject::Patient && matches!(goal, Goal::Sweep | Goal::Estimate) {
         stages.push(StageName::Fields);
     }
-    Ok(stages.into_iter().map(|stage| Step { after: stage.after(subject), stage }).collect())
+    Ok(steps(stages, subject))
+}
+
+fn steps(stages: Vec<StageName>, subject: Subject) -> Vec<Step> {
+    stages.into_iter().map(|stage| Step { after: stage.after(subject), stage }).collect()
 }
 
 /// The tissues whose material is varied.
 pub fn tissues(settings: &Settings, subject: Subject) -> Vec<Tissue> {
     match subject {
-        Subject::Patient => settings.resection.tissue_list(),
+        Subject::Patient | Subject::Plan => settings.resection.tissue_list(),
         Subject::Phantom { .. } => settings.phantom.tissue_list(),
     }
 }
@@ -70,7 +86,7 @@ pub fn tissues(settings: &Settings, subject: Subject) -> Vec<Tissue> {
 pub fn samples(settings: &Settings, subject: Subject) -> Result<Vec<Sample>, WorkflowError> {
     let tissues = tissues(settings, subject);
     let (levels, poisson_ratio) = match subject {
-        Subject::Patient => (&settings.resection.sd_levels, settings.resection.poisson_ratio),
+        Subject::Patient | Subject::Plan => (&settings.resection.sd_levels, settings.resection.poisson_ratio),
         Subject::Phantom { .. } => (&settings.phantom.sd_levels, settings.phantom.poisson_ratio),
     };
     let mut list = match subject {
@@ -102,6 +118,9 @@ mod tests {
                 }
             }
         }
+        let names = plan(&settings, Subject::Plan, Goal::Predict).unwrap();
+        let names: Vec<String> = names.iter().map(|step| step.stage.to_string()).collect();
+        assert_eq!(names, ["pose", "plan", "mesh", "predict"]);
     }
 
     #[test]
@@ -111,6 +130,9 @@ mod tests {
             for step in plan(&settings, subject, Goal::Sweep).unwrap() {
                 assert_eq!(StageName::parse(&step.stage.to_string()), Some(step.stage));
             }
+        }
+        for step in plan(&settings, Subject::Plan, Goal::Predict).unwrap() {
+            assert_eq!(StageName::parse(&step.stage.to_string()), Some(step.stage));
         }
         assert_eq!(StageName::parse("outcome"), None);
     }

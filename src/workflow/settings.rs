@@ -4,6 +4,7 @@
 use super::estimate_options::EstimateOptions;
 use crate::experiment::field::FieldSettings;
 use crate::experiment::phantom::PhantomSettings;
+use crate::experiment::predict::PredictSettings;
 use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::synth::SynthSettings;
@@ -46,6 +47,8 @@ pub struct Settings {
     pub mesh: MeshSettings,
     /// The synthetic validation.
     pub phantom: PhantomSettings,
+    /// Predictions before an operation.
+    pub predict: PredictSettings,
     /// The prior of the moduli.
     pub prior: PriorSettings,
     /// Rigid registration.
@@ -98,7 +101,7 @@ fn kept<E: Display>(checked: Result<(), E>) -> Checked {
     checked.map_err(|e| e.to_string())
 }
 
-const ROOMS: [Room; 15] = [
+const ROOMS: [Room; 16] = [
     ("anat", read::<PairSettings>, |s| s.anat.check()),
     ("deformable", read::<DeformableSettings>, |s| kept(s.deformable.check())),
     ("estimate", read::<EstimateOptions>, |s| s.estimate.check()),
@@ -108,6 +111,7 @@ const ROOMS: [Room; 15] = [
     ("law", read::<MetaModelSettings>, |s| s.law.check()),
     ("mesh", read::<MeshSettings>, |s| kept(s.mesh.check())),
     ("phantom", read::<PhantomSettings>, |s| kept(s.phantom.check())),
+    ("predict", read::<PredictSettings>, |s| kept(s.predict.check())),
     ("prior", read::<PriorSettings>, |_| Ok(())),
     ("register", read::<RigidSettings>, |s| kept(s.register.check())),
     ("resection", read::<ResectionSettings>, |s| kept(s.resection.check())),
@@ -266,6 +270,7 @@ mod tests {
             ("[mesh.limits]\ntime_s = -1.0\n", ["`limits.time_s` is -1.0", "0 or more"]),
             ("[anat.segment]\nbias_order = 9\n", ["table [anat]", "bias_order"]),
             ("[synth]\npost_slice_mm = 80.0\n", ["table [synth]", "post_slice_mm"]),
+            ("[predict]\nheads = [\"0,0,0\"]\n", ["table [predict]", "no way to lie"]),
             ("[tag]\n\n[mesh.optimise]\nround = 2\n", ["line 4: table [mesh]", "unknown setting `round`"]),
         ] {
             let said = said(text);

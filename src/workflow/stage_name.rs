@@ -10,6 +10,8 @@ use std::fmt;
 pub enum Subject {
     /// A pre- and a post-operative scan.
     Patient,
+    /// A pre-operative scan alone, and what is to be taken out.
+    Plan,
     /// The template with known moduli.
     Phantom {
         /// Samples of every task of the generative model instead of one task's.
@@ -26,6 +28,10 @@ pub enum StageName {
     Labels,
     /// Masks and labels of a patient.
     Anat,
+    /// The pre-operative scan alone on the template.
+    Pose,
+    /// Its labels, and what is to be taken out.
+    Plan,
     /// The tagged mesh.
     Mesh,
     /// The target: observed surfaces, or a phantom's known state.
@@ -38,21 +44,26 @@ pub enum StageName {
     Compare,
     /// Displacement fields of a patient.
     Fields,
+    /// How a planned patient's brain will move.
+    Predict,
 }
 
 impl StageName {
     /// The stages whose files it is made from.
     pub fn after(&self, subject: Subject) -> &'static [StageName] {
-        use StageName::{Anat, Labels, Mesh, Reference, Registration};
+        use StageName::{Anat, Labels, Mesh, Plan, Pose, Reference, Registration};
         match (self, subject) {
-            (Self::Registration | Self::Labels, _) => &[],
+            (Self::Registration | Self::Labels | Self::Pose, _) => &[],
+            (Self::Plan, _) => &[Pose],
+            (Self::Mesh, Subject::Plan) => &[Plan],
+            (Self::Predict, _) => &[Plan, Mesh],
             (Self::Anat, _) => &[Registration],
             // With the samples or the estimate whose state it is.
             (Self::Fields, _) => &[Registration, Anat],
-            (Self::Mesh | Self::Reference, Subject::Patient) => &[Anat],
+            (Self::Mesh, Subject::Patient) | (Self::Reference, Subject::Patient | Subject::Plan) => &[Anat],
             (Self::Mesh, Subject::Phantom { .. }) => &[Labels],
             (Self::Reference, Subject::Phantom { .. }) => &[Mesh],
-            (Self::Sample(_), Subject::Patient) => &[Mesh, Reference],
+            (Self::Sample(_), Subject::Patient | Subject::Plan) => &[Mesh, Reference],
             (Self::Sample(_), Subject::Phantom { .. }) | (Self::Estimate | Self::Compare, _) => &[Reference],
         }
     }
@@ -60,15 +71,16 @@ impl StageName {
     /// Who the layout says makes its files.
     pub fn maker(&self) -> Option<Maker> {
         Some(match self {
-            Self::Registration => Maker::Registration,
+            Self::Registration | Self::Pose => Maker::Registration,
             Self::Labels => return None,
-            Self::Anat => Maker::Anat,
+            Self::Anat | Self::Plan => Maker::Anat,
             Self::Mesh => Maker::Mesh,
             Self::Reference => Maker::Reference,
             Self::Sample(_) => Maker::Sample,
             Self::Estimate => Maker::Estimate,
             Self::Compare => Maker::Compare,
             Self::Fields => Maker::Fields,
+            Self::Predict => Maker::Predict,
         })
     }
 
@@ -86,6 +98,9 @@ impl StageName {
             "registration" => Self::Registration,
             "labels" => Self::Labels,
             "anat" => Self::Anat,
+            "pose" => Self::Pose,
+            "plan" => Self::Plan,
+            "predict" => Self::Predict,
             "mesh" => Self::Mesh,
             "reference" => Self::Reference,
             "estimate" => Self::Estimate,
@@ -102,6 +117,9 @@ impl fmt::Display for StageName {
             Self::Registration => f.write_str("registration"),
             Self::Labels => f.write_str("labels"),
             Self::Anat => f.write_str("anat"),
+            Self::Pose => f.write_str("pose"),
+            Self::Plan => f.write_str("plan"),
+            Self::Predict => f.write_str("predict"),
             Self::Mesh => f.write_str("mesh"),
             Self::Reference => f.write_str("reference"),
             Self::Sample(id) => write!(f, "sim-{id}"),

@@ -111,7 +111,13 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
                 let sample = samples.iter().find(|sample| sample.id == *id)?;
                 Some(stages::sample_stage(work, &made, &scenario, &tissues, sample))
             }
-            StageName::Labels | StageName::Estimate | StageName::Compare | StageName::Fields => None,
+            StageName::Labels
+            | StageName::Estimate
+            | StageName::Compare
+            | StageName::Fields
+            | StageName::Pose
+            | StageName::Plan
+            | StageName::Predict => None,
         }
     };
     Ok(steps.iter().filter_map(pose).collect())

@@ -19,12 +19,14 @@ mod material;
 mod mesh;
 mod pairs;
 mod patients;
+mod predict;
 #[path = "../it/python.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod python;
 #[path = "../it/sequences.rs"]
 mod sequences;
 mod stale;
+mod study_level;
 
 use bar::Bar;
 
@@ -37,11 +39,13 @@ fn main() {
         ("corruptions", corruptions::bars),
         ("mesh", mesh::bars),
         ("material", material::bars),
+        ("study-level", study_level::bars),
         ("fem", fem::bars),
         ("contact", contact::bars),
         ("experiment", experiment::bars),
         ("pairs", pairs::bars),
         ("patients", patients::bars),
+        ("predict", predict::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),
         ("stale", stale::bars),

@@ -175,7 +175,7 @@ fn thread_seconds() -> Option<f64> {
 }
 
 /// Seconds of this thread, or of the clock where the system does not tell.
-fn seconds_of<T>(work: impl FnOnce() -> T) -> (T, f64) {
+pub fn seconds_of<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let (start, before) = (Instant::now(), thread_seconds());
     let result = work();
     let seconds = match (before, thread_seconds()) {
@@ -187,7 +187,7 @@ fn seconds_of<T>(work: impl FnOnce() -> T) -> (T, f64) {
 
 /// Least time of a call over several batches, ms. A batch lasts about half a second, because some systems count a
 /// thread's time in ticks of milliseconds.
-fn least_ms(mut work: impl FnMut() -> f64) -> f64 {
+pub fn least_ms(mut work: impl FnMut() -> f64) -> f64 {
     let start = Instant::now();
     let mut calls = 0;
     while start.elapsed().as_secs_f64() < 0.3 {

@@ -79,6 +79,11 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("gp sample", &["gp", "sample", "--task", "hyperelastic-grey", "--draws", "3", "-o", &at("gp")]);
     prints("gp show", &["gp", "show", "--published", "-o", &at("gp")]);
     prints("gp fit", &["gp", "fit", "--starts", "1", "-o", &at("gp")]);
+    let study_level = ["--model", "study-level", "-o", &at("gp")];
+    prints("gp fit", &[&["gp", "fit"], &study_level[..]].concat());
+    let fitted = at("gp/study-level.toml");
+    prints("gp sample", &[&["gp", "sample", "--draws", "3", "--hyperparameters", &fitted], &study_level[..]].concat());
+    prints("gp show", &[&["gp", "show", "--hyperparameters", &fitted], &study_level[..]].concat());
     prints("law fit", &["law", "fit", "--literature", "3"]);
     prints("register", &["register", post, pre, "-o", &at("x.txt")]);
     prints("segment", &[&["segment", pre, "-o", &at("dseg.nii.gz")], &CHEAP[..]].concat());
@@ -96,6 +101,9 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("estimate", &["estimate", &case]);
     prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
+    let plan = sample("truth/resected_pre.nii.gz").display().to_string();
+    let planned = ["predict", pre, "-o", &at("planned"), "--resection", &plan, "--draws", "16", "--checks", "0"];
+    prints("predict", &[&planned[..], &CHEAP[..]].concat());
     for (name, points) in [("pre.csv", "x,y,z\n20,-10,30\n-20,-10,30\n"), ("post.csv", "x,y,z\n15,-5,31\n-23,-8,25\n")]
     {
         std::fs::write(at(name), points).unwrap();

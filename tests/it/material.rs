@@ -139,3 +139,43 @@ fn a_test_in_kilopascals_and_in_pascals_gives_the_same_law() {
     assert_eq!(refusal(&["law", "fit"]).0, Some(2));
     assert_eq!(refusal(&["law", "fit", "--literature", "40", "--law", "rubber"]).0, Some(2));
 }
+
+#[test]
+fn slow_the_study_level_model_is_fitted_sampled_and_shown_with_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let study_level = ["--model", "study-level", "--threads"];
+    let run = |name: &str, threads: &str| {
+        let place = [threads, "-o", &at(name)];
+        let fitted = json(&[&["gp", "fit"], &study_level[..], &place].concat());
+        let file = fitted["study_level"].as_str().unwrap().to_owned();
+        let own = ["--hyperparameters", &file];
+        json(&[&["gp", "sample", "--draws", "50", "--curves"], &study_level[..], &place, &own].concat());
+        json(&[&["gp", "show"], &study_level[..], &place, &own].concat());
+        let names = ["study-level.toml", "study-level-draws-person-hyperelastic-healthy.csv", "study-level-bands.svg"];
+        names.map(|name| text(&Path::new(&file).with_file_name(name)))
+    };
+    let files = run("one", "1");
+    assert_eq!(run("two", "2"), files);
+    let materials = &files[1];
+    assert_eq!(materials.lines().count(), 51);
+    assert!(materials.lines().skip(1).all(|line| line.ends_with(",true")), "every law is stable");
+}
+
+#[test]
+fn options_of_the_other_generative_model_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("gp");
+    let out = out.to_str().unwrap();
+    for (arguments, named) in [
+        (&["gp", "sample", "--of", "person"][..], "--of belongs to --model study-level"),
+        (&["gp", "sample", "--model", "study-level", "--draws", "2", "--spread", "study"], "--spread belongs to"),
+        (&["gp", "fit", "--model", "study-level", "--rank", "2"], "--rank belongs to --model published"),
+        (&["gp", "show", "--model", "study-level", "--models", "44"], "--models belongs to --model published"),
+    ] {
+        let (code, said) = refusal(&[arguments, &["-o", out]].concat());
+        assert_eq!(code, Some(3), "{said}");
+        assert!(said.contains(named), "{said}");
+    }
+    assert!(!Path::new(out).exists(), "nothing half-written");
+}

@@ -1,19 +1,22 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
-use super::options::StudyOptions;
+use super::options::{Model, ModelOption, StudyOptions, only_with};
 use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
-use crate::workflow::fit_gp;
+use crate::workflow::{fit_gp, fit_study_level};
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Fit the hyperparameters to the literature, and to studies of your own
 ///
-/// Writes hyperparameters.toml, which `hgm gp sample` and `hgm gp show` read.
+/// Writes hyperparameters.toml, which `hgm gp sample` and `hgm gp show` read. With `--model study-level`: study-level.toml, the
+/// spreads between and within publications with their 90 % intervals, and the moduli of a person nobody has measured.
 ///
 /// Example: hgm gp fit --studies my-studies.csv -o my-gp
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    #[command(flatten)]
+    model: ModelOption,
     #[command(flatten)]
     studies: StudyOptions,
     /// Rank of the coregionalisation of the twelve tasks [default: 1]
@@ -28,6 +31,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.model.get() == Model::StudyLevel {
+        return study_level(args, session);
+    }
     let mut flags = Flags::default();
     flags.set("gp.rank", args.rank);
     flags.set("gp.starts", args.starts);
@@ -49,4 +55,20 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         figure("lengthscale"),
     );
     session.emit(&json!({ "hyperparameters": file, "settings": settings, "fit": facts }), &text)
+}
+
+fn study_level(args: &Args, session: &Session) -> Result<(), Failure> {
+    only_with(args.rank.is_some(), "--rank", "published")?;
+    only_with(args.starts.is_some(), "--starts", "published")?;
+    let place = (args.output.as_path(), session.options.force);
+    let mut made = fit_study_level(&args.studies.read()?, session.options.seed.unwrap_or(0), place)?;
+    let text = made.facts.as_object_mut().and_then(|facts| facts.remove("text"));
+    let (facts, file) = (made.facts, made.files[0].display().to_string());
+    let text = format!(
+        "{} points of {} publications\n{}\n{file}",
+        facts["points"],
+        facts["publications"],
+        text.as_ref().and_then(|text| text.as_str()).unwrap_or_default()
+    );
+    session.emit(&json!({ "study_level": file, "settings": made.settings, "fit": facts }), &text)
 }

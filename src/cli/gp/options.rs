@@ -3,7 +3,9 @@
 use crate::cli::Failure;
 use crate::material::gp::Hyperparameters;
 use crate::material::literature::Curves;
-use crate::workflow::{Studies, hyperparameters};
+use crate::material::study_level::StudyLevelFile;
+use crate::workflow::{Studies, hyperparameters, study_level_file};
+use anyhow::anyhow;
 use std::path::PathBuf;
 
 /// Which studies.
@@ -17,10 +19,56 @@ pub struct StudyOptions {
     pub published: bool,
 }
 
+/// Which generative model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Model {
+    /// The Gaussian process of the paper: studies are noise about one function a task.
+    #[default]
+    Published,
+    /// Studies differ from one another, and curves within them.
+    StudyLevel,
+}
+
+impl std::str::FromStr for Model {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "published" => Ok(Self::Published),
+            "study-level" => Ok(Self::StudyLevel),
+            _ => Err("say published or study-level".to_owned()),
+        }
+    }
+}
+
+/// The generative model that is asked.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ModelOption {
+    /// The paper's Gaussian process, or the model of how studies and people differ [default: published]
+    #[arg(long, value_name = "published|study-level")]
+    model: Option<Model>,
+}
+
+impl ModelOption {
+    /// Which one.
+    pub fn get(&self) -> Model {
+        self.model.unwrap_or_default()
+    }
+}
+
+/// Refuses an option that the chosen model has no use for.
+pub fn only_with(given: bool, option: &str, model: &str) -> Result<(), Failure> {
+    if given {
+        return Err(Failure::Rejected(anyhow!(
+            "{option} belongs to --model {model}: leave it out, or choose that model"
+        )));
+    }
+    Ok(())
+}
+
 /// Which hyperparameters.
 #[derive(Clone, Debug, clap::Args)]
 pub struct HyperparameterOptions {
-    /// Hyperparameters made by `hgm gp fit` [default: the published ones]
+    /// Hyperparameters made by `hgm gp fit` for the same model [default: the published ones; study-level: fitted at once]
     #[arg(long, value_name = "FILE")]
     pub hyperparameters: Option<PathBuf>,
 }
@@ -34,6 +82,11 @@ impl StudyOptions {
 }
 
 impl HyperparameterOptions {
+    /// The same of the study-level model; none: it is fitted.
+    pub fn study_level(&self) -> Result<Option<StudyLevelFile>, Failure> {
+        Ok(self.hyperparameters.as_deref().map(study_level_file).transpose()?)
+    }
+
     /// The user's hyperparameters, else the published ones.
     pub fn read(&self) -> Result<Hyperparameters, Failure> {
         Ok(hyperparameters(self.hyperparameters.as_deref())?)

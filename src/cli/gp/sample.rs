@@ -1,13 +1,14 @@
 //! `hgm gp sample`: materials from the generative model.
 
-use super::options::{HyperparameterOptions, StudyOptions};
+use super::options::{HyperparameterOptions, Model, ModelOption, StudyOptions, only_with};
 use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
 use crate::material::Task;
 use crate::material::generative::{SampleSettings, nine_levels};
 use crate::material::gp::Spread;
 use crate::material::meta_model::MetaModel;
-use crate::workflow::{Wanted, sample_gp};
+use crate::material::study_level::Of;
+use crate::workflow::{Expected, GenerativeFiles, Wanted, sample_gp, sample_study_level};
 use anyhow::anyhow;
 use serde_json::json;
 use std::fmt::Write;
@@ -16,7 +17,8 @@ use std::path::PathBuf;
 /// Materials of one tissue: at standard deviations from the mean, or fitted to random curves
 ///
 /// Writes the materials and the posterior over the stretch as CSV. Levels are the paper's quantile envelopes (mean
-/// and k standard deviations of a new observation); draws are whole random curves.
+/// and k standard deviations of a new observation); draws are whole random curves. With `--model study-level` both are of
+/// `--of`: the tissue of a new person, what another laboratory publishes or finds on average, or the task's mean.
 ///
 /// Example: hgm gp sample --task hyperelastic-white --draws 1000 --law ogden
 #[derive(Debug, clap::Args)]
@@ -30,9 +32,14 @@ pub struct Args {
     /// Random curves instead of levels
     #[arg(long, value_name = "N", conflicts_with = "levels")]
     draws: Option<u64>,
-    /// What a draw is of: the tissue's own curve, or what one more study would report of it
-    #[arg(long, value_parser = spread, default_value = "tissue", value_name = "tissue|study")]
-    spread: Spread,
+    /// What a draw is of: the tissue's own curve, or what one more study would report of it [default: tissue]
+    #[arg(long, value_parser = spread, value_name = "tissue|study")]
+    spread: Option<Spread>,
+    #[command(flatten)]
+    model: ModelOption,
+    /// What materials of the study-level model are of [default: person]
+    #[arg(long, value_name = "mean|laboratory|person|study")]
+    of: Option<Of>,
     /// Also write the drawn curves, one column a draw
     #[arg(long, requires = "draws")]
     curves: bool,
@@ -60,7 +67,6 @@ fn spread(text: &str) -> Result<Spread, String> {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
-    let hyperparameters = args.hyperparameters.read()?;
     let levels = if args.levels.is_empty() { nine_levels().to_vec() } else { args.levels.clone() };
     if let Some(bad) = levels.iter().find(|level| level.is_nan() || level.abs() > 6.0) {
         return Err(Failure::Rejected(anyhow!("--levels {bad}: give standard deviations from -6 to 6")));
@@ -69,13 +75,30 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::Rejected(anyhow!("--draws {draws}: give 1 to 1000000")));
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
+    let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
+    if args.model.get() == Model::StudyLevel {
+        only_with(args.spread.is_some(), "--spread", "published")?;
+        let own = args.hyperparameters.study_level()?;
+        let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };
+        let wanted = match args.draws {
+            None => Expected::Levels(levels),
+            Some(count) => Expected::Draws { count, curves: args.curves },
+        };
+        let what = (args.task, args.of.unwrap_or_default());
+        let how = (&settings, own.as_ref().map(|file| &file.spreads));
+        return emit(sample_study_level(&studies, what, &wanted, how, seed, place)?, seed, session);
+    }
+    only_with(args.of.is_some(), "--of", "study-level")?;
+    let hyperparameters = args.hyperparameters.read()?;
     let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };
     let wanted = match args.draws {
         None => Wanted::Levels(levels),
-        Some(count) => Wanted::Draws { count, spread: args.spread, curves: args.curves },
+        Some(count) => Wanted::Draws { count, spread: args.spread.unwrap_or_default(), curves: args.curves },
     };
-    let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
-    let made = sample_gp(&studies, args.task, &wanted, &settings, seed, place)?;
+    emit(sample_gp(&studies, args.task, &wanted, &settings, seed, place)?, seed, session)
+}
+
+fn emit(made: GenerativeFiles, seed: u64, session: &Session) -> Result<(), Failure> {
     let (file, facts) = (made.files[0].display().to_string(), made.facts);
     session.emit(
         &json!({ "file": file, "settings": made.settings, "seed": seed, "result": facts }),

@@ -1,23 +1,27 @@
 //! `hgm gp show`: the paper's figures, table and tests.
 
-use super::options::{HyperparameterOptions, StudyOptions};
+use super::options::{HyperparameterOptions, Model, ModelOption, StudyOptions, only_with};
 use crate::cli::{Failure, Session};
 use crate::material::generative::SampleSettings;
-use crate::workflow::show_gp;
+use crate::workflow::{GenerativeFiles, show_gp, show_study_level};
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Figures of the posterior and of the meta-models, shear moduli per task, tests between the laws
 ///
 /// Writes fig-2-posterior.svg (twelve panels: studies, mean, 2 standard deviations), fig-3-meta-models.svg (four
-/// literature models with four fitted laws) and shear-moduli.csv.
+/// literature models with four fitted laws) and shear-moduli.csv. With `--model study-level`: study-level-bands.svg (95 % of the
+/// mean, of a laboratory's average, of a new study), study-level-left-out.svg (each publication against what all others say
+/// of it), study-level-moduli.csv, study-level-person.csv and study-level-left-out.csv.
 ///
 /// Example: hgm gp show --published -o paper
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Literature models of the second figure, by id
-    #[arg(long, value_delimiter = ',', default_value = "44,52,60,62", value_name = "ID,ID,...")]
+    /// Literature models of the second figure, by id [default: 44,52,60,62]
+    #[arg(long, value_delimiter = ',', value_name = "ID,ID,...")]
     models: Vec<u32>,
+    #[command(flatten)]
+    model: ModelOption,
     #[command(flatten)]
     studies: StudyOptions,
     #[command(flatten)]
@@ -27,11 +31,25 @@ pub struct Args {
     output: PathBuf,
 }
 
+/// The paper's Fig. 3.
+const MODELS: [u32; 4] = [44, 52, 60, 62];
+
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
+    if args.model.get() == Model::StudyLevel {
+        only_with(!args.models.is_empty(), "--models", "published")?;
+        let own = args.hyperparameters.study_level()?;
+        let made = show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?;
+        return emit(made, session);
+    }
+    let models = if args.models.is_empty() { &MODELS } else { args.models.as_slice() };
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters: args.hyperparameters.read()?, ..base };
-    let mut made = show_gp(&studies, &args.models, &settings, (&args.output, session.options.force))?;
+    let made = show_gp(&studies, models, &settings, (&args.output, session.options.force))?;
+    emit(made, session)
+}
+
+fn emit(mut made: GenerativeFiles, session: &Session) -> Result<(), Failure> {
     let text = made.facts.as_object_mut().and_then(|facts| facts.remove("text"));
     let files: Vec<String> = made.files.iter().map(|file| file.display().to_string()).collect();
     let shown = format!("{}\n{}", text.as_ref().and_then(|text| text.as_str()).unwrap_or_default(), files.join("\n"));

@@ -26,6 +26,8 @@ pub enum Unknown {
     Pressure(usize),
     /// Room before the wall of this number of the scenario's `contact`, mm.
     Gap(usize),
+    /// Level of the fluid of `loads.csf`, mm; the number is the level itself.
+    CsfLevel,
     /// Turn of gravity (an angle, not a logarithm) about one of the two axes across the direction given.
     GravityTurn(Turn),
 }
@@ -53,7 +55,7 @@ impl Unknown {
         match self {
             Self::GravityTurn(_) => Scale::Angle,
             Self::Shape(_, law) if *law == MetaModel::MOONEY_RIVLIN => Scale::Share,
-            Self::Shape(..) => Scale::Plain,
+            Self::Shape(..) | Self::CsfLevel => Scale::Plain,
             _ => Scale::Logarithm,
         }
     }
@@ -81,6 +83,7 @@ impl Unknown {
             Self::Shape(tissue, _) => format!("alpha of {}", tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
+            Self::CsfLevel => "level_mm of the fluid".to_owned(),
             Self::Gap(_) => "gap_mm between cortex and skull".to_owned(),
             Self::GravityTurn(Turn::Nodding) => "turn of gravity about left-right, degrees".to_owned(),
             Self::GravityTurn(Turn::Rolling) => "turn of gravity across that, degrees".to_owned(),
@@ -228,6 +231,11 @@ impl<'a> Body<'a> {
             match unknown {
                 Unknown::ShearModulus(_) | Unknown::Shape(..) | Unknown::GravityTurn(_) | Unknown::Gap(_) => {}
                 Unknown::Density => loads.density_kg_per_m3 = value.exp(),
+                Unknown::CsfLevel => {
+                    if let Some(csf) = &mut loads.csf {
+                        csf.level_mm = value;
+                    }
+                }
                 Unknown::Pressure(n) => {
                     let pressure = &mut loads.pressure[*n].pressure_pa;
                     *pressure = value.exp().copysign(*pressure);
@@ -261,14 +269,16 @@ impl<'a> Body<'a> {
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     }
 
-    /// Equilibrium and sensitivities at these parameters (logarithms, or angles).
+    /// Equilibrium alone at these parameters.
     ///
     /// # Errors
     /// The solver's.
-    pub fn solve(&mut self, log_parameters: &[f64]) -> Result<Solved, BodyError> {
-        if let Some(last) = self.last.as_ref().filter(|last| last.log_parameters == log_parameters) {
-            return Ok(last.solved.clone());
-        }
+    pub fn equilibrium(&mut self, log_parameters: &[f64]) -> Result<Outcome, BodyError> {
+        self.balanced(log_parameters).map(|(_, outcome, _)| outcome)
+    }
+
+    /// Equilibrium with the materials behind it and the solver's own state.
+    fn balanced(&mut self, log_parameters: &[f64]) -> Result<(Materials, Outcome, State), BodyError> {
         let loads = self.loads(log_parameters);
         if loads != self.template.loads {
             self.template.loads = loads;
@@ -283,11 +293,24 @@ impl<'a> Body<'a> {
         let start = self.last.as_ref().map(|last| last.towards(log_parameters, &self.model));
         let (outcome, state) = self.model.solve(&materials, start.as_ref(), &|_| {})?;
         self.solves += 1;
+        Ok((materials, outcome, state))
+    }
+
+    /// Equilibrium and sensitivities at these parameters (logarithms, or angles).
+    ///
+    /// # Errors
+    /// The solver's.
+    pub fn solve(&mut self, log_parameters: &[f64]) -> Result<Solved, BodyError> {
+        if let Some(last) = self.last.as_ref().filter(|last| last.log_parameters == log_parameters) {
+            return Ok(last.solved.clone());
+        }
+        let (materials, outcome, state) = self.balanced(log_parameters)?;
         // What to differentiate by, with the unknown it belongs to and its weight there.
         let mut by = Vec::new();
         for (n, unknown) in self.unknowns.iter().enumerate() {
             match unknown {
                 Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
+                Unknown::CsfLevel => by.push((By::CsfLevel, n, 1.0)),
                 Unknown::Pressure(number) => by.push((By::Load(Load::Pressure(*number)), n, 1.0)),
                 // By the gap itself, not by its logarithm.
                 Unknown::Gap(wall) => by.push((By::Gap(*wall), n, log_parameters[n].exp())),

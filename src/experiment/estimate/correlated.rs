@@ -170,7 +170,7 @@ pub(super) fn fit(
     let mut descent = if moved {
         fit.settle(start, errors.noise, &rough)?
     } else {
-        fit.descend_projected(&start, errors.noise, &rough)?
+        Descent { convergence: Convergence::NotSought, ..start }
     };
     let mut taken_out_rms_mm = None;
     if let Some((instrument, rounds)) = instrument {
@@ -329,7 +329,11 @@ impl Fit<'_, '_> {
             shift: Shift {
                 seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),
-                explained_share: 1.0 - residuals.norm_squared() / shifted.norm_squared().max(f64::MIN_POSITIVE),
+                explained_share: if seen_at_all {
+                    1.0 - residuals.norm_squared() / shifted.norm_squared().max(f64::MIN_POSITIVE)
+                } else {
+                    0.0
+                },
                 would_be_seen_mm: size.map_or(0.0, |(_, sd)| CONTRADICTION_SD * sd * largest_mm),
                 largest_share: size.filter(|_| !seen_at_all).map(|(share, sd)| share.max(0.0) + Z_95_ONE_SIDED * sd),
             },

@@ -71,7 +71,7 @@ pub struct Shift {
     pub seen: bool,
     /// Root mean square of the displacement seen, rigid remainder taken away, mm.
     pub seen_rms_mm: f64,
-    /// Share of it that the model explains.
+    /// Share of it that the model explains; zero where nothing was seen to move.
     pub explained_share: f64,
     /// The shift, at its largest place, that would have been seen (three standard deviations of its size), mm.
     pub would_be_seen_mm: f64,

@@ -79,6 +79,8 @@ pub enum Convergence {
     NoDescent,
     /// The iterations ran out: the figures are the best found, not a minimum.
     IterationsExhausted,
+    /// Nothing was seen to move: there is no minimum to be looked for, and the figures are the prior's.
+    NotSought,
 }
 
 /// The best point found and the way there.

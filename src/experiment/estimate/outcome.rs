@@ -7,7 +7,7 @@ use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, without_own_error};
 use super::verdict_of_fit::{Posed, verdict_of_fit};
-use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, estimate, information, laplace};
+use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, Z_95, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::{Finding, Verdict};
@@ -125,6 +125,25 @@ pub struct Estimate {
     pub materials: BTreeMap<String, Material>,
     /// The unknowns' numbers at the mode, as [`Problem::start`] takes them.
     pub numbers: Vec<f64>,
+}
+
+impl Estimate {
+    /// The state of what has not been seen to move: at rest, as sure as the measurement is of that. That of the mode, a body
+    /// which the prior made, would be a shift that nobody saw.
+    #[must_use]
+    pub fn at_rest(mut self) -> Self {
+        let reach_mm = self.outcome.shift.map_or(0.0, |shift| shift.would_be_seen_mm);
+        self.state.displacement_mm.fill([0.0; 3]);
+        self.state.reaction_n.fill([0.0; 3]);
+        self.state.jacobian.fill(1.0);
+        self.state.strain_energy_density_pa.fill(0.0);
+        self.state.contact.clear();
+        self.state.contact_pressure_pa.clear();
+        // The reach is 1.96 standard deviations of one of three components.
+        self.displacement_sd_mm.fill(reach_mm * 3f64.sqrt() / Z_95);
+        self.displacement_95_mm.fill(reach_mm);
+        self
+    }
 }
 
 /// How far a single room between cortex and skull is off for a head, mm: it differs from place to place by more, and a
@@ -462,10 +481,7 @@ mod tests {
     }
 
     /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.
-    fn seen_by_a_model_of_a_push_from_above(
-        force_n: Option<[f64; 3]>,
-        add: impl Fn([f64; 3]) -> [f64; 3],
-    ) -> EstimateOutcome {
+    fn seen_by_a_model_of_a_push_from_above(force_n: Option<[f64; 3]>, add: impl Fn([f64; 3]) -> [f64; 3]) -> Estimate {
         let (mesh, settings) = (block(5), settings());
         let u = match force_n {
             Some(two_tissue_force_n) => {
@@ -494,12 +510,12 @@ mod tests {
             body_known: false,
             ..problem(&mesh, &scenario, every_node(&observed))
         };
-        solve_problem(problem, &EstimateSettings::default()).unwrap().outcome
+        solve_problem(problem, &EstimateSettings::default()).unwrap()
     }
 
     #[test]
     fn a_shift_of_everything_is_taken_for_the_registrations_and_not_for_the_moduli() {
-        let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.06, -0.04, 0.05]);
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.06, -0.04, 0.05]).outcome;
         for (n, truth) in [1370.0, 990.0].into_iter().enumerate() {
             let [low, high] = found.posterior.interval_95[n];
             assert!(low < truth && truth < high, "{:?}", found.posterior);
@@ -513,7 +529,8 @@ mod tests {
     #[test]
     fn without_a_shift_there_is_a_bound_and_no_stiffness() {
         let wave = |x: [f64; 3]| [0.01 * (0.2 * x[1]).sin(), 0.01 * (0.15 * x[2]).cos(), 0.01 * (0.25 * x[0]).sin()];
-        let found = seen_by_a_model_of_a_push_from_above(None, wave);
+        let whole = seen_by_a_model_of_a_push_from_above(None, wave);
+        let found = whole.outcome.clone();
         assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
         let bounds = found.verdict.moduli.iter().map(|(_, answer)| match answer {
             Claim::Above { bound_pa } => *bound_pa,
@@ -523,11 +540,16 @@ mod tests {
         assert!(bounds.into_iter().all(|bound| bound > 4000.0), "{:?}", found.verdict);
         let said = &found.posterior.identifiability.verdicts;
         assert!(said.iter().all(|v| *v != crate::experiment::estimate::Knowledge::Identified), "{said:?}");
+        // The state is rest, as sure as the measurement is of it.
+        let reach_mm = found.shift.unwrap().would_be_seen_mm;
+        let state = whole.at_rest();
+        assert!(state.state.displacement_mm.iter().all(|u| *u == [0.0; 3]) && reach_mm > 0.0);
+        assert!(state.displacement_95_mm.iter().all(|reach| *reach == reach_mm));
     }
 
     #[test]
     fn a_push_from_the_side_is_not_explained_by_one_from_above() {
-        let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]);
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]).outcome;
         assert!(!found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
         assert!(found.shift.unwrap().seen, "{:?}", found.odds);
     }

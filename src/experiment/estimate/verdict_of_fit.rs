@@ -95,7 +95,11 @@ pub(super) fn verdict_of_fit(
         _ => Claim::Withheld,
     };
     let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
-    let mut reasons: Vec<Reason> = still.into_iter().chain(conflict).chain(unexplained).chain(wider).collect();
+    // Of what has not moved there is nothing to be explained, well or badly.
+    let mut reasons: Vec<Reason> = match still {
+        Some(still) => vec![still],
+        None => conflict.into_iter().chain(unexplained).chain(wider).collect(),
+    };
     if finding.has_stiffness() {
         let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != Knowledge::Identified);
         reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));

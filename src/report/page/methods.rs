@@ -68,7 +68,8 @@ pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
     if outcome.mesh.as_ref().is_some_and(|m| m.engine == "cgal") {
         all.push(CGAL);
     }
-    if !outcome.samples.is_empty() || outcome.estimate.is_some() {
+    let predicted = outcome.kind == ExperimentKind::Prediction;
+    if !outcome.samples.is_empty() || outcome.estimate.is_some() || predicted {
         all.push(GENERATIVE_MODEL);
     }
     all
@@ -118,6 +119,10 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
         "Processing was done with hgm " (env!("CARGO_PKG_VERSION")) ", research software"
         @match outcome.kind {
             ExperimentKind::Phantom => { ", on the MNI152NLin2009aSym template " (cite(TEMPLATE)) ". " },
+            ExperimentKind::Prediction => {
+                ". The pre-operative image was registered rigidly to the MNI152NLin2009aSym template " (cite(TEMPLATE))
+                ", so that sizes stay the patient's. The tissue of the plan was removed from the mesh. "
+            },
             ExperimentKind::Resection => {
                 ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
                  MNI152NLin2009aSym template " (cite(TEMPLATE))
@@ -137,6 +142,10 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
         @if simulated && !outcome.loads.is_empty() { "Loads: " (list(&outcome.loads)) ". " }
         @if swept > 0 { (of_samples(outcome, swept, &cite(GENERATIVE_MODEL))) }
         @if let Some(estimate) = &outcome.estimate { (of_estimate(outcome, estimate, &cite(GENERATIVE_MODEL))) }
+        @if outcome.kind == ExperimentKind::Prediction {
+            "Unknowns were drawn by Halton's sequence from the priors stated above " (cite(GENERATIVE_MODEL))
+            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities. "
+        }
         @if !outcome.held_shear_modulus_pa.is_empty() && simulated {
             "Held at the mean of the prior of abnormal tissue: "
             (list(&outcome.held_shear_modulus_pa.keys().map(|name| tissue_name(name)).collect::<Vec<_>>())) ". "

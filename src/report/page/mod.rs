@@ -6,9 +6,11 @@ mod estimate;
 mod glance;
 mod methods;
 mod parts;
+mod prediction;
 mod results;
 
 pub use methods::{Reference, references};
+pub use prediction::in_a_sentence as expected_in_a_sentence;
 pub use results::set_name;
 
 use super::chart;
@@ -20,6 +22,7 @@ use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use crate::experiment::predict::Prediction;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("../assets/page.css");
@@ -60,6 +63,15 @@ pub struct ShiftFigure {
     pub pictures: Vec<CaptionedPicture>,
 }
 
+/// A prediction on a slice: the expected shift, and how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictionFigure {
+    /// Expected shift and its reach, with the colours of both.
+    pub shift: ShiftFigure,
+    /// Its standard deviation.
+    pub spread: ShiftFigure,
+}
+
 /// Everything a page can show. What is absent is left out, and said so in `absent`.
 #[derive(Clone, Debug, Default)]
 pub struct CasePage {
@@ -75,6 +87,10 @@ pub struct CasePage {
     pub absent: Vec<String>,
     /// What the experiment found.
     pub outcome: Option<ExperimentOutcome>,
+    /// How the brain is expected to move.
+    pub prediction: Option<Prediction>,
+    /// The same on slices.
+    pub prediction_figure: Option<PredictionFigure>,
     /// The brain shift in numbers.
     pub brain_shift: Option<BrainShift>,
     /// Slices for the first screen.
@@ -209,7 +225,11 @@ impl CasePage {
         let note = "The images are masked to the brain; of the scans' headers the page holds no names, dates or places (the \
                     heading is the folder's name), and it makes no request to any other place.";
         let glance = glance::block(self.outcome.as_ref(), self.glance.as_ref(), self.brain_shift.as_ref());
-        let first = html! { (glance) (self.warnings_box()) };
+        let expected = self.prediction.as_ref().map(prediction::in_a_sentence);
+        let first = html! {
+            @if let Some(expected) = expected { p class="verdict" { (expected) } "\n" }
+            (glance) (self.warnings_box())
+        };
         frame.html(&first, &self.sections(), note, &scripts)
     }
 
@@ -222,7 +242,11 @@ impl CasePage {
         let shift = self.brain_shift.as_ref().filter(|shift| !shift.states.is_empty());
         let figure = self.shift_figure.as_ref().map(shift_pictures);
         let landmarks = self.landmarks.as_ref();
-        add("summary", "Summary", outcome.map(results::summary));
+        let expected = self.prediction_figure.as_ref();
+        let expected = expected.map(|f| html! { (shift_pictures(&f.shift)) (shift_pictures(&f.spread)) });
+        add("expected", "Expected brain shift", self.prediction.as_ref().map(|p| prediction::section(p, expected)));
+        let compared = outcome.filter(|o| o.kind != ExperimentKind::Prediction);
+        add("summary", "Summary", compared.map(results::summary));
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
         add("registration", "Registration", self.registration_section());
@@ -319,6 +343,7 @@ impl maud::Render for Given {
 pub fn title_of(outcome: Option<&ExperimentOutcome>) -> &'static str {
     match outcome.map(|o| (o.kind, o.samples.is_empty(), o.answer)) {
         Some((ExperimentKind::Phantom, ..)) => "A phantom: known moduli, looked for again",
+        Some((ExperimentKind::Prediction, ..)) => "Brain shift expected of a planned resection",
         Some((ExperimentKind::Resection, true, Some(_))) => "Two scans compared",
         Some((ExperimentKind::Resection, false, _)) => "Brain deformation after resection",
         Some((ExperimentKind::Resection, true, None)) | None => "Prepared case",

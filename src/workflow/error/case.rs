@@ -28,6 +28,10 @@ pub enum CaseError {
     Phantom { folder: PathBuf },
     #[error("{}: this is a patient's case, and a phantom is asked for", folder.display())]
     Patient { folder: PathBuf },
+    #[error("{}: this is a prediction before an operation, and a case of two scans is asked for", folder.display())]
+    Planned { folder: PathBuf },
+    #[error("{}: this is a case of two scans or a phantom, and a prediction from one scan is asked for", folder.display())]
+    NotPlanned { folder: PathBuf },
     #[error("{}: the case was made from another {which} scan", folder.display())]
     OtherScan { folder: PathBuf, which: &'static str },
     #[error("{}: {what} is not of the present state: {}", folder.display(), in_words(reasons))]

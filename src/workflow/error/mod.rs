@@ -5,6 +5,7 @@ mod input;
 mod label_map;
 mod landmarks;
 mod mesh_file;
+mod predict;
 mod simulation;
 mod warp;
 
@@ -13,6 +14,7 @@ pub use input::{InputError, MaskRole};
 pub use label_map::LabelMapError;
 pub use landmarks::LandmarkError;
 pub use mesh_file::MeshFileError;
+pub use predict::PredictError;
 pub use simulation::SimulationError;
 pub use warp::WarpError;
 
@@ -30,6 +32,7 @@ use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
 use crate::material::literature::StudyError;
 use crate::material::meta_model::FitError;
+use crate::material::study_level;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
 use crate::overlay::OverlayError;
@@ -90,6 +93,10 @@ pub enum WorkflowError {
     Studies { file: String, source: StudyError },
     #[error("{file}: {source}")]
     Hyperparameters { file: String, source: HyperparametersError },
+    #[error("{file}: {reason}; make it with hgm gp fit --model study-level")]
+    StudyLevelFile { file: String, reason: String },
+    #[error(transparent)]
+    StudyLevel(#[from] study_level::FitError),
     #[error("there is no literature model {id}; ids go from 0 to {last}")]
     NoSuchModel { id: u32, last: u32 },
     #[error(transparent)]
@@ -128,6 +135,8 @@ pub enum WorkflowError {
     Overlay(#[from] OverlayError),
     #[error(transparent)]
     Warp(#[from] WarpError),
+    #[error(transparent)]
+    Predict(#[from] PredictError),
     #[error(transparent)]
     Landmark(#[from] LandmarkError),
     #[error(transparent)]
@@ -174,6 +183,7 @@ impl WorkflowError {
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)
             | Self::NoReferenceState { .. }
+            | Self::Predict(PredictError::NoEquilibrium { .. })
             | Self::Synth(SynthError::Sag(_))
             | Self::Mesh(MeshFileError::Noted { .. } | MeshFileError::Format { .. })
             | Self::Simulation(SimulationError::NotFinite { .. } | SimulationError::Noted { .. })

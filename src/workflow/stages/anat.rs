@@ -73,20 +73,24 @@ impl Anatomy {
             let displacement = nifti::decode_vectors(&case.read(name)?, name)?;
             Ok(DisplacementField::from_displacement(&displacement.relabelled()))
         };
-        let mut labels: LabelMap<Mni> = labels.relabelled();
-        for (l, taken) in labels.data.iter_mut().zip(&resected.data) {
-            if *taken && *l != label::VENTRICLE {
-                *l = label::RESECTED;
-            }
-        }
         Ok(Self {
-            labels,
+            labels: without_resected(labels.relabelled(), &resected),
             cavity,
             post_ventricle,
             sag: field(SAG)?,
             template_from_patient: field(TEMPLATE_DISPLACEMENT)?,
         })
     }
+}
+
+/// The labels with what is taken as a label of its own; a ventricle that is opened stays one.
+pub(super) fn without_resected(mut labels: LabelMap<Mni>, resected: &Mask<Mni>) -> LabelMap<Mni> {
+    for (l, taken) in labels.data.iter_mut().zip(&resected.data) {
+        if *taken && *l != label::VENTRICLE {
+            *l = label::RESECTED;
+        }
+    }
+    labels
 }
 
 /// The stage with its settings and its inputs but for the user's own masks.
@@ -186,7 +190,7 @@ pub(crate) fn anat(
 }
 
 /// Intensities as 16-bit whole numbers, scaled so that the brightest keeps three digits.
-fn whole_numbers(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
+pub(super) fn whole_numbers(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
     let highest = volume.data.iter().copied().fold(0.0f32, f32::max);
     let scale = if (500.0..32000.0).contains(&highest) { 1.0 } else { 4000.0 / highest.max(1e-6) };
     volume.map(|x| (x * scale).round().clamp(0.0, 32000.0) as i16)

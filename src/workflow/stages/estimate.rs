@@ -12,6 +12,7 @@ use crate::experiment::prior::{PriorSettings, law_priors};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::sweep::Reference;
+use crate::experiment::verdict::Finding;
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
@@ -25,7 +26,7 @@ use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -132,7 +133,7 @@ pub(super) fn held_by(work: &Work<'_>) -> serde_json::Value {
     let ResectionSettings { supports, falx, skull, .. } = &work.settings.resection;
     match work.subject {
         Subject::Patient => serde_json::json!({ "supports": supports, "falx": falx, "skull": skull }),
-        Subject::Phantom { .. } => serde_json::Value::Null,
+        Subject::Phantom { .. } | Subject::Plan => serde_json::Value::Null,
     }
 }
 
@@ -354,6 +355,7 @@ fn produced(
     comparison: Option<Comparison>,
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
+    let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
     let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials, numbers: _ } = found;
     let errors = body.reference.errors(mesh, &state.displacement_mm);
     let tissue = |t: &Tissue| {

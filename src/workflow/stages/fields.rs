@@ -98,7 +98,7 @@ fn files(state: &str, field: &ShiftField, case: &CaseShift<'_>, produced: &mut P
 }
 
 /// The pre-operative scan and its labels carried to the deformed state, on the scan's own grid.
-fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produced) -> Result<(), WorkflowError> {
+pub(super) fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produced) -> Result<(), WorkflowError> {
     let options = ReadOptions::default();
     let t1: Volume<f32, Pre> =
         nifti::decode(&work.case.read(PRE_NATIVE_T1)?, PRE_NATIVE_T1, &options)?.volume.relabelled();

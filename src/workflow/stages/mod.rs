@@ -10,6 +10,9 @@ mod estimate;
 mod fields;
 mod labels;
 mod mesh;
+mod plan;
+mod pose;
+mod predict;
 mod reading;
 mod reference;
 mod registration;
@@ -27,6 +30,9 @@ pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
 pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
+pub(crate) use plan::{PlannedHead, plan};
+pub(crate) use pose::pose;
+pub(crate) use predict::{PredictInput, predict};
 pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,
     reference_stage,

@@ -5,7 +5,7 @@ use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::RegistrationOutcome;
 use crate::experiment::resection::GravityFrame;
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
-use crate::image::Grid;
+use crate::image::{Grid, LabelMap, Volume};
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
 use crate::register::{RigidFit, RigidMasks, register_rigid};
@@ -59,18 +59,8 @@ pub(crate) fn registration(
         let mut produced = Produced::default();
         produced.warnings.extend(scans.warnings.iter().cloned());
         produced.warnings.extend(pre_from_post.warnings.iter().map(|w| format!("post to pre: {w}")));
-        let (mni_from_pre, fit) = if let Some((pose, _)) = &own.pose {
-            (*pose, by_hand(pose, &scans.pre.grid))
-        } else {
-            let found = match &own.labels {
-                // A label map says where the brain is, whatever the scan's contrast.
-                Some((labels, _)) => pose_of_labels(labels),
-                None => pose_of_head(&scans.pre),
-            };
-            let found = found.map_err(refused("the pre-operative scan (moving) onto the MNI template (fixed)"))?;
-            produced.warnings.extend(found.warnings.iter().map(|w| format!("pre to MNI: {w}")));
-            (found.fixed_from_moving, outcome(&found, &scans.pre.grid))
-        };
+        let given = (own.pose.as_ref().map(|(pose, _)| pose), own.labels.as_ref().map(|(labels, _)| labels));
+        let (mni_from_pre, fit) = pose_of(&scans.pre, given, &mut produced.warnings)?;
         work.tell(|p| p.end());
         let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
         write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
@@ -82,15 +72,39 @@ pub(crate) fn registration(
     })
 }
 
+/// The pose of the pre-operative scan in the MNI frame: given, or found from a label map or from the scan.
+pub(super) fn pose_of(
+    pre: &Volume<f32, Pre>,
+    (given, labels): (Option<&RigidTransform<Pre, Mni>>, Option<&LabelMap<Pre>>),
+    warnings: &mut Vec<String>,
+) -> Result<(RigidTransform<Pre, Mni>, RegistrationOutcome), WorkflowError> {
+    if let Some(pose) = given {
+        return Ok((*pose, by_hand(pose, &pre.grid)));
+    }
+    let found = match labels {
+        // A label map says where the brain is, whatever the scan's contrast.
+        Some(labels) => pose_of_labels(labels),
+        None => pose_of_head(pre),
+    };
+    let what = "the pre-operative scan (moving) onto the MNI template (fixed)";
+    let found = found.map_err(|source| WorkflowError::Registration { what, source })?;
+    warnings.extend(found.warnings.iter().map(|w| format!("pre to MNI: {w}")));
+    Ok((found.fixed_from_moving, outcome(&found, &pre.grid)))
+}
+
 /// Post to pre, and pre to MNI.
 type Poses = (RigidTransform<Post, Pre>, RigidTransform<Pre, Mni>);
 
 /// The two transforms of a case, as the files hold them.
 pub(crate) fn transforms(case: &Case) -> Result<Poses, WorkflowError> {
-    let (post, pre) = (layout::PRE_FROM_POST_TEXT, layout::MNI_FROM_PRE_TEXT);
-    let pre_from_post = rigid_from_text(&case.read_text(post)?, post)?;
-    let mni_from_pre = rigid_from_text(&case.read_text(pre)?, pre)?;
-    Ok((pre_from_post, mni_from_pre))
+    let post = layout::PRE_FROM_POST_TEXT;
+    Ok((rigid_from_text(&case.read_text(post)?, post)?, pose(case)?))
+}
+
+/// Pre to MNI, as the file holds it.
+pub(crate) fn pose(case: &Case) -> Result<RigidTransform<Pre, Mni>, WorkflowError> {
+    let pre = layout::MNI_FROM_PRE_TEXT;
+    Ok(rigid_from_text(&case.read_text(pre)?, pre)?)
 }
 
 /// What turns a vector of the frame that gravity is given in to the MNI frame.
@@ -103,7 +117,7 @@ pub(crate) fn mni_from_gravity_frame(case: &Case, frame: GravityFrame) -> Result
     })
 }
 
-fn write_transform<M: Frame, F: Frame>(
+pub(super) fn write_transform<M: Frame, F: Frame>(
     produced: &mut Produced,
     text: &str,
     itk: &str,

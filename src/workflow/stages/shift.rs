@@ -79,7 +79,7 @@ pub(crate) fn brain_shift(case: &Case) -> Result<Option<BrainShift>, WorkflowErr
 }
 
 /// A mask of the case on a grid.
-fn mask_of<F: Frame>(case: &Case, name: &str, grid: &Grid<F>) -> Result<Mask<F>, WorkflowError> {
+pub(super) fn mask_of<F: Frame>(case: &Case, name: &str, grid: &Grid<F>) -> Result<Mask<F>, WorkflowError> {
     let (labels, _) = nifti::decode_labels(&case.read(name)?, name, &ReadOptions::default())?;
     let mask: Mask<F> = labels.relabelled::<F>().map(|l| l > 0);
     Ok(if mask.grid.coincides(grid, 1e-3) { mask } else { mask_on(&mask, grid, &RigidTransform::identity()) })
@@ -91,7 +91,7 @@ pub(crate) fn grid_of<F: Frame>(case: &Case, name: &str) -> Result<Grid<F>, Work
     Ok(labels.grid.relabelled::<Native>().relabelled())
 }
 
-fn spaced<F: Frame>(grid: Grid<F>, spacing_mm: f64) -> Grid<F> {
+pub(super) fn spaced<F: Frame>(grid: Grid<F>, spacing_mm: f64) -> Grid<F> {
     if spacing_mm > 0.0 { grid_with_spacing(&grid, [spacing_mm; 3]) } else { grid }
 }
 

@@ -1,0 +1,149 @@
+//! What is to be taken out, by a mask on the labels of the pre-operative scan.
+
+use crate::geometry::Frame;
+use crate::image::components::{Connectivity, components};
+use crate::image::{Grid, LabelMap, Mask};
+use crate::segment::label;
+use nalgebra::Point3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A plan in numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Planned {
+    /// Tissue that is to be taken, cc.
+    pub resected_cc: f64,
+    /// Tissue of the whole brain, cc.
+    pub tissue_cc: f64,
+    /// Part of the mask that lies outside the brain.
+    pub outside: f64,
+}
+
+/// Why a plan cannot be followed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum PlannedError {
+    #[error("{plan}: the mask is empty; draw what is to be taken, or check which label means it")]
+    Empty { plan: String },
+    #[error(
+        "{plan}: {percent:.0} % of what is to be taken lies outside the brain of this scan; check that it was drawn on this scan, in \
+         its grid and frame (mm, RAS+)"
+    )]
+    Outside { plan: String, percent: f64 },
+    #[error(
+        "{plan}: it touches no grey or white matter, only fluid ({cc:.2} cc): nothing would be taken; draw it on the tissue that is \
+         to be taken"
+    )]
+    NoTissue { plan: String, cc: f64 },
+    #[error(
+        "{plan}: it would take {resected_cc:.0} of {tissue_cc:.0} cc of tissue, more than half of the brain; check that it marks what is \
+         taken and not what stays"
+    )]
+    MoreThanHalf { plan: String, resected_cc: f64, tissue_cc: f64 },
+    #[error(
+        "{plan}: it would cut the brain in two: {apart_cc:.0} cc would hang on nothing; leave a bridge of tissue, or take the part \
+         behind the cut as well"
+    )]
+    InTwo { plan: String, apart_cc: f64 },
+}
+
+/// More of a mask than this outside the brain: it belongs to another scan.
+const MOST_OUTSIDE: f64 = 0.5;
+/// A part that comes loose and is larger than this is half a brain; smaller ones are specks at the border, cc.
+const LARGEST_SPECK_CC: f64 = 10.0;
+
+/// Looks at a plan before anything is computed from it; `plan` is its name for messages.
+///
+/// # Errors
+/// [`PlannedError`] says what is wrong with it and what to do.
+pub fn planned<F: Frame>(plan: &str, mask: &Mask<F>, labels: &LabelMap<F>) -> Result<Planned, PlannedError> {
+    let plan = || plan.to_owned();
+    let voxel_cc = labels.grid.voxel_volume_mm3() / 1000.0;
+    let both = || mask.data.iter().zip(&labels.data);
+    let marked = mask.count();
+    if marked == 0 {
+        return Err(PlannedError::Empty { plan: plan() });
+    }
+    let inside = both().filter(|(m, l)| **m && **l != label::BACKGROUND).count();
+    let outside = 1.0 - inside as f64 / marked as f64;
+    if outside > MOST_OUTSIDE {
+        return Err(PlannedError::Outside { plan: plan(), percent: 100.0 * outside });
+    }
+    let taken = both().filter(|(m, l)| **m && label::is_tissue(**l)).count();
+    if taken == 0 {
+        return Err(PlannedError::NoTissue { plan: plan(), cc: marked as f64 * voxel_cc });
+    }
+    let tissue = labels.map(label::is_tissue);
+    let found = Planned { resected_cc: taken as f64 * voxel_cc, tissue_cc: tissue.count() as f64 * voxel_cc, outside };
+    if found.resected_cc > 0.5 * found.tissue_cc {
+        let (resected_cc, tissue_cc) = (found.resected_cc, found.tissue_cc);
+        return Err(PlannedError::MoreThanHalf { plan: plan(), resected_cc, tissue_cc });
+    }
+    let left = Mask::from_fn(labels.grid, |n| tissue.data[n] && !mask.data[n]);
+    let apart_cc = (second_largest(&left) as f64 - second_largest(&tissue) as f64) * voxel_cc;
+    if apart_cc > LARGEST_SPECK_CC {
+        return Err(PlannedError::InTwo { plan: plan(), apart_cc });
+    }
+    Ok(found)
+}
+
+/// Voxels of the second largest part.
+fn second_largest<F: Frame>(mask: &Mask<F>) -> usize {
+    let mut voxels = components(mask, Connectivity::Faces).voxels;
+    voxels.sort_unstable_by(|a, b| b.cmp(a));
+    voxels.get(1).copied().unwrap_or(0)
+}
+
+/// The voxels of a grid whose centre lies in an ellipsoid along the axes of its frame, mm.
+pub fn ellipsoid_mask<F: Frame>(grid: &Grid<F>, centre_mm: [f64; 3], half_axes_mm: [f64; 3]) -> Mask<F> {
+    Mask::from_fn(*grid, |n| {
+        let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+        (0..3).map(|a| ((p[a] - centre_mm[a]) / half_axes_mm[a]).powi(2)).sum::<f64>() <= 1.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mni;
+
+    /// Two blocks of tissue with a bridge between them, fluid around.
+    fn labels() -> LabelMap<Mni> {
+        let grid = Grid::<Mni>::axis_aligned([60, 40, 40], [1.0; 3], [0.0; 3]);
+        LabelMap::from_fn(grid, |n| {
+            let [x, y, z] = grid.voxel(n);
+            let within = |v: usize, low: usize, high: usize| (low..high).contains(&v);
+            if within(x, 5, 55) && within(y, 5, 35) && within(z, 5, 35) {
+                let bridge = within(y, 15, 25) && within(z, 15, 25);
+                if within(x, 27, 33) && !bridge { label::CSF } else { label::WHITE_MATTER }
+            } else {
+                label::BACKGROUND
+            }
+        })
+    }
+
+    fn of(centre: [f64; 3], half_axes: [f64; 3]) -> Result<Planned, PlannedError> {
+        let labels = labels();
+        planned("plan.nii", &ellipsoid_mask(&labels.grid, centre, half_axes), &labels)
+    }
+
+    #[test]
+    fn a_plan_is_taken_where_it_takes_a_piece_and_refused_where_it_cannot_be_followed() {
+        let good = of([15.0, 20.0, 30.0], [8.0, 6.0, 8.0]).unwrap();
+        assert!(good.resected_cc > 0.5 && good.outside < 0.5 && good.resected_cc < 0.05 * good.tissue_cc, "{good:?}");
+        let said = |centre, half_axes| of(centre, half_axes).unwrap_err().to_string();
+        let cases = [
+            ([15.0, 20.0, 20.3], [0.1; 3], "is empty"),
+            ([15.0, 20.0, 39.0], [4.0; 3], "outside the brain"),
+            ([29.5, 8.0, 8.0], [2.0; 3], "touches no grey or white matter"),
+            ([20.0, 20.0, 20.0], [40.0, 30.0, 30.0], "more than half"),
+            ([29.5, 19.5, 19.5], [4.0, 12.0, 12.0], "cut the brain in two"),
+        ];
+        for (centre, half_axes, words) in cases {
+            let said = said(centre, half_axes);
+            assert!(said.contains(words) && said.starts_with("plan.nii: "), "{said}");
+        }
+    }
+}

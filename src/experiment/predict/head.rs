@@ -1,0 +1,140 @@
+//! How the head lies in theatre.
+
+use crate::geometry::{Mni, Pre, RigidTransform};
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// The way down, as a word for how the patient lies or as a direction of the scanner.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(into = "String", try_from = "String")]
+pub enum Head {
+    /// On the back: down is towards the back of the head.
+    Supine,
+    /// On the face.
+    Prone,
+    /// On the left side.
+    Left,
+    /// On the right side.
+    Right,
+    /// Upright: down is towards the feet.
+    Sitting,
+    /// A direction of the pre-operative scanner's frame (RAS+), of any length.
+    Down([f64; 3]),
+}
+
+/// Why a word says nothing of a head.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error(
+    "`{0}` is no way to lie: say supine, prone, left, right, sitting or the way down as x,y,z (scanner, RAS+), not all 0"
+)]
+pub struct HeadParseError(String);
+
+impl FromStr for Head {
+    type Err = HeadParseError;
+
+    fn from_str(text: &str) -> Result<Self, HeadParseError> {
+        let wrong = || HeadParseError(text.to_owned());
+        Ok(match text.trim() {
+            "supine" => Self::Supine,
+            "prone" => Self::Prone,
+            "left" => Self::Left,
+            "right" => Self::Right,
+            "sitting" => Self::Sitting,
+            other => {
+                let numbers: Vec<f64> =
+                    other.split(',').map(|x| x.trim().parse()).collect::<Result<_, _>>().map_err(|_| wrong())?;
+                let down: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
+                let length = Vector3::from(down).norm();
+                if !(length > 1e-6 && length.is_finite()) {
+                    return Err(wrong());
+                }
+                Self::Down(down)
+            }
+        })
+    }
+}
+
+impl TryFrom<String> for Head {
+    type Error = HeadParseError;
+
+    fn try_from(text: String) -> Result<Self, HeadParseError> {
+        text.parse()
+    }
+}
+
+impl From<Head> for String {
+    fn from(head: Head) -> Self {
+        head.to_string()
+    }
+}
+
+impl fmt::Display for Head {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Supine => "supine",
+            Self::Prone => "prone",
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Sitting => "sitting",
+            Self::Down([x, y, z]) => return write!(f, "{x},{y},{z}"),
+        })
+    }
+}
+
+impl Head {
+    /// Gravity in the MNI frame, m/s2. Words are of the head's own axes, which the MNI frame has and a scanner has nearly.
+    pub fn gravity_m_per_s2(&self, mni_from_pre: &RigidTransform<Pre, Mni>) -> [f64; 3] {
+        const G: f64 = 9.81;
+        let down = match self {
+            Self::Supine => -Vector3::y(),
+            Self::Prone => Vector3::y(),
+            Self::Left => -Vector3::x(),
+            Self::Right => Vector3::x(),
+            Self::Sitting => -Vector3::z(),
+            Self::Down(down) => mni_from_pre.rotation * Vector3::from(*down).normalize(),
+        };
+        // Plus zero: no -0 in a file.
+        (G * down).map(|x| x + 0.0).into()
+    }
+
+    /// The name of its state among a case's files: a word, or `head-2` for a direction.
+    pub fn name(&self, number: usize) -> String {
+        match self {
+            Self::Down(_) => format!("head-{}", number + 1),
+            word => word.to_string(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_head_is_a_word_or_a_direction_and_nothing_else() {
+        for text in ["supine", "prone", "left", "right", "sitting", "0,-1,0.5"] {
+            assert_eq!(text.parse::<Head>().unwrap().to_string(), text);
+        }
+        for text in ["0,0,0", "1,2", "nan,0,1", "inf,0,0", "upside-down", "", "0,0,1,0"] {
+            let said = text.parse::<Head>().unwrap_err().to_string();
+            assert!(said.contains("supine, prone") && said.contains(text), "{said}");
+        }
+    }
+
+    #[test]
+    fn who_lies_on_the_back_is_pulled_to_the_back_of_the_head_wherever_the_scanner_was() {
+        let turned = RigidTransform::<Pre, Mni>::about(
+            [0.0; 3].into(),
+            Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2),
+            Vector3::zeros(),
+        );
+        assert_eq!(Head::Supine.gravity_m_per_s2(&turned), [0.0, -9.81, 0.0]);
+        let g = Head::Down([2.0, 0.0, 0.0]).gravity_m_per_s2(&turned);
+        assert!(g[0].abs() < 1e-12 && (g[1] - 9.81).abs() < 1e-12, "{g:?}");
+        assert_eq!([Head::Left.name(1), Head::Down([0.0, 1.0, 0.0]).name(1)], ["left", "head-2"]);
+    }
+}

@@ -1,0 +1,35 @@
+//! Before the operation: how a brain will move, and how sure that is.
+//!
+//! What is not known (stiffness, load, direction of gravity, room under the skull, supports) has a stated prior. A few
+//! equilibria with their sensitivities make a [`Response`] of every node to the unknowns, which quasi-random draws from the
+//! priors are read from ([`Spread`]); some draws are solved whole to tell how far that is off ([`Check`]).
+
+mod check;
+mod cut;
+mod ellipsoid;
+mod forecast;
+mod head;
+mod low_discrepancy;
+mod outcome;
+mod place;
+mod planned;
+mod response;
+mod settings;
+mod shares;
+mod spread;
+mod uncertain;
+
+pub use check::{Check, checked};
+pub use cut::{Planned, PlannedError, ellipsoid_mask, planned};
+pub use ellipsoid::{Ellipsoid, ellipsoid_95};
+pub use forecast::{Forecast, ForecastError, Posed, forecast};
+pub use head::{Head, HeadParseError};
+pub use low_discrepancy::{halton, inverse_normal, normals};
+pub use outcome::{HeadPrediction, Prediction, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome};
+pub use place::{Found, Locator};
+pub use planned::{PREDICTED, assumptions};
+pub use response::{Coordinates, Response, SolvedState};
+pub use settings::PredictSettings;
+pub use shares::{Shares, variance_shares};
+pub use spread::{Spread, spread};
+pub use uncertain::{Cause, Uncertain, Uncertainty};

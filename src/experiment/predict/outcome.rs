@@ -1,0 +1,132 @@
+//! A prediction in numbers, as `sim/prediction.json` keeps it.
+
+use super::check::Check;
+use super::cut::Planned;
+use super::shares::Shares;
+use super::uncertain::Cause;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A prediction. Lengths in mm, positions and directions in the pre-operative scanner's frame, RAS+.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Prediction {
+    /// What is taken.
+    pub plan: Planned,
+    /// What counts as a shift, mm.
+    pub threshold_mm: f64,
+    /// Draws for each way of supporting the brain.
+    pub draws: usize,
+    /// Each way of lying; the first is the state `predicted`.
+    pub heads: Vec<HeadPrediction>,
+    /// What was not known, and its prior.
+    pub unknowns: Vec<UnknownOutcome>,
+    /// How the brain may be supported, and how probable that was taken to be.
+    pub supports: Vec<SupportWeight>,
+    /// How far draws read from the response surface are off those solved whole.
+    pub checks: Vec<Check>,
+    /// What was assumed, in plain words.
+    pub assumptions: Vec<String>,
+}
+
+/// One way of lying.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeadPrediction {
+    /// `supine`, `prone`, `left`, `right`, `sitting` or the direction that was given.
+    pub head: String,
+    /// Name of its state among the case's files: `predicted`, `predicted-prone`.
+    pub state: String,
+    /// The way down.
+    pub down: [f64; 3],
+    /// Largest mean displacement of a node, mm.
+    pub largest_mm: f64,
+    /// Where that is, mm.
+    pub largest_at_mm: [f64; 3],
+    /// Median over the nodes of the mean displacement, mm.
+    pub median_mm: f64,
+    /// Median over the nodes of its standard deviation (root of the trace of the covariance), mm.
+    pub sd_median_mm: f64,
+    /// Largest displacement that 95 % of the draws do not exceed, mm.
+    pub reach95_largest_mm: f64,
+    /// Tissue that is expected to move by more than the threshold, cc: probabilities summed over the tissue.
+    pub over_threshold_cc: f64,
+    /// Which unknown contributes how much to the variance.
+    pub shares: Shares,
+    /// Equilibria behind the response surfaces.
+    pub states_solved: usize,
+    /// Points that were asked for.
+    pub targets: Vec<TargetPrediction>,
+}
+
+/// Where a target lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TargetPlace {
+    /// In tissue.
+    #[default]
+    Tissue,
+    /// In fluid: it goes with the nearest tissue.
+    Fluid,
+    /// In tissue that is to be taken: nothing is said of where it goes.
+    Removed,
+}
+
+impl TargetPlace {
+    /// The word of tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tissue => "tissue",
+            Self::Fluid => "fluid",
+            Self::Removed => "removed",
+        }
+    }
+}
+
+/// A point of the scan, and where it is expected.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetPrediction {
+    /// Its number in the file, from 1.
+    pub target: usize,
+    /// Where it lies.
+    pub place: TargetPlace,
+    /// Where it is, mm.
+    pub at_mm: [f64; 3],
+    /// Where it is expected, mm.
+    pub expected_mm: [f64; 3],
+    /// Length of the mean displacement, mm.
+    pub shift_mm: f64,
+    /// Root of the trace of the covariance, mm.
+    pub sd_mm: f64,
+    /// Half axes of the ellipsoid around the expected place that holds 95 % of the draws, the longest first, mm.
+    pub half_axes_mm: [f64; 3],
+    /// Their directions.
+    pub axes: [[f64; 3]; 3],
+    /// Probability of moving more than the threshold.
+    pub over_threshold: f64,
+}
+
+/// An unknown with its prior.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnknownOutcome {
+    /// Its name with the unit.
+    pub name: String,
+    /// What it belongs to.
+    pub cause: Cause,
+    /// The middle of its prior.
+    pub median: f64,
+    /// 95 % of its prior lie between.
+    pub interval_95: [f64; 2],
+}
+
+/// A way of supporting the brain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportWeight {
+    /// `fixed` or `sliding`.
+    pub supports: String,
+    /// How probable it was taken to be.
+    pub weight: f64,
+}

@@ -1,0 +1,177 @@
+//! A patient's unknowns with their priors, and what is assumed beside them.
+
+use super::outcome::{SupportWeight, UnknownOutcome};
+use super::settings::PredictSettings;
+use super::uncertain::{Cause, Uncertain, Uncertainty};
+use crate::experiment::estimate::{LogPrior, Scale, Turn, Unknown, Z_95};
+use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
+use crate::experiment::resection::{CsfSettings, ResectionSettings, Supports};
+use crate::experiment::sample::Tissue;
+use crate::experiment::skull::level_when_drained;
+use crate::geometry::Frame;
+use crate::image::LabelMap;
+
+/// Name of the state of the first head; the others' follow it.
+pub const PREDICTED: &str = "predicted";
+
+/// Steps of the table of levels.
+const LEVELS: usize = 32;
+
+impl PredictSettings {
+    /// The tissues whose stiffness is not known.
+    pub fn tissue_list(&self) -> Vec<Tissue> {
+        if self.tissues == 1 { Tissue::whole_brain() } else { Tissue::grey_and_white() }
+    }
+
+    /// The patient's settings for one head (gravity in the MNI frame) and one way of supporting the brain.
+    #[must_use]
+    pub fn resection(&self, own: &ResectionSettings, gravity: [f64; 3], supports: Supports) -> ResectionSettings {
+        let mut settings = ResectionSettings { supports, gravity_m_per_s2: gravity, ..own.clone() };
+        if let Some(drained) = self.drained {
+            settings.csf = Some(CsfSettings { drained, ..own.csf.clone().unwrap_or_default() });
+            settings.density_kg_per_m3 = self.tissue_density_kg_per_m3;
+        }
+        settings
+    }
+
+    /// How probable each way of supporting the brain is; only what the settings of the patient leave open is weighed.
+    pub fn weights(&self, own: &ResectionSettings) -> Vec<(Supports, f64)> {
+        let family = own.supports.family();
+        let weight = |supports| match supports {
+            _ if family.len() == 1 => 1.0,
+            Supports::Sliding => self.sliding_weight,
+            Supports::Fixed | Supports::Evidence => self.fixed_weight,
+        };
+        let weighed: Vec<(Supports, f64)> = family.iter().map(|&s| (s, weight(s))).filter(|(_, w)| *w > 0.0).collect();
+        let all: f64 = weighed.iter().map(|(_, w)| w).sum();
+        weighed.into_iter().map(|(s, w)| (s, w / all)).collect()
+    }
+
+    /// All that is not known of a patient, for one head. `own` is [`Self::resection`]'s.
+    ///
+    /// # Errors
+    /// [`PriorError`].
+    pub fn uncertainty<F: Frame>(
+        &self,
+        own: &ResectionSettings,
+        prior: &PriorSettings,
+        labels: &LabelMap<F>,
+    ) -> Result<Uncertainty, PriorError> {
+        let mut list = Vec::new();
+        let mut add = |unknown: Unknown, prior: LogPrior, cause| {
+            list.push(Uncertain { unknown, prior, cause, levels_mm: Vec::new() });
+        };
+        for tissue in self.tissue_list() {
+            for (unknown, prior) in law_priors(&tissue, prior)? {
+                add(unknown, prior, Cause::Stiffness);
+            }
+        }
+        if own.csf.is_none() {
+            let density = Unknown::Density.prior(own.density_kg_per_m3.ln(), self.density_log_sd);
+            add(Unknown::Density, density, Cause::Load);
+        }
+        for turn in [Turn::Nodding, Turn::Rolling] {
+            let unknown = Unknown::GravityTurn(turn);
+            let prior = unknown.prior(0.0, self.direction_sd_deg.to_radians());
+            add(unknown, prior, Cause::Direction);
+        }
+        if own.supports == Supports::Sliding && own.skull.gap_mm > 0.0 {
+            let prior = Unknown::Gap(0).prior(own.skull.gap_mm.ln(), own.skull.gap_log_sd);
+            add(Unknown::Gap(0), prior, Cause::Room);
+        }
+        if let Some(csf) = &own.csf {
+            let level = |n: usize| level_when_drained(labels, own.gravity_m_per_s2, n as f64 / LEVELS as f64);
+            let levels_mm: Option<Vec<f64>> = (0..=LEVELS).map(level).collect();
+            let prior = LogPrior {
+                name: "part of the fluid that has drained".to_owned(),
+                scale: Scale::Logarithm,
+                ..Unknown::CsfLevel.prior(csf.drained.ln(), self.drained_log_sd)
+            };
+            // Right behind the stiffness, so that draws of it are the same for every way of supporting the brain.
+            let place = list.iter().position(|u| u.cause != Cause::Stiffness).unwrap_or(list.len());
+            if let Some(levels_mm) = levels_mm {
+                list.insert(place, Uncertain { unknown: Unknown::CsfLevel, prior, cause: Cause::Load, levels_mm });
+            }
+        }
+        Ok(Uncertainty::new(list))
+    }
+}
+
+impl UnknownOutcome {
+    /// The prior of an unknown in its own unit.
+    pub fn of(uncertain: &Uncertain) -> Self {
+        let prior = &uncertain.prior;
+        let sd = prior.sd.unwrap_or(0.0);
+        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd));
+        Self { name: prior.name.clone(), cause: uncertain.cause, median: at(0.0), interval_95: [at(-Z_95), at(Z_95)] }
+    }
+}
+
+fn rounded(x: f64) -> f64 {
+    (x * 1e4).round() / 1e4 + 0.0
+}
+
+/// What was assumed, a sentence each.
+pub fn assumptions(settings: &PredictSettings, own: &ResectionSettings, supports: &[SupportWeight]) -> Vec<String> {
+    let mut said = vec![
+        "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
+        match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
+            Some(part) => format!(
+                "About {:.0} % of the fluid drains from the top; tissue above its level has its own weight.",
+                100.0 * part
+            ),
+            None => format!(
+                "How much fluid drains is not known: the tissue weighs about {:.0} kg/m3 more than what still carries it, give or take a \
+                 factor of {:.1}.",
+                own.density_kg_per_m3,
+                settings.density_log_sd.exp()
+            ),
+        },
+        format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
+        "How stiff this brain is, is not known: it is drawn from what published studies of brain tissue found.".to_owned(),
+    ];
+    let words = supports.iter().map(|s| {
+        let what = if s.supports == "sliding" { "slides on the skull" } else { "is held at its base and at the falx" };
+        format!("it {what} (weight {:.0} %)", 100.0 * s.weight)
+    });
+    said.push(format!("How the skull holds the brain: {}.", words.collect::<Vec<_>>().join(", or ")));
+    said
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mni;
+    use crate::image::Grid;
+    use crate::segment::label;
+
+    fn labels() -> LabelMap<Mni> {
+        let grid = Grid::<Mni>::axis_aligned([10, 20, 10], [1.0; 3], [0.0; 3]);
+        LabelMap::filled(grid, label::CSF)
+    }
+
+    fn causes(settings: &PredictSettings, supports: Supports) -> Vec<Cause> {
+        let own = settings.resection(&ResectionSettings::default(), [0.0, -9.81, 0.0], supports);
+        let found = settings.uncertainty(&own, &PriorSettings::default(), &labels()).unwrap();
+        found.list.iter().map(|u| u.cause).collect()
+    }
+
+    #[test]
+    fn every_unknown_is_drawn_and_the_room_only_where_there_is_a_skull() {
+        use Cause::{Direction, Load, Room, Stiffness};
+        let settings = PredictSettings::default();
+        let held = [Stiffness, Stiffness, Load, Direction, Direction];
+        assert_eq!(causes(&settings, Supports::Fixed), held);
+        assert_eq!(causes(&settings, Supports::Sliding), [&held[..], &[Room]].concat());
+        let drained = PredictSettings { drained: Some(0.3), ..settings };
+        assert_eq!(causes(&drained, Supports::Fixed), held);
+    }
+
+    #[test]
+    fn weights_are_those_of_what_is_left_open() {
+        let settings = PredictSettings { fixed_weight: 1.0, sliding_weight: 3.0, ..PredictSettings::default() };
+        let of = |supports| settings.weights(&ResectionSettings { supports, ..ResectionSettings::default() });
+        assert_eq!(of(Supports::Evidence), [(Supports::Fixed, 0.25), (Supports::Sliding, 0.75)]);
+        assert_eq!(of(Supports::Sliding), [(Supports::Sliding, 1.0)]);
+    }
+}

@@ -1,0 +1,130 @@
+//! How a prediction is made; the table `[predict]` of the settings.
+
+use super::head::Head;
+use crate::experiment::setting::{SettingError, first_broken};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How a prediction is made; the table `[predict]` of the settings. What a patient's job has anyway (median of the effective
+/// density, Poisson's ratio, supports, skull, law and studies of the prior, element) is taken from `[resection]`, `[prior]`
+/// and `[estimate]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PredictSettings {
+    /// How the head lies: supine, prone, left, right, sitting or the way down as `x,y,z` of the scanner. The first is the
+    /// state `predicted`; the others are compared with it.
+    pub heads: Vec<Head>,
+    /// 1: the whole brain one material; 2: grey and white matter apart.
+    pub tissues: usize,
+    /// Draws from the priors, for each way of supporting the brain.
+    pub draws: usize,
+    /// Draws that are also solved whole, for each way of supporting the brain with the first head.
+    pub checks: usize,
+    /// What counts as a shift, mm: probabilities are those of moving more.
+    pub threshold_mm: f64,
+    /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
+    pub density_log_sd: f64,
+    /// The part of the fluid that will have drained, from the top, where it can be told; then tissue has its own weight above
+    /// the fluid's level and is buoyant below it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drained: Option<f64>,
+    /// Standard deviation of ln(part drained): a factor of 1.5 to either side.
+    pub drained_log_sd: f64,
+    /// Density of the tissue itself, where `drained` is given.
+    pub tissue_density_kg_per_m3: f64,
+    /// Standard deviation of either angle between the head and how it is said to lie, degrees.
+    pub direction_sd_deg: f64,
+    /// How probable it is, against `sliding_weight`, that base and falx hold the brain. Before an operation nothing speaks for
+    /// either: of patients of either kind, equal weights are wrong least.
+    pub fixed_weight: f64,
+    /// How probable it is that the brain slides on the skull.
+    pub sliding_weight: f64,
+}
+
+impl Default for PredictSettings {
+    fn default() -> Self {
+        Self {
+            heads: vec![Head::Supine],
+            tissues: 2,
+            draws: 128,
+            checks: 2,
+            threshold_mm: 2.0,
+            density_log_sd: 0.56,
+            drained: None,
+            drained_log_sd: 0.4,
+            tissue_density_kg_per_m3: 1040.0,
+            direction_sd_deg: 10.0,
+            fixed_weight: 0.5,
+            sliding_weight: 0.5,
+        }
+    }
+}
+
+impl PredictSettings {
+    /// Refuses what no prediction can be made with.
+    ///
+    /// # Errors
+    /// The first setting out of its range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let sd = |x: f64| (0.0..=3.0).contains(&x);
+        let weights = [self.fixed_weight, self.sliding_weight];
+        let weigh = weights.iter().all(|w| *w >= 0.0 && w.is_finite()) && weights.iter().sum::<f64>() > 0.0;
+        let part = self.drained.is_none_or(|part| part > 0.0 && part <= 1.0);
+        let names: Vec<String> = self.heads.iter().enumerate().map(|(n, head)| head.name(n)).collect();
+        let apart = names.iter().enumerate().all(|(n, name)| !names[..n].contains(name));
+        first_broken(&[
+            ("heads", &self.heads, !self.heads.is_empty() && apart, "one or more ways to lie, none twice"),
+            (
+                "tissues",
+                &self.tissues,
+                (1..=2).contains(&self.tissues),
+                "1 (the whole brain) or 2 (grey and white matter)",
+            ),
+            ("draws", &self.draws, (16..=4096).contains(&self.draws), "16 to 4096"),
+            ("checks", &self.checks, self.checks <= self.draws, "at most as many as draws"),
+            ("threshold_mm", &self.threshold_mm, (0.01..=50.0).contains(&self.threshold_mm), "0.01 to 50 mm"),
+            ("density_log_sd", &self.density_log_sd, sd(self.density_log_sd), "0 to 3"),
+            ("drained", &self.drained, part, "a part above 0, at most 1"),
+            ("drained_log_sd", &self.drained_log_sd, sd(self.drained_log_sd), "0 to 3"),
+            (
+                "tissue_density_kg_per_m3",
+                &self.tissue_density_kg_per_m3,
+                (500.0..=2000.0).contains(&self.tissue_density_kg_per_m3),
+                "500 to 2000",
+            ),
+            (
+                "direction_sd_deg",
+                &self.direction_sd_deg,
+                (0.0..=30.0).contains(&self.direction_sd_deg),
+                "0 to 30 degrees",
+            ),
+            ("fixed_weight and sliding_weight", &weights, weigh, "0 or more, and not both 0"),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_drawn_from_is_refused_by_name() {
+        let of = |change: &dyn Fn(&mut PredictSettings)| {
+            let mut settings = PredictSettings::default();
+            change(&mut settings);
+            settings.check().map_err(|e| e.to_string())
+        };
+        assert_eq!(of(&|_| ()), Ok(()));
+        let cases: [(&str, &dyn Fn(&mut PredictSettings)); 6] = [
+            ("`heads`", &|s| s.heads = Vec::new()),
+            ("`heads`", &|s| s.heads = vec![Head::Left, Head::Left]),
+            ("`draws`", &|s| s.draws = 3),
+            ("`drained`", &|s| s.drained = Some(0.0)),
+            ("`threshold_mm`", &|s| s.threshold_mm = f64::NAN),
+            ("`fixed_weight and sliding_weight`", &|s| (s.fixed_weight, s.sliding_weight) = (0.0, 0.0)),
+        ];
+        for (name, change) in cases {
+            assert!(of(change).unwrap_err().contains(name), "{name}");
+        }
+    }
+}

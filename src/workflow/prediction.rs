@@ -1,0 +1,76 @@
+//! The job before an operation: one scan and a plan to the expected brain shift.
+
+use super::case::Case;
+use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
+use super::outcome::{finish, keep_settings};
+use super::plan::{Goal, plan};
+use super::planned_scan::{PlanInputs, PlannedScan};
+use super::progress::Progress;
+use super::settings::Settings;
+use super::stage_name::{StageName, Subject};
+use super::stages::{self, PlannedHead, PredictInput};
+use super::user_file::{read_input, shown};
+use super::work::{Made, Place, Work};
+use crate::artefact::Manifest;
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
+use crate::experiment::predict::Prediction;
+use crate::layout::REST_MESH;
+use crate::mesh::format::vtu;
+
+/// How the brain of a pre-operative scan will move when the planned tissue is taken, with its spread. Registration of the
+/// scan, labels and mesh are made as for a pair.
+///
+/// # Errors
+/// [`WorkflowError`] of the first stage that cannot be done.
+pub fn predict(
+    inputs: &PlanInputs,
+    place: &Place,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<(Case, Prediction), WorkflowError> {
+    let work = Work::new(place, Subject::Plan, settings, progress);
+    settings.check()?;
+    let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
+    place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
+    let scan = PlannedScan::read(inputs, &work)?;
+    let targets = inputs.targets.as_deref().map(|path| Ok::<_, WorkflowError>((shown(path), read_input(path)?)));
+    let targets = targets.transpose()?;
+    work.hold(true)?;
+    check_scan(&work, &scan.sum)?;
+    keep_settings(&work)?;
+    let mut made = Made::default();
+    let posed = stages::pose(&work, &mut made, &scan)?;
+    let planned = stages::plan(&work, &mut made, &scan)?;
+    let head = PlannedHead::read(&work.case)?;
+    let meshed: MeshFacts = stages::mesh(&work, &mut made, &head.labels, Some(&head.template_from_patient))?;
+    work.case.drop_stale();
+    let bytes = work.case.read(REST_MESH)?;
+    let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;
+    let targets = targets.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+    let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
+    let prediction = stages::predict(&work, &mut made, &input)?;
+    let steps = plan(settings, Subject::Plan, Goal::Predict)?;
+    let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
+    let outcome = ExperimentOutcome {
+        kind: ExperimentKind::Prediction,
+        reference: "nothing: the operation is still to come".to_owned(),
+        volumes: Some(planned.volumes),
+        registrations: vec![posed.fit],
+        sets: meshed.sets,
+        mesh: Some(meshed.mesh),
+        warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
+        ..ExperimentOutcome::default()
+    };
+    finish(&work, &outcome, &manifests)?;
+    Ok((work.case.clone(), prediction))
+}
+
+/// Another scan is another patient's, unless it is meant.
+fn check_scan(work: &Work<'_>, sum: &String) -> Result<(), WorkflowError> {
+    let recorded = Manifest::of_stage(work.case.folder(), &StageName::Pose.to_string());
+    if !work.place.force && recorded.is_some_and(|recorded| recorded.inputs.get("pre") != Some(sum)) {
+        return Err(CaseError::OtherScan { folder: work.case.folder().to_path_buf(), which: "pre-operative" }.into());
+    }
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! Stage `plan`: labels of the pre-operative scan, and the tissue that is to be taken.
+
+use super::anat::{whole_numbers, without_resected};
+use super::reading::WithReading;
+use super::registration::pose;
+use crate::artefact::Produced;
+use crate::experiment::outcome::ResectionVolumes;
+use crate::experiment::predict::{Planned, planned};
+use crate::geometry::{Frame, Mni};
+use crate::image::nifti::{self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
+use crate::image::resample::{Interpolation, resample};
+use crate::image::{LabelMap, Mask};
+use crate::layout::{
+    NATIVE_RESECTED, PRE_BRAIN, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED,
+    TEMPLATE_DISPLACEMENT,
+};
+use crate::register::deformable::DisplacementField;
+use crate::resect::{GivenMasks, take_head_apart};
+use crate::segment::atlas;
+use crate::segment::native::mask_on;
+use crate::workflow::case::Case;
+use crate::workflow::error::{PredictError, WorkflowError};
+use crate::workflow::planned_scan::PlannedScan;
+use crate::workflow::stage_name::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use serde::{Deserialize, Serialize};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Plan;
+/// Less of a plan outside the brain is drawn generously.
+const NOTED_OUTSIDE: f64 = 0.1;
+
+/// What the report says of the plan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PlanFacts {
+    /// Volumes, cc.
+    pub volumes: ResectionVolumes,
+    /// What is to be taken.
+    pub plan: Planned,
+}
+
+/// What later stages start from, as the case's files hold it.
+#[derive(Debug)]
+pub(crate) struct PlannedHead {
+    /// Labels with the planned tissue as a label of its own.
+    pub labels: LabelMap<Mni>,
+    /// Where a point of the patient lies in the template.
+    pub template_from_patient: DisplacementField<Mni>,
+}
+
+impl PlannedHead {
+    /// Reads them.
+    pub fn read(case: &Case) -> Result<Self, WorkflowError> {
+        let options = ReadOptions::default();
+        let (labels, _) = nifti::decode_labels(&case.read(PRE_LABELS)?, PRE_LABELS, &options)?;
+        let (taken, _) = nifti::decode_labels(&case.read(RESECTED)?, RESECTED, &options)?;
+        let taken: Mask<Mni> = taken.relabelled::<Mni>().map(|l| l > 0);
+        let field = nifti::decode_vectors(&case.read(TEMPLATE_DISPLACEMENT)?, TEMPLATE_DISPLACEMENT)?;
+        Ok(Self {
+            labels: without_resected(labels.relabelled(), &taken),
+            template_from_patient: DisplacementField::from_displacement(&field.relabelled()),
+        })
+    }
+}
+
+/// Segments the scan as a pair's would be, and looks whether the plan can be followed.
+pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Result<PlanFacts, WorkflowError> {
+    let posed = WithReading { settings: &work.settings.anat, image: work.settings.image };
+    let stage = work.stage(made, &NAME, VERSION, &posed).input_sha256("pre", &scan.sum).frame(Mni::NAME);
+    let stage = stage.input("resection", &encode_mask(&scan.resection));
+    let stage = scan.given().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
+    work.run(made, &NAME, &stage, || {
+        work.tell(|p| p.begin("images", 2));
+        work.tell(|p| p.doing("pre-operative tissue"));
+        let mni_from_pre = pose(&work.case)?;
+        let grid = atlas::template().grid();
+        let given = GivenMasks {
+            labels: scan.labels.as_ref().map(|(labels, _)| labels.clone()),
+            brain: scan.brain.as_ref().map(|(mask, _)| mask.clone()),
+            ventricle: scan.ventricle.as_ref().map(|(mask, _)| mask.clone()),
+            ..GivenMasks::default()
+        };
+        let (before, template, _) = take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?;
+        work.tell(|p| p.step());
+        work.tell(|p| p.doing("writing"));
+        let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
+        let found = planned(&scan.plan, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
+        let mut produced = Produced::default();
+        if found.outside > NOTED_OUTSIDE {
+            produced.warnings.push(format!(
+                "{}: {:.0} % of what is to be taken lies outside the brain and counts for nothing",
+                scan.plan,
+                100.0 * found.outside
+            ));
+        }
+        let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
+        let t1 = resample(&scan.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        write(PRE_T1, encode_i16(&whole_numbers(&t1.volume)));
+        write(PRE_NATIVE_T1, encode_intensities(&scan.pre));
+        write(PRE_BRAIN, encode_mask(&before.brain_mni));
+        write(PRE_LABELS, encode_u8(&before.labels_mni));
+        write(RESECTED, encode_mask(&resected));
+        write(TEMPLATE_DISPLACEMENT, encode_vectors(&template.atlas_from_subject.displacement_mm()));
+        write(PRE_NATIVE_BRAIN, encode_mask(&before.brain));
+        write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
+        write(NATIVE_RESECTED, encode_mask(&scan.resection));
+        work.tell(|p| p.end());
+        produced.warnings.extend(before.warnings.iter().map(|w| format!("pre: {w}")));
+        produced.facts = facts(&PlanFacts {
+            volumes: ResectionVolumes {
+                cavity_cc: None,
+                resected_cc: Some(found.resected_cc),
+                ventricle_before_cc: Some(before.volumes.ventricle_cc),
+                ventricle_after_cc: None,
+                brain_cc: Some(before.volumes.brain_cc),
+                midline_shift_mm: None,
+            },
+            plan: found,
+        });
+        Ok(produced)
+    })
+}

@@ -1,0 +1,42 @@
+//! Stage `pose`: the pre-operative scan alone onto the template.
+
+use super::reading::WithReading;
+use super::registration::{pose_of, write_transform};
+use crate::artefact::Produced;
+use crate::experiment::outcome::RegistrationOutcome;
+use crate::geometry::{Frame, Mni};
+use crate::layout;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::planned_scan::PlannedScan;
+use crate::workflow::stage_name::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use serde::{Deserialize, Serialize};
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Pose;
+
+/// What the report says of the fit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PoseFacts {
+    /// Pre to MNI.
+    pub fit: RegistrationOutcome,
+}
+
+/// Finds the pose as a pair's registration does, and writes it as text and as ITK .tfm.
+pub(crate) fn pose(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Result<PoseFacts, WorkflowError> {
+    let posed = WithReading { settings: &work.settings.register, image: work.settings.image };
+    let stage = work.stage(made, &NAME, VERSION, &posed).input_sha256("pre", &scan.sum).frame(Mni::NAME);
+    let stage = scan.posing().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
+    work.run(made, &NAME, &stage, || {
+        work.tell(|p| p.begin("registration", 1));
+        work.tell(|p| p.doing("pre to MNI"));
+        let mut produced = Produced { warnings: scan.warnings.clone(), ..Produced::default() };
+        let given = (scan.pose.as_ref().map(|(pose, _)| pose), scan.labels.as_ref().map(|(labels, _)| labels));
+        let (mni_from_pre, fit) = pose_of(&scan.pre, given, &mut produced.warnings)?;
+        work.tell(|p| p.end());
+        write_transform(&mut produced, layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK, &mni_from_pre);
+        produced.facts = facts(&PoseFacts { fit });
+        Ok(produced)
+    })
+}

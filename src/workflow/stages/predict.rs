@@ -1,0 +1,349 @@
+//! Stage `predict`: how a planned patient's brain will move, and how sure that is.
+
+use super::fields::carried;
+use super::plan::PlannedHead;
+use super::registration::pose;
+use super::samples::with_held_tissues;
+use super::shift::{grid_of, mask_of, spaced};
+use crate::artefact::Produced;
+use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
+use crate::experiment::outcome::MeshOutcome;
+use crate::experiment::predict::{
+    Check, Forecast, Found, Head, HeadPrediction, Locator, PREDICTED, Planned, Posed, Prediction, Spread,
+    SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, ellipsoid_95, forecast, spread,
+    variance_shares,
+};
+use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
+use crate::image::morphology::dilate;
+use crate::image::nifti::{encode_displacement, encode_f32, encode_mask};
+use crate::layout::{
+    NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK, SHIFT_MASK,
+    SHIFT_PROBABILITY, SHIFT_REACH, SHIFT_REACH_50, SHIFT_SD,
+};
+use crate::mesh::TetMesh;
+use crate::mesh::format::{Field, vtu};
+use crate::overlay::Drawing;
+use crate::workflow::error::{PredictError, WorkflowError};
+use crate::workflow::stage_name::StageName;
+use crate::workflow::work::{Made, Work, facts};
+use nalgebra::Vector3;
+
+/// Raised when the stage's code changes its result.
+const VERSION: u32 = 1;
+const NAME: StageName = StageName::Predict;
+/// Nodes that shares of the variance are summed over.
+const SHARED_NODES: usize = 100;
+/// A target may lie this far outside the brain mask, in fluid or in a membrane, mm.
+const BESIDE_MM: f64 = 10.0;
+
+/// What a prediction needs of its case.
+pub(crate) struct PredictInput<'a> {
+    /// The undeformed mesh, its file's bytes, and its figures.
+    pub mesh: (&'a TetMesh, &'a [u8], &'a MeshOutcome),
+    /// What is to be taken.
+    pub plan: &'a Planned,
+    /// The file of targets by its name, with its bytes.
+    pub targets: Option<(&'a str, &'a [u8])>,
+}
+
+/// Makes (or skips) the prediction.
+pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>) -> Result<Prediction, WorkflowError> {
+    let settings = work.settings;
+    let posed = serde_json::json!({
+        "predict": settings.predict, "resection": settings.resection, "prior": settings.prior,
+        "element": settings.estimate.element, "fields": settings.fields,
+    });
+    let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Pre::NAME);
+    let stage = input.targets.iter().fold(stage, |stage, (_, bytes)| stage.input("targets", bytes));
+    work.run(made, &NAME, &stage, || {
+        let patient = Patient::read(work, input)?;
+        let mut produced = Produced::default();
+        let weights = settings.predict.weights(&settings.resection);
+        let supports: Vec<SupportWeight> = weights
+            .iter()
+            .map(|(s, weight)| SupportWeight { supports: s.name().to_owned(), weight: *weight })
+            .collect();
+        let mut prediction = Prediction {
+            plan: input.plan.clone(),
+            threshold_mm: settings.predict.threshold_mm,
+            draws: settings.predict.draws,
+            assumptions: assumptions(&settings.predict, &settings.resection, &supports),
+            supports,
+            ..Prediction::default()
+        };
+        for (number, head) in settings.predict.heads.iter().enumerate() {
+            let bodies = patient.posed(work, head)?;
+            if number == 0 {
+                // The body with the most unknowns has them all.
+                let most = bodies.iter().max_by_key(|posed| posed.uncertainty.list.len());
+                prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
+            }
+            let checks = if number == 0 { settings.predict.checks } else { 0 };
+            let found = Lying::of(work, &patient, head, &bodies, checks, &mut produced.warnings)?;
+            let state = if number == 0 { PREDICTED.to_owned() } else { format!("{PREDICTED}-{}", head.name(number)) };
+            prediction.checks.extend(found.checks.iter().cloned());
+            prediction.heads.push(found.in_numbers(&patient, head, &state));
+            let field = patient.field(&found.spread);
+            patient.files(&state, &found.spread, &field, &mut produced)?;
+            if number == 0 {
+                carried(work, &field, &mut produced)?;
+            }
+        }
+        let json = serde_json::to_string_pretty(&prediction).expect("figures are plain data") + "\n";
+        produced.files.push((PREDICTION_JSON.to_owned(), json.into_bytes()));
+        produced.facts = facts(&prediction);
+        Ok(produced)
+    })
+}
+
+/// A target in both frames.
+struct Target {
+    at_mm: [f64; 3],
+    place: TargetPlace,
+    found: Found,
+}
+
+/// What every head shares.
+struct Patient<'a> {
+    input: &'a PredictInput<'a>,
+    head: PlannedHead,
+    mni_from_pre: RigidTransform<Pre, Mni>,
+    around: Surroundings,
+    targets: Vec<Target>,
+    settings: &'a crate::workflow::Settings,
+}
+
+impl<'a> Patient<'a> {
+    fn read(work: &'a Work<'_>, input: &'a PredictInput<'a>) -> Result<Self, WorkflowError> {
+        let case = &work.case;
+        let mni_from_pre = pose(case)?;
+        let grid = spaced(grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?, work.settings.fields.spacing_mm);
+        let around = Surroundings {
+            brain: mask_of(case, PRE_NATIVE_BRAIN, &grid)?,
+            resected: mask_of(case, NATIVE_RESECTED, &grid)?,
+        };
+        let head = PlannedHead::read(case)?;
+        let mut patient = Self { input, head, mni_from_pre, around, targets: Vec::new(), settings: work.settings };
+        if let Some((name, bytes)) = input.targets {
+            patient.targets = patient.targets_of(name, bytes)?;
+        }
+        Ok(patient)
+    }
+
+    /// Finds every target in the mesh; one outside the head is refused.
+    fn targets_of(&self, name: &str, bytes: &[u8]) -> Result<Vec<Target>, WorkflowError> {
+        let drawing = Drawing::decode(bytes, name)?;
+        let file = || name.to_owned();
+        if drawing.points_mm.is_empty() {
+            return Err(PredictError::NoTarget { file: file() }.into());
+        }
+        let head = dilate(&self.around.brain, BESIDE_MM);
+        let of = |(n, x): (usize, &[f64; 3])| -> Result<Target, WorkflowError> {
+            let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
+            if head.nearest(p) != Some(true) {
+                return Err(PredictError::TargetOutside { file: file(), target: n + 1, at_mm: *x }.into());
+            }
+            let found = Locator(self.input.mesh.0).find(self.mni_from_pre.apply(p).mm.into());
+            let place = match self.around.resected.nearest(p) {
+                Some(true) => TargetPlace::Removed,
+                _ if found.outside_mm > 0.0 => TargetPlace::Fluid,
+                _ => TargetPlace::Tissue,
+            };
+            Ok(Target { at_mm: *x, place, found })
+        };
+        drawing.points_mm.iter().enumerate().map(of).collect()
+    }
+
+    /// The body as each way of supporting it poses it, for one head.
+    fn posed(&self, work: &Work<'_>, head: &Head) -> Result<Vec<Posed>, WorkflowError> {
+        let settings = work.settings;
+        let gravity = head.gravity_m_per_s2(&self.mni_from_pre);
+        let one = |(supports, weight)| -> Result<Posed, WorkflowError> {
+            let own = settings.predict.resection(&settings.resection, gravity, supports);
+            let scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), &self.head.labels)?;
+            let (mut scenario, _) = with_held_tissues(work, self.input.mesh.2, scenario)?;
+            let mesh = own.supported_mesh(self.input.mesh.0.clone(), &scenario)?;
+            scenario.solver.element = settings.estimate.element;
+            let uncertainty = settings.predict.uncertainty(&own, &settings.prior, &self.head.labels)?;
+            let (supports, poisson_ratio) = (supports.name().to_owned(), own.poisson_ratio);
+            Ok(Posed { supports, weight, mesh, scenario, poisson_ratio, uncertainty })
+        };
+        settings.predict.weights(&settings.resection).into_iter().map(one).collect()
+    }
+
+    /// The mean shift as a field of the scan.
+    fn field(&self, spread: &Spread) -> ShiftField {
+        let mesh = self.input.mesh.0;
+        let state = Moved {
+            tets: mesh.tets(),
+            nodes_mm: mesh.nodes_mm(),
+            displacement_mm: &spread.mean_mm,
+            sd_mm: &spread.sd_mm,
+            reach95_mm: &spread.reach95_mm,
+        };
+        shift_field(&state, None, &self.mni_from_pre.inverse(), &self.around, &self.settings.fields)
+    }
+
+    /// Fields of one state in the scan's frame, and the state on the mesh.
+    fn files(
+        &self,
+        state: &str,
+        spread: &Spread,
+        field: &ShiftField,
+        produced: &mut Produced,
+    ) -> Result<(), WorkflowError> {
+        let mesh = self.input.mesh.0;
+        let pre_from_mni = self.mni_from_pre.inverse();
+        let nodes: Vec<[f64; 3]> =
+            mesh.nodes_mm().iter().map(|x| pre_from_mni.apply(Position::new(x[0], x[1], x[2])).mm.into()).collect();
+        let both: Vec<[f64; 2]> = spread.reach50_mm.iter().zip(&spread.over).map(|(r, p)| [*r, *p]).collect();
+        let known = in_tetrahedra(mesh.tets(), &nodes, &both, &field.forward.grid);
+        let part = |c: usize| -> Vec<f32> {
+            // A thousandth of a mm, or of a probability, is more than is known, and packs well.
+            let rounded = |v: Option<[f32; 2]>| v.map_or(0.0, |v| (v[c] * 1024.0).round() / 1024.0);
+            known.iter().zip(&field.believed).map(|(v, believed)| if *believed { rounded(*v) } else { 0.0 }).collect()
+        };
+        let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
+        write(SHIFT.of(state), encode_displacement(&field.whole, |n| field.forward_at(n)));
+        write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |n| field.inverse_at(n)));
+        write(SHIFT_SD.of(state), encode_f32(&field.on_whole(&field.sd_mm, 0.0)));
+        write(SHIFT_REACH_50.of(state), encode_f32(&field.on_whole(&part(0), 0.0)));
+        write(SHIFT_REACH.of(state), encode_f32(&field.on_whole(&field.reach95_mm, 0.0)));
+        write(SHIFT_PROBABILITY.of(state), encode_f32(&field.on_whole(&part(1), 0.0)));
+        write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+        let points = [
+            Field::vector("displacement", &spread.mean_mm),
+            Field::scalar("displacement_sd", spread.sd_mm.clone()),
+            Field::scalar("displacement_50", spread.reach50_mm.clone()),
+            Field::scalar("displacement_95", spread.reach95_mm.clone()),
+            Field::scalar("over_threshold", spread.over.clone()),
+        ];
+        write(PREDICTED_STATE.of(state), vtu::encode(mesh, &points, &[])?);
+        if field.changed > 0 {
+            produced.warnings.push(format!(
+                "{state}: tissue folds over at {} voxels; the displacement field is smoothed there and not believed",
+                field.changed
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// One head, with the draws of every way of supporting the brain.
+struct Lying {
+    draws: Vec<(f64, Vec<[f64; 3]>)>,
+    spread: Spread,
+    checks: Vec<Check>,
+    shares: crate::experiment::predict::Shares,
+    states: usize,
+}
+
+impl Lying {
+    /// Solves what is needed; supports without an equilibrium are left out, unless nothing is left.
+    fn of(
+        work: &Work<'_>,
+        patient: &Patient<'_>,
+        head: &Head,
+        bodies: &[Posed],
+        checks: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, WorkflowError> {
+        let settings = &work.settings.predict;
+        let nodes = patient.input.mesh.0.nodes_mm().len();
+        let (mut found, mut refused): (Vec<(&Posed, Forecast)>, Vec<String>) = (Vec::new(), Vec::new());
+        // States of the surface and solved draws.
+        work.tell(|p| p.begin("prediction", bodies.len() * (7 + checks)));
+        work.tell(|p| p.doing(&head.to_string()));
+        for posed in bodies {
+            match forecast(posed, nodes, (settings.draws, checks), &|| work.tell(|p| p.step())) {
+                Ok(forecast) => found.push((posed, forecast)),
+                Err(error) => refused.push(error.to_string()),
+            }
+        }
+        work.tell(|p| p.end());
+        if found.is_empty() {
+            return Err(PredictError::NoEquilibrium { reason: refused.join("; ") }.into());
+        }
+        warnings.extend(refused.into_iter().map(|error| format!("{head}: left out: {error}")));
+        let all: f64 = found.iter().map(|(posed, _)| posed.weight).sum();
+        let every = (nodes / SHARED_NODES).max(1);
+        let some: Vec<usize> = (0..nodes).step_by(every).collect();
+        let thinned: Vec<_> = found
+            .iter()
+            .map(|(posed, f)| (posed.weight / all, f.response.thinned(&some), &posed.uncertainty))
+            .collect();
+        let models: Vec<_> =
+            thinned.iter().map(|(weight, response, unknowns)| (*weight, response, *unknowns)).collect();
+        let shares = variance_shares(&models);
+        let states = found.iter().map(|(_, f)| f.states).sum();
+        let mut draws = Vec::new();
+        let mut told = Vec::new();
+        for (posed, forecast) in found {
+            let weight = posed.weight / all / forecast.draws_mm.len() as f64;
+            draws.extend(forecast.draws_mm.into_iter().map(|u| (weight, u)));
+            told.extend(forecast.check);
+        }
+        let spread = spread(&draws, nodes, settings.threshold_mm);
+        Ok(Self { draws, spread, checks: told, shares, states })
+    }
+
+    fn in_numbers(&self, patient: &Patient<'_>, head: &Head, state: &str) -> HeadPrediction {
+        let mesh = patient.input.mesh.0;
+        let pre_from_mni = patient.mni_from_pre.inverse();
+        let sizes: Vec<f64> = self.spread.mean_mm.iter().map(|u| Vector3::from(*u).norm()).collect();
+        let largest = (0..sizes.len()).max_by(|&a, &b| sizes[a].total_cmp(&sizes[b]).then(b.cmp(&a))).unwrap_or(0);
+        let at = mesh.nodes_mm()[largest];
+        let over = (0..mesh.tets().len()).map(|t| {
+            let mean = mesh.tets()[t].iter().map(|&n| self.spread.over[n as usize]).sum::<f64>() / 4.0;
+            mean * mesh.volume_mm3(t) / 1000.0
+        });
+        let down = pre_from_mni.rotation * Vector3::from(head.gravity_m_per_s2(&patient.mni_from_pre)).normalize();
+        let median = |values: &[f64]| {
+            let mut sorted = values.to_vec();
+            sorted.sort_by(f64::total_cmp);
+            sorted[sorted.len() / 2]
+        };
+        HeadPrediction {
+            head: head.to_string(),
+            state: state.to_owned(),
+            down: [down.x, down.y, down.z].map(rounded),
+            largest_mm: rounded(sizes[largest]),
+            largest_at_mm: <[f64; 3]>::from(pre_from_mni.apply(Position::new(at[0], at[1], at[2])).mm).map(rounded),
+            median_mm: rounded(median(&sizes)),
+            sd_median_mm: rounded(median(&self.spread.sd_mm)),
+            reach95_largest_mm: rounded(self.spread.reach95_mm.iter().copied().fold(0.0, f64::max)),
+            over_threshold_cc: rounded(over.sum()),
+            shares: self.shares,
+            states_solved: self.states,
+            targets: (0..patient.targets.len()).map(|n| self.target(patient, n)).collect(),
+        }
+    }
+
+    fn target(&self, patient: &Patient<'_>, number: usize) -> TargetPrediction {
+        let Target { at_mm, place, found } = &patient.targets[number];
+        let mut told =
+            TargetPrediction { target: number + 1, place: *place, at_mm: *at_mm, ..TargetPrediction::default() };
+        if *place == TargetPlace::Removed {
+            told.expected_mm = *at_mm;
+            return told;
+        }
+        let turn = patient.mni_from_pre.inverse().rotation;
+        let draws: Vec<(f64, [f64; 3])> =
+            self.draws.iter().map(|(weight, u)| (*weight, (turn * Vector3::from(found.at(u))).into())).collect();
+        let ellipsoid = ellipsoid_95(&draws);
+        let threshold_mm = patient.settings.predict.threshold_mm;
+        let over = draws.iter().filter(|(_, u)| Vector3::from(*u).norm() > threshold_mm).map(|(w, _)| w).sum::<f64>();
+        told.expected_mm = [0, 1, 2].map(|a| rounded(at_mm[a] + ellipsoid.mean_mm[a]));
+        told.shift_mm = rounded(Vector3::from(ellipsoid.mean_mm).norm());
+        told.sd_mm = rounded(ellipsoid.sd_mm);
+        told.half_axes_mm = ellipsoid.half_axes_mm.map(rounded);
+        told.axes = ellipsoid.axes.map(|axis| axis.map(rounded));
+        told.over_threshold = rounded(over.min(1.0));
+        told
+    }
+}
+
+/// Micrometres: more than any use needs.
+fn rounded(x: f64) -> f64 {
+    (x * 1e3).round() / 1e3 + 0.0
+}
