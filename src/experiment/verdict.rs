@@ -44,6 +44,8 @@ pub enum Finding {
     NoOperation,
     /// Two heads.
     NotOnePerson,
+    /// The operation is still to come: there is nothing to be compared with.
+    Predicted,
     /// Nothing was simulated.
     #[default]
     Nothing,
@@ -82,6 +84,7 @@ impl Finding {
             Self::NoEquilibrium => "no equilibrium",
             Self::NoOperation => "no operation seen",
             Self::NotOnePerson => "not one person",
+            Self::Predicted => "predicted",
             Self::Nothing => "nothing simulated",
         }
     }
@@ -365,7 +368,8 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
             let against = |r: &&Reason| matches!(r, Reason::Surface { .. });
             let rest = reasons.iter().find(against).map(|r| format!(" ({})", r.sentence())).unwrap_or_default();
             let failed = reasons.iter().filter(|r| matches!(r, Reason::WithoutEquilibrium { .. }));
-            let failed: String = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
+            let failed: Vec<String> = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
+            let failed = failed.concat();
             format!("Better than rest{rest}; samples as good as the best have {ranges}.{failed}")
         }
         Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
@@ -375,6 +379,10 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         Finding::NoEquilibrium => format!("No stiffness is claimed: {first}."),
         Finding::NoOperation => "No operation is seen: no stiffness is claimed.".to_owned(),
         Finding::NotOnePerson => "The two scans do not show one person: nothing was compared.".to_owned(),
+        Finding::Predicted => {
+            "A prediction: the operation is still to come, nothing was compared, and no stiffness is claimed."
+                .to_owned()
+        }
         Finding::Nothing => "Prepared only: nothing was simulated, and no stiffness is claimed.".to_owned(),
     }
 }

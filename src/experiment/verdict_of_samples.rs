@@ -34,6 +34,9 @@ fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
     if let Some(answer) = outcome.answer {
         return answer.verdict();
     }
+    if outcome.kind == ExperimentKind::Prediction {
+        return without(Finding::Predicted, Vec::new());
+    }
     let (of, samples) = (outcome.samples.len(), outcome.samples.iter().filter(|s| !s.converged).count());
     let failed = (samples > 0).then_some(Reason::WithoutEquilibrium { samples, of });
     let Some(best) = outcome.best() else {

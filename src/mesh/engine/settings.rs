@@ -35,7 +35,7 @@ pub struct MidplaneSplit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSettings {
-    /// The engine; see [`super::EnginePrograms::preferred`].
+    /// The engine, by its name; where none is named the first that can run (`hgm doctor` tells which can).
     #[schemars(with = "String")]
     pub engine: Engine,
     /// How fine.

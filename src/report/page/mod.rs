@@ -225,7 +225,11 @@ impl CasePage {
         let note = "The images are masked to the brain; of the scans' headers the page holds no names, dates or places (the \
                     heading is the folder's name), and it makes no request to any other place.";
         let glance = glance::block(self.outcome.as_ref(), self.glance.as_ref(), self.brain_shift.as_ref());
-        let first = html! { (glance) (self.warnings_box()) };
+        let expected = self.prediction.as_ref().map(prediction::in_a_sentence);
+        let first = html! {
+            @if let Some(expected) = expected { p class="verdict" { (expected) } "\n" }
+            (glance) (self.warnings_box())
+        };
         frame.html(&first, &self.sections(), note, &scripts)
     }
 
