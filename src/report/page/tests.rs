@@ -49,9 +49,10 @@ fn outcome(kind: ExperimentKind) -> ExperimentOutcome {
             ..RegistrationOutcome::default()
         }],
         loads: vec!["gravity 9.81 m/s² towards −z".to_owned()],
-        reference_shear_modulus_pa: match kind {
-            ExperimentKind::Phantom => map(vec![("grey_matter", 880.0)]),
-            ExperimentKind::Resection => BTreeMap::new(),
+        reference_shear_modulus_pa: if kind == ExperimentKind::Phantom {
+            map(vec![("grey_matter", 880.0)])
+        } else {
+            BTreeMap::new()
         },
         warnings: vec!["</script><img src=x>: the cavity touches the brain's edge".to_owned()],
         ..ExperimentOutcome::default()
