@@ -365,7 +365,8 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
             let against = |r: &&Reason| matches!(r, Reason::Surface { .. });
             let rest = reasons.iter().find(against).map(|r| format!(" ({})", r.sentence())).unwrap_or_default();
             let failed = reasons.iter().filter(|r| matches!(r, Reason::WithoutEquilibrium { .. }));
-            let failed: String = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
+            let failed: Vec<String> = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
+            let failed = failed.concat();
             format!("Better than rest{rest}; samples as good as the best have {ranges}.{failed}")
         }
         Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
