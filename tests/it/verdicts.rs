@@ -68,7 +68,7 @@ fn in_conflict() -> ExperimentOutcome {
         "convergence": "step-below-tolerance", "solves": 9, "tangent_solves": 18, "limits": [], "verdict": verdict,
     });
     let mut outcome = swept(3.0, &[(41526.2, Some(1.1))]);
-    outcome.samples[0].id = "estimate".to_owned();
+    "estimate".clone_into(&mut outcome.samples[0].id);
     outcome.best_sample = Some("estimate".to_owned());
     outcome.estimate = Some(serde_json::from_value(estimate).unwrap());
     outcome
