@@ -168,7 +168,8 @@ mod tests {
         let text = annotated(&every_setting(&settings));
         let layer = Settings::layer(&text, "printed.toml").unwrap_or_else(|e| panic!("{e}\n{text}"));
         assert_eq!(Settings::resolve([&layer]).unwrap(), settings);
-        assert!(text.contains("engine = \"gmsh\"") && text.contains("Default: \"lattice\"."), "{text}");
+        let unwrapped = text.replace("\n# ", " ");
+        assert!(text.contains("engine = \"gmsh\"") && unwrapped.contains("Default: \"lattice\"."), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 130), "{text}");
     }
 
