@@ -80,7 +80,11 @@ pub fn variance_shares(models: &[Supported<'_>]) -> Shares {
     };
     let [stiffness, load, direction, room] = Cause::ALL.map(share);
     let supports = share_of_supports(models, weights, &firsts);
-    let together = (1.0 - stiffness - load - direction - room - supports).clamp(0.0, 1.0);
+    // Found from draws, they may be a hair more than all there is.
+    let sum = (stiffness + load + direction + room + supports).max(1.0);
+    let [stiffness, load, direction, room, supports] =
+        [stiffness, load, direction, room, supports].map(|share| share / sum);
+    let together = (1.0 - stiffness - load - direction - room - supports).max(0.0);
     Shares { stiffness, load, direction, room, supports, together }
 }
 
