@@ -194,8 +194,7 @@ impl Coordinates {
             let pairs = others[..n].iter().filter(|(_, other)| bend != Bend::Straight || *other != Bend::Straight);
             terms.extend(pairs.map(|(other, _)| y * other));
         }
-        terms.iter_mut().for_each(|t| *t *= compliance);
-        terms
+        terms.into_iter().map(|term| term * compliance).collect()
     }
 
     /// How the terms change with each number, by central differences: they are smooth formulas, good to ten digits.
