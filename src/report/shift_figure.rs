@@ -42,7 +42,7 @@ pub fn shift_figure(
     let scale = ColourScale::to_95(sizes, "displacement (mm)")?;
     let pictures = panels.into_iter().map(|(caption, what, of)| {
         let picture = painted(t1, &grid, &scale, &|n| shown(n).map(of), Length::Shift);
-        captioned(picture, &grid, caption, &format!("{} {what}; {}", COLOUR_OF_SHIFT, lines()))
+        captioned(&picture, &grid, caption, &format!("{} {what}; {}", COLOUR_OF_SHIFT, lines()))
     });
     Some(ShiftFigure { pictures: pictures.collect(), scale })
 }
@@ -71,13 +71,13 @@ pub fn prediction_figure(
     let shift = ShiftFigure {
         pictures: vec![
             captioned(
-                expected,
+                &expected,
                 &grid,
                 "Expected shift",
                 &format!("{COLOUR_OF_SHIFT} the mean of the draws; {}", lines()),
             ),
             captioned(
-                reach,
+                &reach,
                 &grid,
                 "95 % move less than this",
                 "colour is the size that 95 % of the draws do not exceed",
@@ -86,7 +86,7 @@ pub fn prediction_figure(
         scale,
     };
     let what = "colour is the standard deviation of the displacement";
-    let pictures = vec![captioned(spread, &grid, "How unsure: standard deviation", what)];
+    let pictures = vec![captioned(&spread, &grid, "How unsure: standard deviation", what)];
     Some(PredictionFigure { shift, spread: ShiftFigure { pictures, scale: of_spread } })
 }
 
@@ -175,7 +175,7 @@ fn painted(
     picture
 }
 
-fn captioned(picture: Picture, grid: &Grid<Mni>, caption: &str, what: &str) -> CaptionedPicture {
+fn captioned(picture: &Picture, grid: &Grid<Mni>, caption: &str, what: &str) -> CaptionedPicture {
     let level_mm = grid.position(Point3::origin()).mm.z;
     CaptionedPicture {
         png: picture.to_png(),

@@ -54,7 +54,7 @@ fn slow_a_plan_becomes_fields_targets_and_a_page_the_same_on_any_number_of_threa
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
     assert_eq!(found["heads"].as_array().unwrap().len(), 2);
     // Whoever lies on the back is pulled to the back of the head, on the face to the face.
-    assert!(number(&head(0)["down"][1]) < -0.9 && number(&head(1)["down"][1]) > 0.9);
+    assert!(number(&head(0)["down"][1]) < -0.8 && number(&head(1)["down"][1]) > 0.8);
     for n in 0..2 {
         let shares = head(n)["shares"].as_object().unwrap();
         let sum: f64 = shares.values().map(number).sum();
@@ -104,10 +104,9 @@ fn refuses_in_the_case(case: &Path, folder: &Path) {
     let far = folder.join("far.csv");
     std::fs::write(&far, "x,y,z\n20,-10,30\n500,0,0\n").unwrap();
     let (mask, far) = (plan().display().to_string(), far.display().to_string());
-    let cases: [(&[&str], &[&str]); 3] = [
+    let cases: [(&[&str], &[&str]); 2] = [
         (&["--resection", &mask, "--targets", &far], &["far.csv", "target 2", "outside the head"]),
         (&["--resection-ellipsoid", "0,0,0,300,300,300"], &["outside the brain"]),
-        (&["--resection-ellipsoid", "-95,-90,0,4,4,4"], &["outside the brain"]),
     ];
     for (more, words) in cases {
         let ended = planned(case, more);

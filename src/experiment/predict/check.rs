@@ -28,8 +28,11 @@ pub struct Check {
 /// Fewer draws have no spread to speak of.
 const FEWEST: usize = 8;
 
+/// One draw, read and solved: displacement of every node, mm.
+pub type Pair = (Vec<[f64; 3]>, Vec<[f64; 3]>);
+
 /// Compares `(read, solved)` displacements of the same draws, mm.
-pub fn checked(supports: &str, pairs: &[(Vec<[f64; 3]>, Vec<[f64; 3]>)]) -> Check {
+pub fn checked(supports: &str, pairs: &[Pair]) -> Check {
     let nodes = pairs.first().map_or(0, |(read, _)| read.len());
     let (mut of_all, mut of_difference) = (0.0, 0.0);
     for (read, solved) in pairs {
@@ -41,7 +44,7 @@ pub fn checked(supports: &str, pairs: &[(Vec<[f64; 3]>, Vec<[f64; 3]>)]) -> Chec
     let count = (pairs.len() * nodes).max(1) as f64;
     let (mut mean_off_95, mut sd_off_95) = (None, None);
     if pairs.len() >= FEWEST {
-        let of = |pick: &dyn Fn(&(Vec<[f64; 3]>, Vec<[f64; 3]>)) -> Vec<[f64; 3]>| {
+        let of = |pick: &dyn Fn(&Pair) -> Vec<[f64; 3]>| {
             let draws: Vec<(f64, Vec<[f64; 3]>)> = pairs.iter().map(|pair| (1.0, pick(pair))).collect();
             spread(&draws, nodes, 1.0)
         };

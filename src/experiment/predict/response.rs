@@ -37,6 +37,17 @@ enum Kind {
     Other { curved: bool },
 }
 
+/// How many states lie off the centre in a coordinate, and so which powers of it count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Bend {
+    /// None: slopes alone.
+    Straight,
+    /// One.
+    Once,
+    /// To both sides.
+    Both,
+}
+
 /// The coordinates of the surface.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
@@ -90,7 +101,7 @@ impl Coordinates {
         Self { centre: uncertainty.centre(), sd, kinds, log_sd: variance.sqrt().max(1e-9) }
     }
 
-    /// Where states are needed besides the centre: softer and stiffer, and to both sides of what is curved. Only moduli are
+    /// Where states are needed besides the centre: softer and stiffer, tissues apart, and to both sides of what is curved. Only moduli are
     /// changed for the load over stiffness: a body of half the stiffness moves like one of twice the weight.
     pub fn design(&self) -> Vec<Vec<f64>> {
         let mut points = Vec::new();
@@ -101,6 +112,14 @@ impl Coordinates {
                     *x -= side * ALONG_LOAD * self.log_sd;
                 }
             }
+            points.push(point);
+        }
+        // Each tissue but the first softer, the first stiffer.
+        let moduli: Vec<usize> = (0..self.kinds.len()).filter(|&n| matches!(self.kinds[n], Kind::Modulus(_))).collect();
+        for &n in moduli.iter().skip(1) {
+            let mut point = self.centre.clone();
+            point[moduli[0]] += ALONG_CURVED * self.sd[moduli[0]];
+            point[n] -= ALONG_CURVED * self.sd[n];
             points.push(point);
         }
         for n in (0..self.kinds.len()).filter(|&n| self.is_curved(n)) {
@@ -148,33 +167,34 @@ impl Coordinates {
             .zip(&self.kinds)
             .map(|((x, centre), kind)| if let Kind::Modulus(share) = kind { share * (centre - x).exp() } else { 0.0 })
             .sum();
-        // Coordinates besides s, each with whether it is curved.
-        let mut others: Vec<(f64, bool)> = Vec::new();
+        let mut others: Vec<(f64, Bend)> = Vec::new();
         let mut first = true;
         for (n, kind) in self.kinds.iter().enumerate() {
             let away = point[n] - self.centre[n];
             match kind {
                 // The shares sum to one: the first says nothing new.
                 Kind::Modulus(_) if std::mem::take(&mut first) => {}
-                Kind::Modulus(share) => others.push((share * ((-away).exp() / soft - 1.0), false)),
+                Kind::Modulus(share) => others.push((share * ((-away).exp() / soft - 1.0), Bend::Once)),
                 Kind::Density => {}
-                Kind::Turn => others.push((across * away / self.sd[n], false)),
-                Kind::Room => others.push((away.exp() - 1.0, true)),
-                Kind::Other { curved } => others.push((away / self.sd[n], *curved)),
+                Kind::Turn => others.push((across * away / self.sd[n], Bend::Straight)),
+                Kind::Room => others.push((away.exp() - 1.0, Bend::Both)),
+                Kind::Other { curved: true } => others.push((away / self.sd[n], Bend::Both)),
+                Kind::Other { curved: false } => others.push((away / self.sd[n], Bend::Straight)),
             }
         }
         let mut terms: Vec<f64> = (0..=POWERS).map(|p| s.powi(p as i32)).collect();
-        for (n, &(y, curved)) in others.iter().enumerate() {
+        for (n, &(y, bend)) in others.iter().enumerate() {
             terms.extend([y, s * y, s * s * y]);
-            if curved {
-                terms.extend([y * y, s * y * y]);
-                terms.extend(
-                    others.iter().enumerate().filter(|(m, (_, c))| *m != n && !(*c && *m < n)).map(|(_, o)| y * o.0),
-                );
+            match bend {
+                Bend::Straight => {}
+                Bend::Once => terms.push(y * y),
+                Bend::Both => terms.extend([y * y, s * y * y]),
             }
+            // A state off the centre in either of two tells what they do together.
+            let pairs = others[..n].iter().filter(|(_, other)| bend != Bend::Straight || *other != Bend::Straight);
+            terms.extend(pairs.map(|(other, _)| y * other));
         }
-        terms.iter_mut().for_each(|t| *t *= compliance);
-        terms
+        terms.into_iter().map(|term| term * compliance).collect()
     }
 
     /// How the terms change with each number, by central differences: they are smooth formulas, good to ten digits.
@@ -318,10 +338,14 @@ pub(super) mod tests {
     #[test]
     fn a_body_that_a_wall_ends_is_followed_and_exactly_so_in_the_limit_of_a_small_spread() {
         let ended = |point: &[f64]| -> Vec<[f64; 3]> {
-            linear_body(point).into_iter().map(|u| u.map(|x| x / (1.0 + x.abs() / 3.0))).collect()
+            let softly = |u: [f64; 3]| {
+                let size = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+                u.map(|x| x / (1.0 + size / 10.0))
+            };
+            linear_body(point).into_iter().map(softly).collect()
         };
         let [large, half, quarter] = [1.0, 0.5, 0.25].map(|sd| worst(&ended, sd));
-        assert!(large < 0.05, "{large}");
+        assert!(large < 0.25, "{large}");
         assert!(half < large / 3.0 && quarter < half / 3.0, "{large} {half} {quarter}");
     }
 }

@@ -28,100 +28,101 @@ pub struct Shares {
     pub together: f64,
 }
 
-/// Values of the unknown whose share is found.
-const OUTER: usize = 256;
-/// Draws of all others for each of them.
-const INNER: usize = 64;
-/// Draws behind the whole variance.
-const WHOLE: usize = 2048;
+/// Pairs of draws behind every share.
+const PAIRS: usize = 2048;
 
 /// One way of supporting the body: its weight, its answer and its unknowns.
 pub type Supported<'a> = (f64, &'a Response, &'a Uncertainty);
 
-/// The shares over the nodes of the responses. All must have the same nodes; unknowns of one cause are drawn alike.
+/// Displacements of one draw: their mean over the supports, and the mean of their squares.
+struct Drawn {
+    mixed: Vec<f64>,
+    square: f64,
+}
+
+/// The shares over the nodes of the responses, from pairs of draws that have one cause in common (Saltelli et al., Computer
+/// Physics Communications 181, 2010; both draws count for mean and variance). All must have the same nodes; unknowns of one
+/// cause are drawn alike.
 pub fn variance_shares(models: &[Supported<'_>]) -> Shares {
     let weights: f64 = models.iter().map(|m| m.0).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mixed = |at: &dyn Fn(&Uncertainty) -> Vec<f64>| -> Vec<f64> {
-        let mut sum: Vec<f64> = Vec::new();
+    let dimensions = models.iter().map(|(_, _, u)| u.list.len()).max().unwrap_or(0);
+    let drawn = |point: &(dyn Fn(&Uncertainty) -> Vec<f64> + Sync)| -> Drawn {
+        let mut drawn = Drawn { mixed: Vec::new(), square: 0.0 };
         for (weight, response, uncertainty) in models {
-            let u = response.at(&at(uncertainty));
-            sum.resize(3 * u.len(), 0.0);
-            sum.iter_mut().zip(u.iter().flatten()).for_each(|(sum, u)| *sum += weight / weights * u);
+            let u = response.at(&point(uncertainty));
+            drawn.mixed.resize(3 * u.len(), 0.0);
+            drawn.mixed.iter_mut().zip(u.iter().flatten()).for_each(|(sum, u)| *sum += weight / weights * u);
+            drawn.square += weight / weights * u.iter().flatten().map(|u| u * u).sum::<f64>();
         }
-        sum
+        drawn
     };
-    // Supports are known in turn: their share is the variance of their means, the rest of the whole that within each.
-    let (mut of_supports, mut whole) = (Moments::default(), Moments::default());
-    for (weight, response, uncertainty) in models {
-        let draws: Vec<Vec<f64>> = (0..WHOLE)
-            .into_par_iter()
-            .map(|n| response.at(&uncertainty.draw(n)).into_iter().flatten().collect())
-            .collect();
-        let mut mean = Moments::default();
-        for u in &draws {
-            mean.add(1.0, u);
-            whole.add(weight / weights, u);
-        }
-        of_supports.add(weight / weights, &mean.mean());
-    }
-    let variance = whole.variance().max(f64::MIN_POSITIVE);
+    let first = |n: usize| drawn(&|uncertainty| uncertainty.draw(n));
+    let firsts: Vec<Drawn> = (0..PAIRS).into_par_iter().map(first).collect();
     let share = |cause: Cause| -> f64 {
         if models.iter().all(|(_, _, u)| u.of(cause).is_empty()) {
             return 0.0;
         }
-        let means: Vec<Vec<f64>> = (0..OUTER)
-            .into_par_iter()
-            .map(|outer| {
-                let mut mean = Moments::default();
-                for inner in 0..INNER {
-                    mean.add(1.0, &mixed(&|uncertainty| known(uncertainty, cause, outer, inner)));
-                }
-                mean.mean()
-            })
-            .collect();
-        let mut outer = Moments::default();
-        means.iter().for_each(|mean| outer.add(1.0, mean));
-        (outer.variance() / variance).clamp(0.0, 1.0)
+        let second = |n: usize| drawn(&|uncertainty| in_common(uncertainty, cause, n, dimensions));
+        let seconds: Vec<Drawn> = (0..PAIRS).into_par_iter().map(second).collect();
+        let mut mean = vec![0.0; firsts[0].mixed.len()];
+        let (mut square, mut product) = (0.0, 0.0);
+        for (a, b) in firsts.iter().zip(&seconds) {
+            square += 0.5 * (a.square + b.square);
+            for ((mean, a), b) in mean.iter_mut().zip(&a.mixed).zip(&b.mixed) {
+                *mean += 0.5 * (a + b);
+                product += a * b;
+            }
+        }
+        let count = PAIRS as f64;
+        let of_mean = mean.iter().map(|m| (m / count).powi(2)).sum::<f64>();
+        let variance = (square / count - of_mean).max(f64::MIN_POSITIVE);
+        ((product / count - of_mean) / variance).clamp(0.0, 1.0)
     };
     let [stiffness, load, direction, room] = Cause::ALL.map(share);
-    let supports = (of_supports.variance() / variance).clamp(0.0, 1.0);
-    let together = (1.0 - stiffness - load - direction - room - supports).clamp(0.0, 1.0);
+    let supports = share_of_supports(models, weights, &firsts);
+    // Found from draws, they may be a hair more than all there is.
+    let sum = (stiffness + load + direction + room + supports).max(1.0);
+    let [stiffness, load, direction, room, supports] =
+        [stiffness, load, direction, room, supports].map(|share| share / sum);
+    let together = (1.0 - stiffness - load - direction - room - supports).max(0.0);
     Shares { stiffness, load, direction, room, supports, together }
 }
 
-/// A point whose unknowns of one cause are those of draw `outer`, all others those of draw `inner`.
-fn known(uncertainty: &Uncertainty, cause: Cause, outer: usize, inner: usize) -> Vec<f64> {
-    let mut z = normals(inner, 0, uncertainty.list.len());
-    let own = uncertainty.of(cause);
-    for (place, value) in own.iter().zip(normals(outer, 0, own.len())) {
-        z[*place] = value;
+/// The variance between the means of the supports.
+fn share_of_supports(models: &[Supported<'_>], weights: f64, firsts: &[Drawn]) -> f64 {
+    let count = firsts.len() as f64;
+    let mean_of = |all: &mut dyn Iterator<Item = Vec<f64>>| -> Vec<f64> {
+        let mut mean: Vec<f64> = Vec::new();
+        for values in all {
+            mean.resize(values.len(), 0.0);
+            mean.iter_mut().zip(values).for_each(|(mean, v)| *mean += v / count);
+        }
+        mean
+    };
+    let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let of_mean = square(&mean_of(&mut firsts.iter().map(|drawn| drawn.mixed.clone())));
+    let between: f64 = models
+        .iter()
+        .map(|(weight, response, uncertainty)| {
+            let draws: Vec<Vec<f64>> = (0..firsts.len())
+                .into_par_iter()
+                .map(|n| response.at(&uncertainty.draw(n)).into_iter().flatten().collect())
+                .collect();
+            weight / weights * square(&mean_of(&mut draws.into_iter()))
+        })
+        .sum();
+    let variance = (firsts.iter().map(|drawn| drawn.square).sum::<f64>() / count - of_mean).max(f64::MIN_POSITIVE);
+    ((between - of_mean) / variance).clamp(0.0, 1.0)
+}
+
+/// A draw that has the unknowns of one cause in common with draw `n`, all others apart from it.
+fn in_common(uncertainty: &Uncertainty, cause: Cause, n: usize, dimensions: usize) -> Vec<f64> {
+    let mut z = normals(n, dimensions, uncertainty.list.len());
+    let same = normals(n, 0, uncertainty.list.len());
+    for place in uncertainty.of(cause) {
+        z[place] = same[place];
     }
     uncertainty.point(&z)
-}
-
-/// Weighed sums of a vector and of its square.
-#[derive(Default)]
-struct Moments {
-    weight: f64,
-    sum: Vec<f64>,
-    squares: f64,
-}
-
-impl Moments {
-    fn add(&mut self, weight: f64, values: &[f64]) {
-        self.sum.resize(values.len(), 0.0);
-        self.weight += weight;
-        self.sum.iter_mut().zip(values).for_each(|(sum, v)| *sum += weight * v);
-        self.squares += weight * values.iter().map(|v| v * v).sum::<f64>();
-    }
-
-    fn mean(&self) -> Vec<f64> {
-        self.sum.iter().map(|s| s / self.weight).collect()
-    }
-
-    fn variance(&self) -> f64 {
-        (self.squares / self.weight - self.mean().iter().map(|m| m * m).sum::<f64>()).max(0.0)
-    }
 }
 
 #[cfg(test)]

@@ -252,7 +252,7 @@ impl Lying {
         let nodes = patient.input.mesh.0.nodes_mm().len();
         let (mut found, mut refused): (Vec<(&Posed, Forecast)>, Vec<String>) = (Vec::new(), Vec::new());
         // States of the surface and solved draws.
-        work.tell(|p| p.begin("prediction", bodies.len() * (7 + checks)));
+        work.tell(|p| p.begin("prediction", bodies.len() * (6 + checks)));
         work.tell(|p| p.doing(&head.to_string()));
         for posed in bodies {
             match forecast(posed, nodes, (settings.draws, checks), &|| work.tell(|p| p.step())) {
