@@ -115,7 +115,8 @@ mod tests {
             settings.check().map_err(|e| e.to_string())
         };
         assert_eq!(of(&|_| ()), Ok(()));
-        let cases: [(&str, &dyn Fn(&mut PredictSettings)); 6] = [
+        type Change<'a> = &'a dyn Fn(&mut PredictSettings);
+        let cases: [(&str, Change<'_>); 6] = [
             ("`heads`", &|s| s.heads = Vec::new()),
             ("`heads`", &|s| s.heads = vec![Head::Left, Head::Left]),
             ("`draws`", &|s| s.draws = 3),
