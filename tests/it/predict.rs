@@ -41,7 +41,8 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
 #[test]
 fn slow_a_plan_becomes_fields_targets_and_a_page_the_same_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let (case, again) = (folder.path().join("case"), folder.path().join("again"));
+    // The page is headed by the folder's name.
+    let (case, again) = (folder.path().join("case"), folder.path().join("again").join("case"));
     let targets = folder.path().join("targets.csv");
     std::fs::write(&targets, "x,y,z\n20,-10,30\n-30,0,20\n").unwrap();
     let (mask, targets) = (plan().display().to_string(), targets.display().to_string());
