@@ -61,11 +61,12 @@ pub fn prediction_figure(
     let known = in_tetrahedra(mesh.tets(), mesh.nodes_mm(), &values, &grid);
     let shown = |n: usize| known[n].map(|v| v.map(f64::from));
     let mean = |n: usize| shown(n).map(|v| [v[0], v[1], v[2]]);
-    let sizes = (0..grid.len()).filter_map(shown).flat_map(|v| [length([v[0], v[1], v[2]]), v[3]]);
+    // What lies between nodes that do not move may be a hair below nothing.
+    let sizes = (0..grid.len()).filter_map(shown).flat_map(|v| [length([v[0], v[1], v[2]]), v[3].max(0.0)]);
     let scale = ColourScale::over(sizes.chain([0.0]), "displacement (mm)")?;
     let expected = painted(t1, &grid, &scale, &mean, Length::Shift);
     let reach = painted(t1, &grid, &scale, &|n| shown(n).map(|v| [v[3], 0.0, 0.0]), Length::Plain);
-    let spreads = (0..grid.len()).filter_map(shown).map(|v| v[4]);
+    let spreads = (0..grid.len()).filter_map(shown).map(|v| v[4].max(0.0));
     let of_spread = ColourScale::over(spreads.chain([0.0]), "standard deviation (mm)")?;
     let spread = painted(t1, &grid, &of_spread, &|n| shown(n).map(|v| [v[4], 0.0, 0.0]), Length::Plain);
     let shift = ShiftFigure {

@@ -45,7 +45,10 @@ pub fn in_a_sentence(shift: &BrainShift) -> String {
 fn explained(e: &Explained) -> String {
     match (e.share, e.share_sd) {
         (Some(share), Some(sd)) => {
-            format!("The model explains {} of the shift that the images show.", percent(share, sd))
+            format!(
+                "The model explains {} of the shift as the images show it, the registration's own error in it.",
+                percent(share, sd)
+            )
         }
         _ => format!(
             "Which share of the shift the model explains is not measurable: the images show {} mm, their noise is {} mm.",

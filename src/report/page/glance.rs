@@ -49,7 +49,7 @@ fn numbers(outcome: &ExperimentOutcome, shift: Option<&BrainShift>) -> Vec<Marku
     }
     if let Some(share) = verdict.explained_share {
         let value = html! { (fixed(100.0 * share, 0)) span class="unit" { " %" } };
-        tiles.push(tile("Explained by the model", &value, "of the shift that the images show"));
+        tiles.push(tile("Explained by the model", &value, "of the seen shift, without the registration's own error"));
     }
     tiles.extend(errors(outcome));
     if let Some(state) = shift.and_then(|shift| shift.states.first()) {
