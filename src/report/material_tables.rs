@@ -98,8 +98,8 @@ pub fn moduli_csv(rows: &[TaskModuli]) -> String {
     text + "\n"
 }
 
-/// The same for a terminal, with the tests whether the laws fit equally well.
-pub fn moduli_text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> String {
+/// The same for a terminal, without the end of its last line.
+pub(super) fn levels_text(rows: &[TaskModuli]) -> String {
     let mut text = format!("{:<22}", "shear modulus (Pa), sd");
     for level in nine_levels() {
         let _ = write!(text, "{level:>11.1}");
@@ -110,6 +110,12 @@ pub fn moduli_text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> Strin
             let _ = write!(text, "{modulus:>11.1}");
         }
     }
+    text
+}
+
+/// The same for a terminal, with the tests whether the laws fit equally well.
+pub fn moduli_text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> String {
+    let mut text = levels_text(rows);
     let laws = COMPARED.map(MetaModel::name).join(", ");
     let _ = write!(
         text,

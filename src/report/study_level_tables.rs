@@ -1,8 +1,7 @@
 //! Tables of the study-level model: the prediction over the stretch, drawn functions, a person's moduli, publications
 //! beside what the others say of them; and the same for a terminal.
 
-use super::material_tables::TaskModuli;
-use crate::material::generative::nine_levels;
+use super::material_tables::{TaskModuli, levels_text};
 use crate::material::study_level::{LeftOut, ModuliPrior, StudyLevelFile, StudyLevelPrior, uniform_probability};
 use std::fmt::Write;
 
@@ -92,17 +91,7 @@ pub fn fit_text(file: &StudyLevelFile) -> String {
 
 /// Shear moduli of a new person at nine levels, for a terminal.
 pub fn show_text(rows: &[TaskModuli]) -> String {
-    let mut text = format!("{:<22}", "shear modulus (Pa), sd");
-    for level in nine_levels() {
-        let _ = write!(text, "{level:>11.1}");
-    }
-    for row in rows {
-        let _ = write!(text, "\n{:<22}", row.task);
-        for modulus in &row.shear_modulus_pa {
-            let _ = write!(text, "{modulus:>11.1}");
-        }
-    }
-    text + "\n"
+    levels_text(rows) + "\n"
 }
 
 /// Publications that were left out, in sum, for a terminal.

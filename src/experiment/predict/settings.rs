@@ -35,7 +35,7 @@ pub struct PredictSettings {
     /// Standard deviation of either angle between the head and how it is said to lie, degrees.
     pub direction_sd_deg: f64,
     /// How probable it is, against `sliding_weight`, that base and falx hold the brain. Before an operation nothing speaks for
-    /// either: of patients of either kind, equal weights are wrong least.
+    /// either.
     pub fixed_weight: f64,
     /// How probable it is that the brain slides on the skull.
     pub sliding_weight: f64,
