@@ -26,10 +26,14 @@ use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
+/// Array of a state: what the images showed of a node, the registration's own error taken out, mm; zero elsewhere.
+pub(super) const SEEN_DISPLACEMENT: &str = "seen_displacement";
+/// Array of a state: the nodes that the estimate was held against.
+pub(super) const SEEN_AT: &str = "seen";
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
 
@@ -356,7 +360,7 @@ fn produced(
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
     let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
-    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials, numbers: _ } = found;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, seen, materials, numbers: _ } = found;
     let errors = body.reference.errors(mesh, &state.displacement_mm);
     let tissue = |t: &Tissue| {
         // The parameters are named after the tissue.
@@ -386,6 +390,11 @@ fn produced(
         file: Some(file.clone()),
     };
     let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
+    let mut seen_at = vec![0.0; mesh.nodes_mm().len()];
+    let mut seen_mm = vec![[0.0; 3]; mesh.nodes_mm().len()];
+    for (n, u) in seen {
+        (seen_at[n as usize], seen_mm[n as usize]) = (1.0, u);
+    }
     let points = [
         Field::vector("displacement", &state.displacement_mm),
         Field::vector("reaction_n", &state.reaction_n),
@@ -394,6 +403,8 @@ fn produced(
         Field::vector("displacement_mean", &state.displacement_mm),
         Field::scalar("displacement_sd", displacement_sd_mm),
         Field::scalar("displacement_95", displacement_95_mm),
+        Field::vector(SEEN_DISPLACEMENT, &seen_mm),
+        Field::scalar(SEEN_AT, seen_at),
     ];
     let cells = [
         Field::scalar("jacobian", state.jacobian),

@@ -39,4 +39,4 @@ pub(crate) use reference::{
 };
 pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
-pub(crate) use shift::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
+pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
