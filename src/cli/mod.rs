@@ -22,6 +22,7 @@ mod manual;
 mod mesh;
 mod output;
 mod phantom;
+mod population;
 mod predict;
 mod prep;
 mod reduce;
@@ -81,6 +82,7 @@ enum Command {
     Segment(segment::Args),
     Report(report::Args),
     Bids(bids::Args),
+    Population(population::Args),
     Why(why::Args),
     Layout(layout::Args),
     Schema(schema::Args),
@@ -141,6 +143,7 @@ pub fn main() -> ExitCode {
         Command::Segment(args) => segment::run(&args, &session),
         Command::Report(args) => report::run(&args, &session),
         Command::Bids(args) => bids::run(&args, &session),
+        Command::Population(args) => population::run(&args, &session),
         Command::Why(args) => why::run(&args, &session),
         Command::Layout(args) => layout::run(&args, &session),
         Command::Schema(args) => schema::run(&args, &session),

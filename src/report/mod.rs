@@ -4,6 +4,7 @@ pub mod case;
 pub mod change_chart;
 pub mod chart;
 pub mod cohort;
+pub mod cohort_population;
 pub mod colour;
 pub mod derivatives;
 pub mod figure;

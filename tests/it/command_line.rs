@@ -17,7 +17,7 @@ fn every_command(folder: &Path) -> BTreeSet<String> {
     let mut names: BTreeSet<String> = contents(&pages).keys().filter_map(name).collect();
     // A level of BIDS is an argument, but it prints a document of its own; `gp` and `law` only hold others.
     names.extend(["bids participant", "bids group"].map(str::to_owned));
-    for holder in ["bids", "gp", "law"] {
+    for holder in ["bids", "gp", "law", "population"] {
         assert!(names.remove(holder));
     }
     // The bundled demo is run and checked by `./run test` itself.
@@ -39,6 +39,15 @@ poisson_ratio = 0.45
 gravity_m_per_s2 = [0.0, 0.0, -9.81]
 density_kg_per_m3 = 30.0
 "#;
+
+/// The population of one patient whose ln(shear modulus) is known to a tenth.
+fn one_brain(log_mean: f64) -> String {
+    use hgm::experiment::population::{Moments, PopulationFile};
+    let moments = Moments { information: vec![100.0 * log_mean], precision: vec![vec![100.0]] };
+    let brain = [("shear_modulus_pa of brain".to_owned(), (6.5, 0.4))];
+    let law = hgm::material::meta_model::MetaModel::NEO_HOOKEAN;
+    PopulationFile::new((law, 100.0), &brain, vec![moments], std::collections::BTreeMap::new()).unwrap().to_toml()
+}
 
 #[test]
 fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_describes() {
@@ -99,6 +108,11 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("bids participant", &[&bids, &CHEAP[..]].concat());
     prints("bids group", &["bids", &study, &out, "group"]);
     prints("estimate", &["estimate", &case]);
+    for (name, mean) in [("a.toml", 6.4), ("b.toml", 6.6)] {
+        std::fs::write(at(name), one_brain(mean)).unwrap();
+    }
+    prints("population merge", &["population", "merge", &at("a.toml"), &at("b.toml"), "-o", &at("both.toml")]);
+    prints("population show", &["population", "show", &at("both.toml")]);
     prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
     let plan = sample("truth/resected_pre.nii.gz").display().to_string();

@@ -65,6 +65,9 @@ pub struct EstimateOutcome {
     pub posterior: Posterior,
     /// What was known before.
     pub prior: Vec<LogPrior>,
+    /// Patients of the cohort that the prior was learnt from; absent where it is the literature's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taught_by: Option<usize>,
     /// Largest standard deviation of ln(modulus) that the mesh itself adds to the intervals.
     #[serde(default)]
     pub model_log_sd: f64,
@@ -218,6 +221,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     };
     let correlated = fitted.correlated;
     let outcome = EstimateOutcome {
+        taught_by: None,
         limits: verdict.because(),
         verdict,
         observations: fitted.observations,

@@ -4,7 +4,7 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by,
     solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
@@ -197,8 +197,10 @@ pub(crate) fn estimate(
             (1, None) => (models.remove(0), None),
             _ => chosen(models),
         };
+        let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
+        let found = Estimate { outcome: EstimateOutcome { taught_by, ..found.outcome }, ..found };
         let mut produced = produced(body, input, found, comparison)?;
         produced.warnings.extend(warnings);
         Ok(produced)
@@ -267,7 +269,8 @@ impl Bodies {
         for tissue in tissues {
             unknowns.extend(law_priors(tissue, prior)?);
         }
-        unknowns.extend(options.unknown_loads(&body.scenario.loads));
+        let loads = options.unknown_loads(&body.scenario.loads);
+        unknowns.extend(loads.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))));
         unknowns.extend(body.unknown_room());
         let patient = matches!(body.reference, Reference::Surfaces(_));
         let mut scenario = body.scenario.clone();

@@ -67,7 +67,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             plan: input.plan.clone(),
             threshold_mm: settings.predict.threshold_mm,
             draws: settings.predict.draws,
-            assumptions: assumptions(&settings.predict, &settings.resection, &supports),
+            assumptions: assumptions(&settings.predict, (&settings.resection, &settings.prior), &supports),
             supports,
             ..Prediction::default()
         };
