@@ -55,7 +55,7 @@ pub fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 /// Engine and size of a mesh.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct MeshOptions {
-    /// Mesh engine [default: cgal where it is built, else lattice]
+    /// Mesh engine [default: lattice, which is part of hgm]
     #[arg(long, help_heading = MESH, value_name = "ENGINE", value_parser = engine)]
     pub mesher: Option<Engine>,
     /// Target number of tetrahedra (within 15 %)

@@ -17,7 +17,7 @@ pub struct Args {
     analysis: AnalysisOptions,
 }
 
-/// Tetrahedra of an estimate's mesh: from 60,000 of `cgal` to this many the moduli of a synthetic patient moved by +14 and
+/// Tetrahedra of an estimate's mesh: from 60,000 (of the engine `cgal`) to this many the moduli of a synthetic patient moved by +14 and
 /// -13 %, towards what another engine's mesh gave.
 const ESTIMATE_CELLS: usize = 160_000;
 

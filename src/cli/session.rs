@@ -120,14 +120,12 @@ impl Session {
     /// # Errors
     /// As [`Session::settings`].
     pub fn settings_over(&self, own: &toml::Table, mut flags: Flags) -> Result<Settings, Failure> {
-        let mut base = Flags::default();
-        base.set("mesh.engine", Some(self.programs.engines().preferred()));
         flags.set("image.prefer", self.options.prefer);
         flags.set("image.volume", self.options.volume);
         for room in ["register", "gp", "synth"] {
             flags.set(&format!("{room}.seed"), self.options.seed);
         }
-        Ok(Settings::resolve([&base.0, own, &self.config, &flags.0])?)
+        Ok(Settings::resolve([own, &self.config, &flags.0])?)
     }
 
     /// Where a job is done.
