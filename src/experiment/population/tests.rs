@@ -138,7 +138,7 @@ fn known_populations_lie_inside_their_intervals_and_shrunken_moduli_are_nearer_t
         }
         nearer += usize::from(shrunken < single);
     }
-    println!("inside: grey and white means, spreads {inside:?} of 20; shrunken nearer {nearer} of 20");
+    // Means of grey and white matter, then their spreads.
     assert!(inside.iter().all(|count| *count >= 18), "{inside:?}");
     assert_eq!(nearer, 20);
 }
