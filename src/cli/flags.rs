@@ -1,11 +1,11 @@
 //! Options that several commands share, and how they become a layer of settings over the settings file.
 
+use super::Failure;
 use crate::experiment::population::PopulationPrior;
 use crate::material::StudyKind;
 use crate::material::meta_model::MetaModel;
 use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
 use crate::segment::label;
-use super::Failure;
 use crate::workflow::cohort::population_prior;
 use crate::workflow::{Goal, Inputs};
 use serde::Serialize;

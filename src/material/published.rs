@@ -40,9 +40,5 @@ pub fn printed_moduli() -> Vec<PrintedModulus> {
 
 /// The statistic H of Kruskal and Wallis' test between three laws, per task.
 pub fn printed_kruskal_wallis() -> [(Task, f64); 3] {
-    [
-        (Task::HYPERELASTIC_GREY, 14.59),
-        (Task::HYPERELASTIC_WHITE, 20.98),
-        (Task::HYPERELASTIC_HEALTHY, 15.17),
-    ]
+    [(Task::HYPERELASTIC_GREY, 14.59), (Task::HYPERELASTIC_WHITE, 20.98), (Task::HYPERELASTIC_HEALTHY, 15.17)]
 }

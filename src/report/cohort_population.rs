@@ -38,7 +38,12 @@ impl CohortPopulation {
             _ if self.patients == 0 => {
                 format!("none of {out} estimated patients teaches: no population; left out: {}", left.join(", "))
             }
-            _ => format!("{} of {} estimated patients teach; left out: {}", self.patients, self.patients + out, left.join(", ")),
+            _ => format!(
+                "{} of {} estimated patients teach; left out: {}",
+                self.patients,
+                self.patients + out,
+                left.join(", ")
+            ),
         }];
         said.extend(self.parameters.iter().map(in_words));
         said

@@ -78,10 +78,8 @@ pub fn errors_figure(tasks: &[TaskErrors]) -> String {
     kinds.dedup();
     // One scale for all panels: they are to be compared.
     let all = || tasks.iter().flat_map(|t| &t.samples);
-    let axes = (
-        Axis::over(all().map(|s| s.0), false, false, SMALL.x),
-        Axis::over(all().map(|s| s.2), true, false, SMALL.y),
-    );
+    let axes =
+        (Axis::over(all().map(|s| s.0), false, false, SMALL.x), Axis::over(all().map(|s| s.2), true, false, SMALL.y));
     let mut regions: Vec<&str> = Vec::new();
     for task in tasks {
         if !regions.contains(&task.region.as_str()) {
@@ -114,7 +112,12 @@ pub fn errors_figure(tasks: &[TaskErrors]) -> String {
         );
     }
     let panels: Vec<String> = kinds.iter().map(panel).collect();
-    document(&SMALL, "Root mean square error of every task's samples against the phantom's known state", &legend, &panels)
+    document(
+        &SMALL,
+        "Root mean square error of every task's samples against the phantom's known state",
+        &legend,
+        &panels,
+    )
 }
 
 /// Where the published program departs from the paper or from the studies, and what it changes.

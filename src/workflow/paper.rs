@@ -130,9 +130,7 @@ mod tests {
             assert!((row.as_published_pa - row.printed_pa).abs() < 0.7, "{row:?}");
         }
         // The exact fit's, computed by another program from the same posterior.
-        let exact = [
-            528.7, 636.0, 765.0, 920.2, 1331.0, 2314.9, 314.8, 372.4, 440.5, 521.0, 616.2, 1205.1,
-        ];
+        let exact = [528.7, 636.0, 765.0, 920.2, 1331.0, 2314.9, 314.8, 372.4, 440.5, 521.0, 616.2, 1205.1];
         for (row, exact) in moduli.iter().zip(exact) {
             assert!((row.exact_fit_pa - exact).abs() < 0.06, "{row:?} {exact}");
         }
@@ -146,6 +144,10 @@ mod tests {
             let row = format!("| {:.0} | {:.1} |", r.printed_pa, r.as_published_pa);
             assert!(text.contains(&row), "{row} in\n{text}");
         }
-        assert!(text.contains("| 14.59 | 14.59 |") && text.contains("| 20.98 | 20.98 |") && text.contains("| 15.17 | 15.17 |"));
+        assert!(
+            text.contains("| 14.59 | 14.59 |")
+                && text.contains("| 20.98 | 20.98 |")
+                && text.contains("| 15.17 | 15.17 |")
+        );
     }
 }

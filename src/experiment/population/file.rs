@@ -88,11 +88,15 @@ pub struct PopulationFileError {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum MergeError {
-    #[error("{file}: its patients were estimated {its}, those of {first} {those}; moduli of both are not alike: merge cohorts of one kind")]
+    #[error(
+        "{file}: its patients were estimated {its}, those of {first} {those}; moduli of both are not alike: merge cohorts of one kind"
+    )]
     Otherwise { file: String, first: String, its: String, those: String },
     #[error("{file}: {count} of its patients are in another file, too; merge each cohort once")]
     Twice { file: String, count: usize },
-    #[error("{file}: `{name}` has another prior of the literature than in {first}; make both files with the same version of hgm")]
+    #[error(
+        "{file}: `{name}` has another prior of the literature than in {first}; make both files with the same version of hgm"
+    )]
     Literature { file: String, first: String, name: String },
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -159,7 +163,8 @@ impl PopulationFile {
 
     /// The prior of the next patient: the parameters that the cohort knows well enough.
     pub fn prior(&self) -> PopulationPrior {
-        let learnt = |t: &Taught| LearntPrior { name: t.name.clone(), log_mean: t.next_log_mean, log_sd: t.next_log_sd };
+        let learnt =
+            |t: &Taught| LearntPrior { name: t.name.clone(), log_mean: t.next_log_mean, log_sd: t.next_log_sd };
         PopulationPrior {
             law: self.law,
             density_kg_per_m3: self.density_kg_per_m3,
@@ -237,7 +242,9 @@ impl PopulationFile {
             }
         }
         let moments = self.moments.iter().enumerate();
-        moments.map(|(n, m)| m.check(self.parameters.len()).map_err(|e| format!("`moments` number {}: {e}", n + 1))).collect()
+        moments
+            .map(|(n, m)| m.check(self.parameters.len()).map_err(|e| format!("`moments` number {}: {e}", n + 1)))
+            .collect()
     }
 }
 

@@ -80,7 +80,8 @@ impl Population {
         let parts: Vec<(DMatrix<f64>, DVector<f64>)> = patients.iter().map(Moments::parts).collect();
         let first = DVector::from_iterator(names.len(), names.iter().map(|name| usual(name).ln()));
         let on = |grid: Grid| {
-            let tried: Vec<Tried> = (0..grid.len()).into_par_iter().map(|n| tried(&parts, &first, grid.at(n))).collect();
+            let tried: Vec<Tried> =
+                (0..grid.len()).into_par_iter().map(|n| tried(&parts, &first, grid.at(n))).collect();
             let best = tried.iter().map(|t| t.log_density).fold(f64::MIN, f64::max);
             let raw: Vec<f64> = tried.iter().map(|t| (t.log_density - best).exp()).collect();
             let sum: f64 = raw.iter().sum();
@@ -89,8 +90,7 @@ impl Population {
         };
         let mut found = on(Grid::whole(names.len(), SPREAD_SCALE));
         for _ in 0..CLOSER {
-            let spreads: Vec<(f64, f64)> =
-                (0..names.len()).map(|n| found.spread(n)).map(|s| (s.mean, s.sd)).collect();
+            let spreads: Vec<(f64, f64)> = (0..names.len()).map(|n| found.spread(n)).map(|s| (s.mean, s.sd)).collect();
             found = on(found.grid.around(&spreads));
         }
         Ok(found)

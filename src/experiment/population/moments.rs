@@ -113,7 +113,9 @@ impl Moments {
     pub(super) fn check(&self, parameters: usize) -> Result<(), String> {
         let square = self.precision.len() == parameters && self.precision.iter().all(|row| row.len() == parameters);
         if self.information.len() != parameters || !square {
-            return Err(format!("`information` must have {parameters} numbers and `precision` as many rows and columns"));
+            return Err(format!(
+                "`information` must have {parameters} numbers and `precision` as many rows and columns"
+            ));
         }
         let (precision, information) = self.parts();
         if precision.iter().chain(&information).any(|x| !x.is_finite()) {

@@ -2,9 +2,7 @@
 
 use super::case_folder;
 use crate::experiment::estimate::EstimateOutcome;
-use crate::experiment::population::{
-    Literature, Moments, PopulationFile, PopulationPrior, merged,
-};
+use crate::experiment::population::{Literature, Moments, PopulationFile, PopulationPrior, merged};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::Finding;
@@ -142,7 +140,10 @@ pub fn population_prior(path: &Path) -> Result<PopulationPrior, WorkflowError> {
 /// # Errors
 /// A file that is no population; cohorts of different kinds, or one that was given twice.
 pub fn merge_populations(paths: &[PathBuf]) -> Result<PopulationFile, WorkflowError> {
-    let files = paths.iter().map(|path| Ok((shown(path), read_population(path)?))).collect::<Result<Vec<_>, WorkflowError>>()?;
+    let files = paths
+        .iter()
+        .map(|path| Ok((shown(path), read_population(path)?)))
+        .collect::<Result<Vec<_>, WorkflowError>>()?;
     Ok(merged(&files)?)
 }
 
@@ -203,7 +204,8 @@ mod tests {
         let file = file.unwrap();
         assert_eq!(file.patients, 9);
         let left: Vec<(&str, usize)> = told.left_out.iter().map(|(why, n)| (why.as_str(), *n)).collect();
-        let expected = ["another law or density than most", "contradicts what is known", "no shift seen", "quality-gate"];
+        let expected =
+            ["another law or density than most", "contradicts what is known", "no shift seen", "quality-gate"];
         assert_eq!(left, expected.map(|why| (why, 1)));
         assert!(told.sentences()[0].starts_with("9 of 13 estimated patients teach"), "{:?}", told.sentences());
         // Drawn towards the others, the lowest up and the highest of the eight down.

@@ -4,8 +4,8 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by,
-    solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown,
+    moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
