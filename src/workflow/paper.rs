@@ -94,7 +94,7 @@ pub fn moduli_beside() -> Result<Vec<ModulusBeside>, WorkflowError> {
 pub fn tests_beside() -> Result<Vec<TestBeside>, WorkflowError> {
     let ours = SampleSettings { stretches: TEST_STRETCHES, ..SampleSettings::default() };
     let theirs = SampleSettings { stretches: TEST_STRETCHES, ..SampleSettings::published() };
-    let one = |(task, printed_h): (Task, f64)| {
+    let one = |(task, printed_h): (Task, f64)| -> Result<TestBeside, WorkflowError> {
         let as_published = compare(&tissue_prior(task, &theirs), &theirs.meta_model, CostDigits::Two)?.kruskal_wallis;
         let friedman = compare(&tissue_prior(task, &ours), &ours.meta_model, CostDigits::All)?.friedman;
         Ok(TestBeside { task: task.to_string(), printed_h, as_published, friedman })
