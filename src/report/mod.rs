@@ -18,6 +18,7 @@ pub mod material_tables;
 pub mod median_samples;
 pub mod mesh_figure;
 pub mod page;
+pub mod paper;
 pub mod picture;
 pub mod refusal;
 pub mod render;

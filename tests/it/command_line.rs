@@ -2,6 +2,7 @@
 
 use crate::job::{CHEAP, contents, output, program, sample};
 use crate::made::{copy, finished_phantom, prepared_pair};
+use crate::population::of_brains;
 use crate::python::python_file;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -39,15 +40,6 @@ poisson_ratio = 0.45
 gravity_m_per_s2 = [0.0, 0.0, -9.81]
 density_kg_per_m3 = 30.0
 "#;
-
-/// The population of one patient whose ln(shear modulus) is known to a tenth.
-fn one_brain(log_mean: f64) -> String {
-    use hgm::experiment::population::{Moments, PopulationFile};
-    let moments = Moments { information: vec![100.0 * log_mean], precision: vec![vec![100.0]] };
-    let brain = [("shear_modulus_pa of brain".to_owned(), (6.5, 0.4))];
-    let law = hgm::material::meta_model::MetaModel::NEO_HOOKEAN;
-    PopulationFile::new((law, 100.0), &brain, vec![moments], std::collections::BTreeMap::new()).unwrap().to_toml()
-}
 
 #[test]
 fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_describes() {
@@ -87,6 +79,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("gp sample", &["gp", "sample", "--task", "hyperelastic-white", "-o", &at("gp")]);
     prints("gp sample", &["gp", "sample", "--task", "hyperelastic-grey", "--draws", "3", "-o", &at("gp")]);
     prints("gp show", &["gp", "show", "--published", "-o", &at("gp")]);
+    prints("gp paper", &["gp", "paper", "--cells", "3000", "-o", &at("paper")]);
     prints("gp fit", &["gp", "fit", "--starts", "1", "-o", &at("gp")]);
     let study_level = ["--model", "study-level", "-o", &at("gp")];
     prints("gp fit", &[&["gp", "fit"], &study_level[..]].concat());
@@ -109,7 +102,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("bids group", &["bids", &study, &out, "group"]);
     prints("estimate", &["estimate", &case]);
     for (name, mean) in [("a.toml", 6.4), ("b.toml", 6.6)] {
-        std::fs::write(at(name), one_brain(mean)).unwrap();
+        std::fs::write(at(name), of_brains(&[mean])).unwrap();
     }
     prints("population merge", &["population", "merge", &at("a.toml"), &at("b.toml"), "-o", &at("both.toml")]);
     prints("population show", &["population", "show", &at("both.toml")]);

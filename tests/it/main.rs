@@ -22,6 +22,7 @@ mod midline;
 mod nifti_guard;
 mod own_masks;
 mod pipelines;
+mod population;
 mod predict;
 mod privacy;
 mod python;

@@ -138,7 +138,7 @@ fn known_populations_lie_inside_their_intervals_and_shrunken_moduli_are_nearer_t
         }
         nearer += usize::from(shrunken < single);
     }
-    println!("inside: grey and white means, spreads {inside:?} of 20; shrunken nearer {nearer} of 20");
+    // Means of grey and white matter, then their spreads.
     assert!(inside.iter().all(|count| *count >= 18), "{inside:?}");
     assert_eq!(nearer, 20);
 }
@@ -202,7 +202,7 @@ fn a_file_reads_back_and_a_slip_in_it_is_refused_by_name() {
     for (from, to, said) in [
         ("format = 1", "format = 9", "`format` is 9"),
         ("patients = 6", "patients = 7", "there are 6 `moments`"),
-        ("patients = 6", "patient = 6", "line 11"),
+        ("patients = 6", "patient = 6", "`patient`"),
         ("next_log_sd = ", "next_log_sd = -", "`next_log_sd`"),
         ("information = [", "information = [1.0, ", "must have 2 numbers"),
         ("law = \"neo-hookean\"", "law = \"neo\"", "neo"),
