@@ -90,6 +90,17 @@ pub enum Command {
     Reset {},
 }
 
+/// What the surface is coloured by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Colour {
+    /// How far every node has moved, mm.
+    #[default]
+    Displacement,
+    /// Stored energy per volume, Pa, averaged around every node.
+    Energy,
+}
+
 /// What changes only what is shown, and when steps are taken.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
@@ -106,7 +117,7 @@ pub enum View {
     /// What the surface is coloured by.
     Colour {
         /// Displacement or energy.
-        by: super::frame::Colour,
+        by: Colour,
     },
     /// The state as a scenario that `hgm simulate` repeats.
     ExportScenario {},

@@ -1,9 +1,9 @@
 //! What goes to the page in binary: the mesh once, then frames. Little-endian; a header of 32-bit words, then arrays.
 
+use super::command::Colour;
 use super::session::Session;
 use crate::fem::live::Readout;
 use crate::mesh::TetMesh;
-use serde::{Deserialize, Serialize};
 
 /// The first word of everything binary: `HGML`.
 const MAGIC: u32 = u32::from_le_bytes(*b"HGML");
@@ -11,17 +11,6 @@ const MESH: u32 = 1;
 const FRAME: u32 = 2;
 /// Words of a frame's header.
 pub const HEAD: usize = 20;
-
-/// What the surface is coloured by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Colour {
-    /// How far every node has moved, mm.
-    #[default]
-    Displacement,
-    /// Stored energy per volume, Pa, averaged around every node.
-    Energy,
-}
 
 /// What the clock says, for the header.
 #[derive(Clone, Copy, Debug, Default)]

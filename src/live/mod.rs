@@ -20,9 +20,9 @@ mod server;
 mod session;
 
 pub use body::{LiveBody, LiveTissue, Spread};
-pub use command::{Command, View};
+pub use command::{Colour, Command, View};
 pub use export::Export;
-pub use frame::{Colour, Pace};
+pub use frame::{Pace, frame_bytes};
 pub use pace::{Driven, Measured};
 pub use recording::{Recording, RecordingError, Timed};
 pub use server::{ServeError, Server, serve};

@@ -1,10 +1,10 @@
 //! The solver's thread: takes up what the page says, steps as fast as the clock wants it, and leaves the latest frame.
 
 use super::body::LiveBody;
-use super::command::{Command, Message, View};
+use super::command::{Colour, Command, Message, View};
 use super::desk::{Desk, Order};
 use super::export::Export;
-use super::frame::{Colour, Pace, frame_bytes};
+use super::frame::{Pace, frame_bytes};
 use super::hello::hello;
 use super::recording::{Recording, Timed};
 use super::session::Session;

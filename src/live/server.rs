@@ -244,7 +244,7 @@ fn client(stream: TcpStream, shared: &Shared) {
         }
         if to_go.is_empty() && pinged.elapsed() > PING_EVERY {
             pinged = Instant::now();
-            to_go.push(Message::Ping(Vec::new().into()));
+            to_go.push(Message::Ping(Vec::<u8>::new().into()));
         }
         if let Some(message) = to_go.pop() {
             match socket.write(message).and_then(|()| socket.flush()) {

@@ -5,7 +5,7 @@ use super::error::{CaseError, SimulationError, WorkflowError};
 use super::facts::EstimateFacts;
 use super::settings::{Settings, in_words};
 use super::simulation::mesh_in;
-use super::stage_name::{StageName, Subject};
+use super::stage_name::Subject;
 use super::stages;
 use super::user_file::{read_input, read_text, shown};
 use crate::anatomy::label;
@@ -13,12 +13,16 @@ use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::fem::Scenario;
 use crate::layout;
+use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use nalgebra::UnitQuaternion;
 use std::path::Path;
 
 /// Node sets that hold a mesh that comes without a scenario, where it has them.
 const HOLDING: [&str; 3] = ["base", "falx", "fixed"];
+
+/// Tissues that a case of one tissue takes for one.
+const OF_BRAIN: [&str; 2] = ["grey_matter", "white_matter"];
 
 /// Mesh and scenario with all its materials, and the case's estimate where it has one.
 #[derive(Clone, Debug)]
@@ -67,12 +71,9 @@ pub fn posed_case(folder: &Path, settings: &Settings) -> Result<Posed, WorkflowE
     add_materials(&mesh, &mut scenario, ratio, &settings.prior)?;
     if let Some(facts) = &estimate {
         for (tissue, &pa) in &facts.record.shear_modulus_pa {
-            let of_brain = ["grey_matter", "white_matter"];
-            let names = if tissue == "brain" { &of_brain[..] } else { &[tissue.as_str()][..] };
-            for name in names {
-                if let Some(material) = scenario.materials.get_mut(*name) {
-                    *material = crate::material::law::Material::neo_hookean(pa, ratio);
-                }
+            let of_tissue = |name: &str| name == tissue || (tissue == "brain" && OF_BRAIN.contains(&name));
+            for (_, material) in scenario.materials.iter_mut().filter(|(name, _)| of_tissue(name)) {
+                *material = Material::neo_hookean(pa, ratio);
             }
         }
     }

@@ -80,11 +80,6 @@ impl Hands {
         })
     }
 
-    /// Nothing is gripped or pushed.
-    pub fn are_off(&self) -> bool {
-        self.springs.is_empty() && self.ball.is_none()
-    }
-
     /// Stored energy, J.
     pub fn energy(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> f64 {
         let springs = self.springs.iter().map(|s| 0.5 * s.stiffness * Self::stretch(s, u).norm_squared());
