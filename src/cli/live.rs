@@ -109,7 +109,10 @@ fn replay(body: &LiveBody, file: &Path, output: &Path, session: &Session) -> Res
     let largest = replayed.displacement_mm().iter().map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
     let displacement_max_mm = largest.sqrt();
     let (steps, commands, at_rest) = (replayed.steps(), recording.commands.len(), replayed.is_at_rest());
-    let text = format!("{}: {commands} commands, {steps} steps, moved by {displacement_max_mm:.3} mm at most", output.display());
+    let text = format!(
+        "{}: {commands} commands, {steps} steps, moved by {displacement_max_mm:.3} mm at most",
+        output.display()
+    );
     let output = output.display().to_string();
     session.emit(&Printed::Replayed { output, steps, commands, displacement_max_mm, at_rest }, &text)
 }

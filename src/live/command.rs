@@ -144,7 +144,8 @@ impl Message {
     /// What is wrong with it, in words.
     pub fn read(text: &str) -> Result<Self, String> {
         let value: serde_json::Value = serde_json::from_str(text).map_err(|e| format!("not JSON: {e}"))?;
-        let name = value.get("do").and_then(serde_json::Value::as_str).ok_or("`do` is missing: it names the command")?;
+        let name =
+            value.get("do").and_then(serde_json::Value::as_str).ok_or("`do` is missing: it names the command")?;
         let wrong = |e: serde_json::Error| e.to_string();
         if VIEWS.contains(&name) {
             return serde_json::from_value(value).map(Self::View).map_err(wrong);

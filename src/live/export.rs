@@ -43,7 +43,8 @@ impl Export {
     /// In words.
     pub fn scenario_toml(&self) -> Result<String, String> {
         let text = toml::to_string(&self.scenario).map_err(|e| e.to_string())?;
-        let mut head = "# A state of `hgm live`; repeat it with: hgm simulate MESH.vtu SCENARIO.toml -o OUT.vtu\n".to_owned();
+        let mut head =
+            "# A state of `hgm live`; repeat it with: hgm simulate MESH.vtu SCENARIO.toml -o OUT.vtu\n".to_owned();
         if !self.scenario.prescribed.is_empty() {
             head += "# What a hand held stands in sets of the VTU exported beside it: give that file as MESH.vtu.\n";
         }

@@ -102,7 +102,9 @@ impl Request {
         };
         match (self.method.as_str(), rest) {
             ("GET", "/") => Verdict::Page,
-            ("GET", "/socket") if self.websocket_key.is_none() => Verdict::Refused(426, "a WebSocket is asked for here"),
+            ("GET", "/socket") if self.websocket_key.is_none() => {
+                Verdict::Refused(426, "a WebSocket is asked for here")
+            }
             // Every browser says where a WebSocket comes from.
             ("GET", "/socket") if self.origin.is_none() => Verdict::Refused(403, "no origin"),
             ("GET", "/socket") => Verdict::Socket,

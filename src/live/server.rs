@@ -194,9 +194,8 @@ fn client(stream: TcpStream, shared: &Shared) {
         return;
     }
     stream.set_nodelay(true).ok();
-    let limits = WebSocketConfig::default()
-        .max_message_size(Some(LONGEST_MESSAGE))
-        .max_frame_size(Some(LONGEST_MESSAGE));
+    let limits =
+        WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
     let mut to_go = vec![Message::binary(shared.mesh.clone())];
     // A part of what was written has not gone out yet.

@@ -344,13 +344,17 @@ impl Session {
 
     /// Tells the body what hands do.
     fn hand_over(&mut self) {
-        let grips: Vec<Grip> = self.hold.iter().flat_map(|hold| {
-            hold.nodes.iter().map(|&(node, share, was)| Grip {
-                node,
-                to_mm: [0, 1, 2].map(|i| was[i] + hold.to_mm[i] - hold.from_mm[i]),
-                stiffness_n_per_mm: share * HAND_N_PER_MM,
+        let grips: Vec<Grip> = self
+            .hold
+            .iter()
+            .flat_map(|hold| {
+                hold.nodes.iter().map(|&(node, share, was)| Grip {
+                    node,
+                    to_mm: [0, 1, 2].map(|i| was[i] + hold.to_mm[i] - hold.from_mm[i]),
+                    stiffness_n_per_mm: share * HAND_N_PER_MM,
+                })
             })
-        }).collect();
+            .collect();
         self.stepper.set_hands(&grips, self.ball);
     }
 }

@@ -89,12 +89,14 @@ pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> 
     let mesh = mesh_in(file, &read_input(file)?)?;
     let scenario = if let Some(path) = scenario {
         let name = path.display().to_string();
-        let refused = |e: crate::fem::ScenarioError| SimulationError::Scenario { name, reason: in_words(&e.to_string()) };
+        let refused =
+            |e: crate::fem::ScenarioError| SimulationError::Scenario { name, reason: in_words(&e.to_string()) };
         Scenario::from_toml(&read_text(path)?).map_err(refused)?
     } else {
         let own = ResectionSettings { supports: Supports::Fixed, ..settings.resection.clone() };
         let mut scenario = own.scenario(&UnitQuaternion::identity());
-        scenario.fixed = HOLDING.into_iter().filter(|set| mesh.node_sets.contains_key(*set)).map(str::to_owned).collect();
+        scenario.fixed =
+            HOLDING.into_iter().filter(|set| mesh.node_sets.contains_key(*set)).map(str::to_owned).collect();
         add_materials(&mesh, &mut scenario, own.poisson_ratio, &settings.prior)?;
         scenario
     };

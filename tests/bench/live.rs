@@ -134,7 +134,12 @@ pub fn bars() -> Vec<Bar> {
         for &tissues in kinds {
             let hz = rate(&mesh, tissues);
             let bar = format!(">= {wanted} steps/s with frames (paper: {})", PAPER[tissues - 1]);
-            bars.push(Bar::new(&format!("live, {name}, tissues: {tissues}"), &bar, format!("{hz:.1} steps/s"), hz >= wanted));
+            bars.push(Bar::new(
+                &format!("live, {name}, tissues: {tissues}"),
+                &bar,
+                format!("{hz:.1} steps/s"),
+                hz >= wanted,
+            ));
         }
     }
     if let Some(mesh) = read("brain5k.vtu") {

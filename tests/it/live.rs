@@ -361,12 +361,21 @@ fn only_the_right_token_and_origin_get_in_and_only_one_at_a_time() {
     page.read_to_string(&mut text).unwrap();
     assert!(text.contains("<canvas"));
     let wrong = "0".repeat(token.len());
-    for (origin, token) in [(own.as_str(), wrong.as_str()), ("http://evil.example", token.as_str()), ("null", token.as_str()), (own.as_str(), "")] {
+    for (origin, token) in [
+        (own.as_str(), wrong.as_str()),
+        ("http://evil.example", token.as_str()),
+        ("null", token.as_str()),
+        (own.as_str(), ""),
+    ] {
         let (_, head) = knock(&address, origin, token);
         assert!(head.starts_with("HTTP/1.1 403"), "{origin} {token}: {head}");
     }
     assert!(ask(port, &format!("/{token}/"), "Host: evil.example").1.starts_with("HTTP/1.1 403"));
-    assert!(ask(port, &format!("/{token}/../../etc/passwd"), &format!("Host: 127.0.0.1:{port}")).1.starts_with("HTTP/1.1 404"));
+    assert!(
+        ask(port, &format!("/{token}/../../etc/passwd"), &format!("Host: 127.0.0.1:{port}"))
+            .1
+            .starts_with("HTTP/1.1 404")
+    );
 
     let mut first = enter(&address);
     assert!(knock(&address, &own, &token).1.starts_with("HTTP/1.1 409"));
@@ -414,7 +423,10 @@ fn malformed_messages_are_refused_with_a_reason_and_change_nothing() {
     server.stopper()();
     let driven = server.wait().unwrap();
     let done: Vec<&Command> = driven.recording.commands.iter().map(|timed| &timed.command).collect();
-    assert!(done.iter().all(|c| matches!(c, Command::Release {} | Command::Lift {} | Command::TimeStep { .. })), "{done:?}");
+    assert!(
+        done.iter().all(|c| matches!(c, Command::Release {} | Command::Lift {} | Command::TimeStep { .. })),
+        "{done:?}"
+    );
 }
 
 #[test]
@@ -471,7 +483,8 @@ fn ctrl_c_ends_the_server_and_leaves_the_recording_whole() {
     std::fs::write(at("block.vtu"), vtu::encode(&block(), &[], &[]).unwrap()).unwrap();
     std::fs::write(at("s.toml"), SCENARIO).unwrap();
     let words = ["live", "block.vtu", "s.toml", "--no-browser", "--json", "--record", "session.jsonl"];
-    let mut running = Process::new(program()).current_dir(folder.path()).args(words).stdout(Stdio::piped()).spawn().unwrap();
+    let mut running =
+        Process::new(program()).current_dir(folder.path()).args(words).stdout(Stdio::piped()).spawn().unwrap();
     let mut printed = String::new();
     let mut out = running.stdout.take().unwrap();
     let mut byte = [0];
@@ -504,7 +517,8 @@ fn bodies_that_cannot_be_opened_are_refused_by_file() {
         (&["none.vtu"], "none.vtu"),
         (&["."], "hgm prep"),
     ] {
-        let ended = Process::new(program()).current_dir(folder.path()).arg("live").args(words).arg("--no-browser").output();
+        let ended =
+            Process::new(program()).current_dir(folder.path()).arg("live").args(words).arg("--no-browser").output();
         let ended = ended.unwrap();
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert_eq!(ended.status.code(), Some(3), "{words:?}: {said}");

@@ -104,7 +104,21 @@ impl Stepper {
         let time_step_s = scenario.dynamics.time_step_s;
         let newton_iterations = scenario.dynamics.newton_iterations.clamp(1, 2);
         let manner = Manner::default();
-        Ok(Self { mesh, model, laws, mass, solver, hands, manner, time_step_s, newton_iterations, u, v, spare: None, stored: None })
+        Ok(Self {
+            mesh,
+            model,
+            laws,
+            mass,
+            solver,
+            hands,
+            manner,
+            time_step_s,
+            newton_iterations,
+            u,
+            v,
+            spare: None,
+            stored: None,
+        })
     }
 
     /// The mesh, cut open where sheets slide.
