@@ -19,6 +19,8 @@ const LOOK_EVERY: u64 = 30;
 /// Shortest and longest step in time, s: a hundred a second is more than a screen shows, a tenth of a second is where a hand
 /// feels that it waits.
 const TIME_STEPS_S: [f64; 2] = [0.01, 0.1];
+/// Steps a second are counted over this time.
+const COUNT_OVER: Duration = Duration::from_millis(500);
 /// Energy and cells are read out this often.
 const READ_OUT_EVERY: Duration = Duration::from_millis(200);
 
@@ -59,6 +61,9 @@ pub(super) struct Driver<'a> {
     /// Seconds of a step, averaged.
     cost_s: f64,
     measured: Measured,
+    /// Steps a second, and since when and from which step they are counted.
+    hz: f64,
+    counted: (Instant, u64),
 }
 
 impl<'a> Driver<'a> {
@@ -77,6 +82,8 @@ impl<'a> Driver<'a> {
             readout: (Readout::default(), None),
             cost_s: 0.0,
             measured: Measured::default(),
+            hz: 0.0,
+            counted: (Instant::now(), 0),
         }
     }
 
@@ -96,6 +103,7 @@ impl<'a> Driver<'a> {
                     Err(RecvTimeoutError::Disconnected) => break,
                 }
                 due = Instant::now();
+                self.counted = (due, self.session.steps());
                 continue;
             }
             self.step();
@@ -132,6 +140,11 @@ impl<'a> Driver<'a> {
         self.measured.stepping_s += spent;
         self.cost_s = if self.cost_s == 0.0 { spent } else { 0.9 * self.cost_s + 0.1 * spent };
         (self.single, self.dirty) = (false, true);
+        let (since, from) = self.counted;
+        if since.elapsed() >= COUNT_OVER {
+            self.hz = (self.session.steps() - from) as f64 / since.elapsed().as_secs_f64();
+            self.counted = (Instant::now(), self.session.steps());
+        }
         if self.session.steps().is_multiple_of(LOOK_EVERY) && !self.session.is_quasi_static() {
             let s = (1.1e3 * self.cost_s).ceil() / 1e3;
             let s = s.clamp(TIME_STEPS_S[0], TIME_STEPS_S[1]);
@@ -222,9 +235,7 @@ impl<'a> Driver<'a> {
         if old || still {
             self.readout = (self.session.stepper().readout(), Some(Instant::now()));
         }
-        let waits = !self.session.is_quasi_static();
-        let step_s = if waits { self.cost_s.max(self.session.time_step_s()) } else { self.cost_s };
-        let hz = if still || step_s == 0.0 { 0.0 } else { 1.0 / step_s };
+        let hz = if still { 0.0 } else { self.hz };
         let pace = Pace { hz: hz as f32, taken: self.taken, paused: self.paused };
         self.desk.put_frame(frame_bytes(&self.session, &self.readout.0, &pace, self.colour));
         self.dirty = false;

@@ -211,13 +211,13 @@ function ballMesh({ centre, radius }) {
   }
   return [new Float32Array(places), new Float32Array(out), new Float32Array(places.length / 3)];
 }
-let top = 1, shown = 0, drawn = 0, turned = true, sections = 0;
+let scale = 1, shown = 0, drawn = 0, turned = true, sections = 0;
 function uploadFrame() {
   fill(surface, [frame.at, normals(frame.at), frame.scalar]);
   let most = 1e-6;
   for (const s of frame.scalar) most = Math.max(most, s);
   // The scale follows slowly, so that colours do not flicker.
-  top = most > top ? most : Math.max(most, 0.98 * top);
+  scale = most > scale ? most : Math.max(most, 0.98 * scale);
 }
 function draw() {
   const ratio = Math.min(devicePixelRatio || 1, 2);
@@ -229,7 +229,7 @@ function draw() {
   const set = (name) => gl.getUniformLocation(program, name), { eye } = axes();
   gl.uniformMatrix4fv(set("view"), false, matrix());
   gl.uniform3fv(set("eye"), eye);
-  gl.uniform1f(set("top"), top);
+  gl.uniform1f(set("top"), scale);
   const plane = [0, 0, 0, 1];
   if (cut.axis >= 0) { plane[cut.axis] = 1; plane[3] = cut.at; }
   gl.uniform4fv(set("plane"), plane);
@@ -285,7 +285,7 @@ function tick(now) {
     $("energy").textContent = `${figure(frame.energy)} J`;
     $("inverted").textContent = frame.inverted.toFixed(0);
     $("force").textContent = `${frame.grip.toFixed(3)}, ${frame.ball.toFixed(3)} N`;
-    $("high").textContent = figure(top);
+    $("high").textContent = figure(scale);
     canvas.dataset.ready = "yes";
   }
   fresh = turned = false;
@@ -459,7 +459,7 @@ $("gravity").addEventListener("change", () => {
 });
 $("quasi").addEventListener("change", () => send({ do: "manner", quasi_static: $("quasi").checked }));
 $("colour").addEventListener("change", () => {
-  top = 1e-6;
+  scale = 1e-6;
   $("unit").textContent = $("colour").value === "energy" ? "Pa" : "mm";
   send({ do: "colour", by: $("colour").value });
 });
