@@ -168,7 +168,7 @@ def keys_turn_and_pause_a_cut_opens_and_a_phone_needs_no_sideways_scrolling(opti
         browser.evaluate("document.getElementById('pause').click()")
         browser.wait_for("document.getElementById('hz').textContent === 'paused'", 20)
         unlabelled = browser.evaluate(
-            "[...document.querySelectorAll('input, select')].filter((e) => !e.labels || !e.labels.length).map((e) => e.id)")
+            "[...document.querySelectorAll('input, select')].filter((e) => !e.labels.length && !e.ariaLabel).map((e) => e.id)")
         require(not unlabelled, f"without a label: {unlabelled}")
         if options.pictures:
             browser.picture(options.pictures / "phone-dark-cut.png")

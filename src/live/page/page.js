@@ -356,6 +356,7 @@ function slider(id, unitOf, then) {
 function line(parent, text, id) {
   const label = document.createElement("label");
   label.className = "line";
+  label.htmlFor = id;
   label.append(text, Object.assign(document.createElement("output"), { id: `${id}-said` }));
   const input = Object.assign(document.createElement("input"), { type: "range", id });
   label.append(input);
