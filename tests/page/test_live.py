@@ -107,6 +107,13 @@ def hand_slider_undo_and_reset_move_the_body_and_bring_it_back(options):
         mouse(browser, "mouseReleased", x + 90, y - 75, 0)
         settle(browser)
         require(abs(number(browser, "maximum") - rest) < 0.02, f"{number(browser, 'maximum')} after letting go, {rest} before")
+        browser.evaluate("document.querySelectorAll('input[name=tool]')[2].click()")
+        mouse(browser, "mousePressed", x, y)
+        browser.wait_for("parseFloat(document.getElementById('force').textContent.split(',')[1]) > 0.005", 20)
+        if options.pictures:
+            browser.picture(options.pictures / "ball.png")
+        mouse(browser, "mouseReleased", x, y, 0)
+        settle(browser)
         set_slider(browser, "modulus-0", browser.evaluate("Number(document.getElementById('modulus-0').value) - 1"))
         browser.wait_for(f"parseFloat(document.getElementById('maximum').textContent) > {rest + 0.2}", 30)
         settle(browser)
