@@ -12,7 +12,7 @@ const TASKS: [(&str, &[&str]); 6] = [
     ),
     ("Many patients", &["bids", "population"]),
     ("Carry to the other scan, and check", &["warp", "evaluate"]),
-    ("One step alone", &["register", "segment", "mesh", "simulate"]),
+    ("One step alone", &["register", "segment", "mesh", "simulate", "live"]),
     ("Materials and validation", &["gp", "law", "phantom", "synth"]),
     ("The program itself", &["doctor", "settings", "why", "layout", "schema", "completions", "man", "help"]),
 ];

@@ -17,6 +17,7 @@ mod gp;
 mod law;
 mod layout;
 mod listener;
+mod live;
 mod man;
 mod manual;
 mod mesh;
@@ -71,6 +72,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Compare(compare::Args),
     Simulate(simulate::Args),
+    Live(live::Args),
     Synth(synth::Args),
     Gp(gp::Args),
     Law(law::Args),
@@ -132,6 +134,7 @@ pub fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args, &session),
         Command::Compare(args) => compare::run(&args, &session),
         Command::Simulate(args) => simulate::run(&args, &session),
+        Command::Live(args) => live::run(&args, &session),
         Command::Synth(args) => synth::run(&args, &session),
         Command::Gp(args) => gp::run(&args, &session),
         Command::Law(args) => law::run(&args, &session),

@@ -14,10 +14,20 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether a result has been printed: then stdout is whole, and a failure is told on stderr and by the exit code alone.
 static EMITTED: AtomicBool = AtomicBool::new(false);
+
+/// What ends a command that runs until it is told to, in the place of ending at once.
+static AT_SIGNAL: OnceLock<Box<dyn Fn() + Send + Sync>> = OnceLock::new();
+
+/// Has the first Ctrl-C (or closed terminal, or SIGTERM) call this instead of ending the program; the next one ends it.
+pub fn at_signal(end: impl Fn() + Send + Sync + 'static) {
+    // A program runs one command.
+    AT_SIGNAL.set(Box::new(end)).ok();
+}
 
 /// See [`EMITTED`].
 pub fn has_emitted() -> bool {
@@ -166,7 +176,13 @@ impl Session {
 fn end_between_files() -> std::io::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::spawn(move || {
-        if let Some(signal) = signals.forever().next() {
+        let mut told = false;
+        for signal in signals.forever() {
+            if let Some(end) = AT_SIGNAL.get().filter(|_| !told) {
+                told = true;
+                end();
+                continue;
+            }
             let _whole = no_more_writes();
             // As shells tell it.
             std::process::exit(128 + signal);

@@ -80,7 +80,7 @@ pub fn simulate(
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
     let mesh_bytes = read_input(&files.mesh)?;
-    let mesh = mesh(&files.mesh, &mesh_bytes)?;
+    let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
         name: files.scenario.display().to_string(),
         reason: in_words(&e.to_string()),
@@ -144,7 +144,8 @@ fn destination(output: &Path) -> Result<(PathBuf, String), SimulationError> {
     }
 }
 
-fn mesh(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
+/// The mesh in a file's bytes, by the ending of its name.
+pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
     let name = path.display().to_string();
     match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
         Some("vtu") => Ok(vtu::decode(bytes, &name)?.mesh),

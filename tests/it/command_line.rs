@@ -123,6 +123,9 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     );
     let phantom = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "-o"];
     prints("phantom", &[&phantom[..], &[&at("phantom")]].concat());
+    let posed = [&at("phantom/mesh/rest.vtu")[..], &at("scenario.toml")];
+    std::fs::write(at("session.jsonl"), recording(posed.map(Path::new))).unwrap();
+    prints("live", &["live", posed[0], posed[1], "--replay", &at("session.jsonl"), "-o", &at("live.vtu")]);
     prints("simulate", &["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("s.vtu")]);
 
     let printed = checks.iter().filter_map(|check| check.split_once('=')).map(|(command, _)| command.to_owned());
@@ -144,6 +147,14 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     let words = ["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("t.vtu")];
     let shown = on_terminal(&words);
     assert!(shown.contains("(left "), "a terminal sees the time left: {shown}");
+}
+
+/// A recorded session of three steps.
+fn recording([mesh, scenario]: [&Path; 2]) -> String {
+    let settings = hgm::workflow::Settings::default();
+    let posed = hgm::workflow::posed_mesh(mesh, Some(scenario), &settings).unwrap();
+    let body = hgm::live::LiveBody::of(posed, &settings.prior);
+    hgm::live::Recording { steps: 3, ..hgm::live::Recording::new(&body) }.to_text()
 }
 
 /// What a command shows where it has a terminal: util-linux's `script` gives it one.

@@ -14,6 +14,7 @@ mod fem;
 mod fields;
 mod job;
 mod label_maps;
+mod live;
 mod made;
 mod material;
 mod mesh_engines;
