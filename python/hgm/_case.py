@@ -64,12 +64,12 @@ class Case:
     @property
     def outcome(self) -> dict[str, Any]:
         """The experiment's numbers: verdict, samples, best sample, errors (mm), moduli (Pa), warnings."""
-        return json.loads(_hgm.case_outcome(self.path))
+        return dict(json.loads(_hgm.case_outcome(self.path)))
 
     @property
     def settings(self) -> dict[str, Any]:
         """Every setting it was made with, by room."""
-        return json.loads(_hgm.case_settings(self.path))
+        return dict(json.loads(_hgm.case_settings(self.path)))
 
     @property
     def prediction(self) -> dict[str, Any]:
@@ -200,7 +200,7 @@ class Case:
         return path
 
     def _json(self, key: str) -> dict[str, Any]:
-        return json.loads(self._file(_NAMES[key]).read_text(encoding="utf-8"))
+        return dict(json.loads(self._file(_NAMES[key]).read_text(encoding="utf-8")))
 
 
 def _cell(text: str) -> Any:

@@ -37,8 +37,8 @@ class QualityRefused(HgmError):
         ``no-operation`` or ``not-one-person`` where the two scans themselves gave that answer.
     result : dict or None
         What the command prints with ``--json``, where it came that far.
-    case : Case or None
-        The case, of the functions that make one.
+    found : Case, Mesh, Registration or None
+        What the function would have returned.
     """
 
     exit_code = 4
@@ -47,7 +47,7 @@ class QualityRefused(HgmError):
         super().__init__(message)
         self.answer = answer
         self.result = result
-        self.case = None
+        self.found: Any = None
 
 
 def of_code(code: int, message: str, answer: str | None, result: str | None) -> HgmError:

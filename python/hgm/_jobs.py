@@ -25,7 +25,7 @@ def _job(files: Files, words: list[str], output: Folder, progress: Optional[Prog
         call([*words, f"--output={folder}"], progress)
     except QualityRefused as refused:
         if refused.result is not None:
-            refused.case = Case(output)
+            refused.found = Case(output)
         raise
     return Case(output)
 
@@ -88,7 +88,7 @@ def run(
     InputRefused
         A file or setting that cannot be used.
     QualityRefused
-        Computed and not to be believed; its ``case`` is what was computed. Also where the scans show no operation, or two people.
+        Computed and not to be believed; its ``found`` is what was computed. Also where the scans show no operation, or two people.
     KeyboardInterrupt
         After Ctrl-C, once the file at hand is whole; a second one does not wait.
     """
@@ -224,7 +224,7 @@ def register(
     Raises
     ------
     QualityRefused
-        The images do not fit; its ``registration`` is what was found.
+        The images do not fit; its ``found`` is what was found.
     """
     with files() as temporary:
         output = temporary.folder / "found.txt"
@@ -238,7 +238,7 @@ def register(
             return found(call(words + options(temporary, settings, **own), progress))
         except QualityRefused as refused:
             if refused.result is not None:
-                refused.registration = found(refused.result)  # type: ignore[attr-defined]
+                refused.found = found(refused.result)
             raise
 
 
@@ -266,7 +266,7 @@ class Segmentation:
         """The labels as nibabel's image (``pip install nibabel``)."""
         import nibabel
 
-        return nibabel.Nifti1Image(self.labels, self.affine)
+        return nibabel.Nifti1Image(self.labels, self.affine)  # type: ignore[no-untyped-call]
 
 
 def segment(

@@ -58,7 +58,7 @@ class Mesh:
         import meshio
 
         # Node sets are 0/1 arrays, as in hgm's own files: every format of meshio's keeps arrays.
-        point_data = dict(self.point_data)
+        point_data: dict[str, NDArray[Any]] = dict(self.point_data)
         for name, nodes in self.sets.items():
             member = np.zeros(len(self.points), dtype=np.uint8)
             member[nodes] = 1
@@ -113,11 +113,11 @@ class Result(Mesh):
 
     @property
     def convergence(self) -> dict[str, Any]:
-        return self.record["convergence"]
+        return dict(self.record["convergence"])
 
     @property
     def warnings(self) -> list[str]:
-        return self.record["warnings"]
+        return list(self.record["warnings"])
 
 
 def simulate(
@@ -230,7 +230,13 @@ def mesh(
     -------
     Mesh
         Its ``record`` has quality, volumes and sets.
+
+    Raises
+    ------
+    QualityRefused
+        A boundary set is not to be believed; its ``found`` is the mesh.
     """
+    in_mni: Optional[bool]
     with files() as temporary:
         if hasattr(labels, "__array__") and not hasattr(labels, "affine") or isinstance(labels, list):
             if affine is None:
@@ -241,7 +247,7 @@ def mesh(
             )
             kept = temporary.folder / "labels.nii.gz"
             kept.write_bytes(encoded)
-            source, in_mni = str(kept), bool(mni)
+            source, in_mni = str(kept), mni or False
         else:
             if affine is not None:
                 raise InputRefused("affine: files and images have their own: leave it out")
@@ -263,6 +269,7 @@ def mesh(
         try:
             record = call(words, progress)
         except QualityRefused as refused:
-            refused.mesh = Mesh(**_hgm.read_mesh(str(output)), record=refused.result or {})  # type: ignore[attr-defined]
+            if refused.result is not None:
+                refused.found = Mesh(**_hgm.read_mesh(str(output)), record=refused.result)
             raise
         return Mesh(**_hgm.read_mesh(str(output)), record=record)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 
@@ -17,8 +18,7 @@ def bars(tqdm: Any = None) -> Any:
     --------
     >>> case = hgm.run("pre.nii.gz", "post.nii.gz", "case", progress=hgm.bars())  # doctest: +SKIP
     """
-    if tqdm is None:
-        from tqdm.auto import tqdm
+    kind = importlib.import_module("tqdm.auto").tqdm if tqdm is None else tqdm
 
     state: dict[str, Any] = {"part": None, "bar": None}
 
@@ -27,7 +27,7 @@ def bars(tqdm: Any = None) -> Any:
         if bar is None or state["part"] != part or done < bar.n or bar.total != total:
             if bar is not None:
                 bar.close()
-            bar = tqdm(total=total, desc=part)
+            bar = kind(total=total, desc=part)
             state.update(part=part, bar=bar)
         if doing:
             bar.set_postfix_str(doing, refresh=False)

@@ -3,7 +3,7 @@
 
 use hgm::workflow::{Progress, StageEnded};
 use pyo3::prelude::*;
-use std::panic::{panic_any, resume_unwind};
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -155,6 +155,6 @@ pub fn run<T: Send + 'static>(
         (_, Some(error)) => Err(error),
         (Ok(found), None) => Ok(found),
         // A fault of the library: Python's PanicException.
-        (Err(panic), None) => panic_any(panic),
+        (Err(panic), None) => resume_unwind(panic),
     }
 }

@@ -32,7 +32,7 @@ fn told(fit: &Fit, poisson_ratio: f64) -> serde_json::Value {
 impl Prior {
     #[new]
     fn new(py: Python<'_>, task: &str, law: &str, studies: Option<PathBuf>) -> PyResult<Self> {
-        let task: Task = task.parse().map_err(|error: hgm::material::TaskError| refused(py, &error.to_string()))?;
+        let task = task.parse::<Task>().map_err(|error| refused(py, &error.to_string()))?;
         let model: MetaModel = law.parse().map_err(|error: String| refused(py, &error))?;
         let made = move || {
             let studies = Studies::read(studies.as_deref(), Curves::Corrected)?;

@@ -47,13 +47,14 @@ fn mesh(
 
 /// A scenario from TOML, or from the same as JSON.
 fn scenario(text: &str, json: bool) -> Result<Scenario, Failure> {
-    let refused = |reason: String| SimulationError::Scenario { name: NAME.to_owned(), reason };
+    let refused = |reason| WorkflowError::from(SimulationError::Scenario { name: NAME.to_owned(), reason });
     let text = if json { crate::toml_of_json(text).map_err(refused)? } else { text.to_owned() };
     Scenario::from_toml(&text)
         .map_err(|error| {
+            let said = error.to_string();
             // The lines of a dictionary are nobody's.
-            let reason = if json { error.message.clone() } else { error.to_string() };
-            WorkflowError::from(refused(in_words(&reason)))
+            let of_line = said.split_once(": ").filter(|(line, _)| json && line.starts_with("line "));
+            refused(in_words(of_line.map_or(&said, |(_, reason)| reason)))
         })
         .reject()
 }
