@@ -176,6 +176,14 @@ impl Map {
     }
 }
 
+/// The state of a case that is meant where none is named: the estimate, else the best sample.
+///
+/// # Errors
+/// A case without any.
+pub fn default_state(case: &Case) -> Result<String, WorkflowError> {
+    named(case, None)
+}
+
 /// The state that is meant: the one named, else the estimate, else the model that the fields were made with.
 fn named(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
     let missing =
