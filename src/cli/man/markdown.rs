@@ -147,7 +147,9 @@ fn entry(setting: &Setting) -> String {
 }
 
 fn files() -> String {
-    let mut text = format!("{MADE}# Files of a case\n{FILES}\n| file | what | frame | stage | name in BIDS derivatives |\n|---|---|---|---|---|\n");
+    let mut text = format!(
+        "{MADE}# Files of a case\n{FILES}\n| file | what | frame | stage | name in BIDS derivatives |\n|---|---|---|---|---|\n"
+    );
     for file in TABLE {
         let word = |value: serde_json::Result<serde_json::Value>| {
             value.ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
@@ -163,7 +165,6 @@ const FILES: &str = "\
 What `hgm layout` prints: every file that a case folder may hold. Words in braces stand for members of a family (`{sample}`: `sample-00` and on).
 Lengths are mm, RAS+; `mni` is the template's frame reached rigidly: sizes stay the patient's.
 ";
-
 
 #[cfg(test)]
 mod tests {
