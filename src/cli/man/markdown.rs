@@ -21,7 +21,7 @@ fn commands(mut hgm: Command) -> String {
     for (task, names) in by_tasks(&hgm) {
         let mut listed = String::new();
         let mut told = String::new();
-        for command in names.iter().filter_map(|name| hgm.find_subcommand(name)) {
+        for command in names.iter().filter(|name| *name != "help").filter_map(|name| hgm.find_subcommand(name)) {
             let name = format!("hgm {}", command.get_name());
             let about = command.get_about().map(ToString::to_string).unwrap_or_default();
             listed += &format!("- [`{name}`](#{}): {}\n", name.replace(' ', "-"), escaped(&about));
@@ -88,14 +88,17 @@ fn option(arg: &Arg) -> String {
     let name = [names.join(", "), values].join(" ");
     let mut text = format!("- `{}`", name.trim());
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
-    text += &format!(": {}", escaped(&help.split_whitespace().collect::<Vec<_>>().join(" ")));
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    text += &format!(": {}", escaped(&help));
     let words: Vec<_> = arg.get_possible_values().iter().map(|word| format!("`{}`", word.get_name())).collect();
+    let end = if help.ends_with(['.', ']']) { "" } else { "." };
     if takes_value(arg) && !words.is_empty() {
-        text += &format!(" One of: {}.", words.join(", "));
+        text += &format!("{end} One of: {}", words.join(", "));
     }
     let defaults: Vec<_> = arg.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
     if takes_value(arg) && !defaults.is_empty() {
-        text += &format!(" Default: `{}`.", defaults.join(" "));
+        let end = if words.is_empty() { end } else { "." };
+        text += &format!("{end} Default: `{}`", defaults.join(" "));
     }
     text + "\n"
 }
