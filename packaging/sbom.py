@@ -2,7 +2,7 @@
 
     python3 packaging/sbom.py > sbom.cdx.json
 
-From `cargo metadata` and Cargo.lock alone: every crate that is compiled into the program on Linux, with its licence and the
+From `cargo metadata`, `cargo tree` and Cargo.lock alone: every crate that is compiled into the program on Linux, with its licence and the
 checksum of its archive; the data inside it (atlases, sample scans); the CGAL mesher beside it. No time, no random number: the same
 sources give the same bytes. Ends with 1 when a crate states no licence.
 """
@@ -18,28 +18,30 @@ ROOT = Path(__file__).resolve().parent.parent
 PLATFORM = "x86_64-unknown-linux-gnu"
 
 
-def metadata():
-    words = ["metadata", "--format-version", "1", "--locked", "--filter-platform", PLATFORM]
-    ended = subprocess.run([os.environ.get("CARGO", "cargo"), *words], cwd=ROOT, check=True, stdout=subprocess.PIPE)
-    return json.loads(ended.stdout)
+def cargo(*words):
+    words = [os.environ.get("CARGO", "cargo"), *words]
+    return subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def compiled_in(everything):
-    """The packages that hgm is linked from: dependencies of dependencies, those of tests and of building left out."""
-    nodes = {node["id"]: node for node in everything["resolve"]["nodes"]}
+def compiled_in():
+    """The packages that hgm is linked from, with what each needs of the others. `cargo metadata` knows licences but lists optional
+    dependencies that nobody asked for; `cargo tree` knows which are compiled."""
+    metadata = ["metadata", "--format-version", "1", "--locked", "--filter-platform", PLATFORM]
+    everything = json.loads(cargo(*metadata))
+    tree = ["tree", "--locked", "--package", "hgm", "--edges", "normal", "--prefix", "none", "--format", "{p}"]
+    named = {tuple(line.split()[:2]) for line in cargo(*tree, "--target", PLATFORM).splitlines() if line}
     packages = {package["id"]: package for package in everything["packages"]}
-    root = next(id for id, package in packages.items() if package["name"] == "hgm" and package["source"] is None)
-    found, open_ends = {}, [root]
-    while open_ends:
-        id = open_ends.pop()
-        if id in found:
-            continue
-        found[id] = sorted(
+    inside = {id for id, package in packages.items() if (package["name"], f"v{package['version']}") in named}
+    root = next(id for id in inside if packages[id]["name"] == "hgm" and packages[id]["source"] is None)
+    found = {
+        node["id"]: sorted(
             dependency["pkg"]
-            for dependency in nodes[id]["deps"]
-            if any(kind["kind"] is None for kind in dependency["dep_kinds"])
+            for dependency in node["deps"]
+            if dependency["pkg"] in inside and any(kind["kind"] is None for kind in dependency["dep_kinds"])
         )
-        open_ends += found[id]
+        for node in everything["resolve"]["nodes"]
+        if node["id"] in inside
+    }
     return packages, root, found
 
 
@@ -82,10 +84,9 @@ def beside():
 
 
 def main():
-    everything = metadata()
     lock = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))
     checksums = {(one["name"], one["version"]): one.get("checksum") for one in lock["package"]}
-    packages, root, found = compiled_in(everything)
+    packages, root, found = compiled_in()
     libraries = sorted((packages[id] for id in found if id != root), key=lambda one: (one["name"], one["version"]))
     own = component(packages[root], {}) | {"type": "application"}
     others = list(beside())

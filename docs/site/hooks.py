@@ -11,29 +11,26 @@ from pathlib import Path
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
-BLOCK = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"\$`([^`]+)`\$")
-CODE = re.compile(r"^```(?!math\n).*?^```$", re.MULTILINE | re.DOTALL)
 
 
 def on_page_markdown(markdown, page, config, files):
     """Takes the equations out before Markdown sees them; `on_page_content` puts them back as MathML."""
     page.meta["equations"] = equations = []
 
-    def kept(display):
-        def replaced(found):
-            equations.append(convert(found[1].strip(), display=display))
-            return f"EQUATION{len(equations) - 1}END"
-
-        return replaced
+    def kept(latex, display):
+        equations.append(convert(latex.strip(), display=display))
+        return f"EQUATION{len(equations) - 1}END"
 
     def outside_code(text):
-        return INLINE.sub(kept("inline"), BLOCK.sub(kept("block"), text))
+        return INLINE.sub(lambda found: kept(found[1], "inline"), text)
 
     parts, at = [], 0
-    for code in CODE.finditer(markdown):
-        parts += [outside_code(markdown[at : code.start()]), code[0]]
-        at = code.end()
+    for fence in FENCE.finditer(markdown):
+        parts.append(outside_code(markdown[at : fence.start()]))
+        parts.append(kept(fence[2], "block") if fence[1] == "math" else fence[0])
+        at = fence.end()
     return "".join([*parts, outside_code(markdown[at:])])
 
 
