@@ -2,7 +2,7 @@
 
     python3 packaging/sbom.py > sbom.cdx.json
 
-From `cargo metadata`, `cargo tree` and Cargo.lock alone: every crate that is compiled into the program on Linux, with its licence and the
+From `cargo metadata`, `cargo tree` and Cargo.lock alone: every crate that is compiled into the program or the wheel on Linux, with its licence and the
 checksum of its archive; the data inside it (atlases, sample scans); the CGAL mesher beside it. No time, no random number: the same
 sources give the same bytes. Ends with 1 when a crate states no licence.
 """
@@ -28,8 +28,11 @@ def compiled_in():
     dependencies that nobody asked for; `cargo tree` knows which are compiled."""
     metadata = ["metadata", "--format-version", "1", "--locked", "--filter-platform", PLATFORM]
     everything = json.loads(cargo(*metadata))
-    tree = ["tree", "--locked", "--package", "hgm", "--edges", "normal", "--prefix", "none", "--format", "{p}"]
-    named = {tuple(line.split()[:2]) for line in cargo(*tree, "--target", PLATFORM).splitlines() if line}
+    tree = ["tree", "--locked", "--target", PLATFORM, "--edges", "normal", "--prefix", "none", "--format", "{p}"]
+    wheel = ROOT / "python" / "Cargo.toml"
+    ours = ["hgm", *([tomllib.loads(wheel.read_text(encoding="utf-8"))["package"]["name"]] if wheel.exists() else [])]
+    lines = [line for name in ours for line in cargo(*tree, "--package", name).splitlines()]
+    named = {tuple(line.split()[:2]) for line in lines if line}
     packages = {package["id"]: package for package in everything["packages"]}
     inside = {id for id, package in packages.items() if (package["name"], f"v{package['version']}") in named}
     root = next(id for id in inside if packages[id]["name"] == "hgm" and packages[id]["source"] is None)
@@ -87,12 +90,13 @@ def main():
     lock = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))
     checksums = {(one["name"], one["version"]): one.get("checksum") for one in lock["package"]}
     packages, root, found = compiled_in()
-    libraries = sorted((packages[id] for id in found if id != root), key=lambda one: (one["name"], one["version"]))
+    libraries = sorted((packages[id] for id in found if packages[id]["source"]), key=lambda one: (one["name"], one["version"]))
     own = component(packages[root], {}) | {"type": "application"}
     others = list(beside())
     depends = [
         {"ref": reference(packages[id]), "dependsOn": sorted(reference(packages[one]) for one in needed)}
         for id, needed in found.items()
+        if id == root or packages[id]["source"]
     ]
     document = {
         "bomFormat": "CycloneDX",

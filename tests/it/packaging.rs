@@ -203,6 +203,7 @@ fn the_list_of_licences_has_every_crate_that_is_compiled_in_and_no_other() {
     for dependency in cargo["dependencies"].as_table().unwrap().keys() {
         assert!(names.contains(&dependency.as_str()), "{dependency}");
     }
+    assert_eq!(names.contains(&"pyo3"), root().join("python/Cargo.toml").exists(), "what the wheel adds");
     // Each once, and what each needs is itself in the list.
     let references: Vec<&str> = components.iter().map(|component| component["bom-ref"].as_str().unwrap()).collect();
     let own = list["metadata"]["component"]["bom-ref"].as_str().unwrap();
@@ -257,7 +258,7 @@ fn a_release_has_program_wheel_recipes_licences_and_checksums_and_refuses_a_prog
     assert!(!refused.status.success() && !at("out").exists());
     assert!(String::from_utf8_lossy(&refused.stderr).contains("is not static"), "{refused:?}");
 
-    script(&at("bin/cargo"), &build("-static"));
+    script(&at("bin/cargo"), &build("-static-pie"));
     stdout(&release());
     let made = contents(&at("out"));
     let version = env!("CARGO_PKG_VERSION");
