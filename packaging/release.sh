@@ -41,9 +41,9 @@ fi
   exit 1
 }
 
-if [ -f python/pyproject.toml ]; then
+if [ -f pyproject.toml ]; then
   say "wheel"
-  python3 -m pip wheel --quiet --no-deps --wheel-dir "$out.part" ./python
+  python3 -m pip wheel --quiet --no-deps --wheel-dir "$out.part" .
 fi
 
 say "recipes of the containers"

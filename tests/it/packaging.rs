@@ -268,7 +268,7 @@ fn a_release_has_program_wheel_recipes_licences_and_checksums_and_refuses_a_prog
         format!("hgm-{version}-x86_64-linux"),
         format!("hgm-{version}.cdx.json"),
     ];
-    if root().join("python/pyproject.toml").exists() {
+    if root().join("pyproject.toml").exists() {
         wanted.push("hgm-0-py3-none-any.whl".to_owned());
     }
     wanted.sort();
