@@ -80,12 +80,20 @@ fn help() -> Arg {
     arg.help_heading(COMMON).display_order(COMMON_ORDER + 99)
 }
 
+/// The commands by task, in the order of the lists; what stands in none comes last.
+pub fn by_tasks(command: &Command) -> Vec<(&'static str, Vec<String>)> {
+    let listed = |name: &str| TASKS.iter().any(|(_, names)| names.contains(&name));
+    let rest = command.get_subcommands().map(Command::get_name).filter(|name| !listed(name)).map(str::to_owned);
+    let mut all: Vec<_> =
+        TASKS.iter().map(|(task, names)| (*task, names.iter().map(|name| (*name).to_owned()).collect())).collect();
+    all.push((OTHERS, rest.collect::<Vec<_>>()));
+    all
+}
+
 /// The list of commands, each with its one line.
 fn by_task(command: &Command) -> String {
-    let listed = |name: &str| TASKS.iter().any(|(_, names)| names.contains(&name));
-    let rest: Vec<&str> = command.get_subcommands().map(Command::get_name).filter(|name| !listed(name)).collect();
     let mut text = String::new();
-    for (heading, names) in TASKS.into_iter().chain([(OTHERS, rest.as_slice())]) {
+    for (heading, names) in by_tasks(command) {
         let lines: String = names.iter().filter_map(|name| line(command, name)).collect();
         if !lines.is_empty() {
             text += &format!("{heading}:\n{lines}\n");

@@ -10,6 +10,8 @@ mod compare;
 mod completions;
 mod demo;
 mod doctor;
+#[cfg(test)]
+mod documented;
 mod estimate;
 mod evaluate;
 mod failure;

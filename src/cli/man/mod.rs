@@ -1,10 +1,14 @@
-//! `hgm man`: man pages from the command line's own definition.
+//! `hgm man`: the program's description of itself, from the command line's own definition: man pages, the reference pages
+//! of the documentation, and the descriptor of the BIDS App.
+
+mod boutiques;
+mod markdown;
 
 use super::{Failure, Session};
 use crate::artefact::write_whole;
 use std::path::PathBuf;
 
-/// Write man pages, one per command
+/// Write man pages, one per command; or the reference pages of the documentation, or the descriptor of the BIDS App
 ///
 /// Example: hgm man -o ~/.local/share/man/man1
 #[derive(Debug, clap::Args)]
@@ -12,13 +16,32 @@ pub struct Args {
     /// The folder to write into
     #[arg(short, long, default_value = "man")]
     output: PathBuf,
+    /// What to write
+    #[arg(long, value_enum, value_name = "FORM", default_value = "man")]
+    form: Form,
+}
+
+/// What `hgm man` writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Form {
+    /// Man pages, one per command
+    Man,
+    /// Commands, settings and files of a case as Markdown
+    Markdown,
+    /// `hgm bids` as a Boutiques descriptor
+    Boutiques,
 }
 
 pub fn run(args: &Args, hgm: clap::Command, session: &Session) -> Result<(), Failure> {
+    let written = match args.form {
+        Form::Man => pages(hgm, "hgm")?.into_iter().map(|(name, page)| (format!("{name}.1"), page)).collect(),
+        Form::Markdown => markdown::pages(hgm),
+        Form::Boutiques => boutiques::descriptor(&hgm).into_iter().collect::<Vec<_>>(),
+    };
     let mut files = Vec::new();
-    for (name, page) in pages(hgm, "hgm")? {
-        let file = args.output.join(format!("{name}.1"));
-        write_whole(&file, &page)?;
+    for (name, text) in written {
+        let file = args.output.join(name);
+        write_whole(&file, &text)?;
         files.push(file.display().to_string());
     }
     session.emit(&serde_json::json!({ "files": files }), "")
