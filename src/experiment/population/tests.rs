@@ -55,12 +55,12 @@ fn estimate(said: &DVector<f64>, noise: &DMatrix<f64>, mesh: [f64; 2]) -> Estima
 
 /// Patients of the population: each one's true logarithms, and the estimate of their scans.
 fn cohort(patients: u64, seed: u64) -> Vec<([f64; 2], EstimateOutcome)> {
-    let rng = CounterRng::new(seed, 21);
+    let (rng, noise_rng) = (CounterRng::new(seed, 21), CounterRng::new(seed, 22));
     let one = |n: u64| {
         let z: Vec<f64> = (0..4).map(|k| rng.normal(8 * n + k)).collect();
         let truth = [MEANS[0] + SPREADS[0] * z[0], MEANS[1] + SPREADS[1] * z[1]];
         // From scans that say much to scans that say little; what softens one tissue stiffens the other.
-        let sd = [0, 1].map(|k| rng.between(8 * n + 4 + k, 0.08, 0.35));
+        let sd = [0, 1].map(|k| noise_rng.between(2 * n + k, 0.08, 0.35));
         let correlation: f64 = -0.4;
         let noise = DMatrix::from_row_slice(
             2,
