@@ -150,7 +150,7 @@ const DEPARTURES: [(&str, &str); 8] = [
     ),
     (
         "The phantom's force",
-        "10 N over the superior patch squeeze a brain of 333 Pa by more than it is high; 2 N are what the body can bear. Curves have \
+        "10 N over the superior patch squeeze a brain of 333 Pa by 126 mm; 2 N are what the body can bear. Curves have \
          the paper's form, distances are smaller.",
     ),
     (
