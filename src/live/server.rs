@@ -86,6 +86,8 @@ pub fn serve(body: &LiveBody, port: u16, recorded: bool) -> Result<Server, Serve
     let solving = {
         let (desk, body) = (Arc::clone(&desk), body.clone());
         std::thread::spawn(move || {
+            // However the solver ends, no page is left before a body that nobody steps.
+            let _ends = Ends(&desk);
             let driver = Driver::new(&body, session, &desk, recorded);
             Some(driver.run(&orders))
         })
@@ -95,6 +97,15 @@ pub fn serve(body: &LiveBody, port: u16, recorded: bool) -> Result<Server, Serve
         None
     });
     Ok(Server { desk, address, token, threads: [solving, accepting] })
+}
+
+/// Stops the desk when it goes.
+struct Ends<'a>(&'a Desk);
+
+impl Drop for Ends<'_> {
+    fn drop(&mut self) {
+        self.0.stop();
+    }
 }
 
 impl Server {
