@@ -212,6 +212,6 @@ mod tests {
 
         let usage = called(&["simulate", "mesh.vtu"]).ended.unwrap_err();
         assert_eq!(usage.code(), 3);
-        assert!(usage.message().contains("SCENARIO.toml"), "{}", usage.message());
+        assert!(usage.message().contains("<SCENARIO>"), "{}", usage.message());
     }
 }
