@@ -67,6 +67,7 @@ pub mod fem;
 pub mod geometry;
 pub mod image;
 pub mod layout;
+pub mod live;
 pub mod material;
 pub mod mesh;
 pub mod overlay;

@@ -40,6 +40,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (phantom, text) = phantom::made(flags, false, &args.output.join("phantom"), session)?;
     let both = serde_json::json!({ "pair": pair.outcome()?, "phantom": phantom });
     let words = run::in_words(&pair)?;
-    session.emit(&both, &format!("{words}\n{text}"))?;
+    let live = format!("pull at it in a browser: hgm live {}", args.output.join("pair").display());
+    session.emit(&both, &format!("{words}\n{}\n{live}", text.trim_end()))?;
     Ok(pair.quality_gate()?)
 }

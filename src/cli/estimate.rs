@@ -1,6 +1,6 @@
 //! `hgm estimate`: the moduli that explain what was observed, with error bars.
 
-use super::flags::Flags;
+use super::flags::{Flags, PopulationOption};
 use super::run::in_words;
 use super::{Failure, Session};
 use crate::workflow::{self, Subject};
@@ -16,6 +16,8 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart [default: as the case was made]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
+    #[command(flatten)]
+    population: PopulationOption,
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -23,6 +25,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for room in ["resection", "phantom"] {
         flags.set(&format!("{room}.tissues"), args.tissues);
     }
+    args.population.over(&mut flags)?;
     let settings = session.settings_of(&args.case, flags)?;
     let case = workflow::estimate(&session.place(&args.case), &settings, &mut session.listener())?;
     let facts = case.estimate()?;

@@ -6,7 +6,6 @@ use crate::experiment::outcome::Answer;
 use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
-use std::process::ExitCode;
 
 /// The three ways to end without success; usage errors (exit code 2) are clap's.
 #[derive(Debug)]
@@ -21,11 +20,6 @@ pub enum Failure {
 
 impl Failure {
     /// The number a script sees.
-    pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(self.code())
-    }
-
-    /// The same as a number.
     pub fn code(&self) -> u8 {
         match self {
             Self::Failed(_) => 1,
@@ -41,6 +35,16 @@ impl Failure {
             Self::Rejected(error) => ("input rejected", error),
             Self::QualityGate(error) => ("quality gate", error),
         }
+    }
+
+    /// The message, in one line.
+    pub fn message(&self) -> String {
+        in_one_line(self.parts().1)
+    }
+
+    /// The name of the answer that the scans gave, where they gave one of their own.
+    pub fn answer(&self) -> Option<&'static str> {
+        self.parts().1.downcast_ref::<Answered>().map(|answered| answered.answer.name())
     }
 
     /// One message on stderr; `on_stdout` also as an object there, which is for `--json` without a result.

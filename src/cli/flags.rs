@@ -1,9 +1,12 @@
 //! Options that several commands share, and how they become a layer of settings over the settings file.
 
+use super::Failure;
+use crate::experiment::population::PopulationPrior;
 use crate::material::StudyKind;
 use crate::material::meta_model::MetaModel;
 use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
 use crate::segment::label;
+use crate::workflow::cohort::population_prior;
 use crate::workflow::{Goal, Inputs};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -52,7 +55,7 @@ pub fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 /// Engine and size of a mesh.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct MeshOptions {
-    /// Mesh engine [default: cgal where it is built, else lattice]
+    /// Mesh engine [default: lattice, which is part of hgm]
     #[arg(long, help_heading = MESH, value_name = "ENGINE", value_parser = engine)]
     pub mesher: Option<Engine>,
     /// Target number of tetrahedra (within 15 %)
@@ -126,6 +129,40 @@ impl PriorOptions {
     }
 }
 
+/// What a cohort says of people.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct PopulationOption {
+    /// The priors of the moduli from a cohort (population.toml of `hgm bids ... group`) instead of the literature; `none`: the
+    /// literature's again
+    #[arg(long, help_heading = MATERIAL, value_name = "FILE")]
+    population: Option<PathBuf>,
+}
+
+impl PopulationOption {
+    /// Whether it was given.
+    pub fn given(&self) -> bool {
+        self.population.is_some()
+    }
+
+    /// What it sets; a cohort that is one study's worth changes nothing, and that is said.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no population.
+    pub fn over(&self, flags: &mut Flags) -> Result<(), Failure> {
+        let Some(path) = &self.population else { return Ok(()) };
+        if path.as_os_str() == "none" {
+            flags.set("prior.population", Some(PopulationPrior::none()));
+            return Ok(());
+        }
+        let prior = population_prior(path)?;
+        if prior.parameters.is_empty() {
+            tracing::warn!("{}: one study's worth: the literature's priors stand", path.display());
+        }
+        flags.set("prior.population", Some(prior));
+        Ok(())
+    }
+}
+
 /// What is asked of a prepared patient.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct AnalysisOptions {
@@ -138,6 +175,8 @@ pub struct AnalysisOptions {
     /// --cells or --edge-mm says otherwise
     #[arg(long, help_heading = MATERIAL)]
     pub estimate: bool,
+    #[command(flatten)]
+    pub population: PopulationOption,
 }
 
 impl AnalysisOptions {

@@ -10,9 +10,9 @@ const TASKS: [(&str, &[&str]); 6] = [
         "A patient, from scans to page",
         &["run", "demo", "prep", "sweep", "reduce", "estimate", "compare", "predict", "report"],
     ),
-    ("Many patients", &["bids"]),
+    ("Many patients", &["bids", "population"]),
     ("Carry to the other scan, and check", &["warp", "evaluate"]),
-    ("One step alone", &["register", "segment", "mesh", "simulate"]),
+    ("One step alone", &["register", "segment", "mesh", "simulate", "live"]),
     ("Materials and validation", &["gp", "law", "phantom", "synth"]),
     ("The program itself", &["doctor", "settings", "why", "layout", "schema", "completions", "man", "help"]),
 ];

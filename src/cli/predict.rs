@@ -1,6 +1,6 @@
 //! `hgm predict`: before the operation, how the brain will move.
 
-use super::flags::{Flags, MeshOptions, PriorOptions};
+use super::flags::{Flags, MeshOptions, PopulationOption, PriorOptions};
 use super::{Failure, Session};
 use crate::report::in_words::prediction_table;
 use crate::workflow::{PlanInputs, PlannedResection, PredictError, WorkflowError, predict};
@@ -62,6 +62,8 @@ pub struct Args {
     #[command(flatten)]
     prior: PriorOptions,
     #[command(flatten)]
+    population: PopulationOption,
+    #[command(flatten)]
     mesh: MeshOptions,
 }
 
@@ -69,6 +71,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut flags = Flags::default();
     args.mesh.over(&mut flags);
     args.prior.over(&mut flags);
+    args.population.over(&mut flags)?;
     flags.list("predict.heads", &args.head);
     flags.set("predict.drained", args.drained);
     flags.set("predict.threshold_mm", args.threshold_mm);

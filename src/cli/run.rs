@@ -4,6 +4,7 @@ use super::flags::{AnalysisOptions, Flags, MeshOptions, PairOptions};
 use super::{Failure, Session};
 use crate::report::in_words::summary;
 use crate::workflow::{Case, Settings, run_to};
+use anyhow::anyhow;
 
 /// T1 pair -> everything: prep, a sweep over the prior, per-node errors, report; resumable
 ///
@@ -16,7 +17,7 @@ pub struct Args {
     analysis: AnalysisOptions,
 }
 
-/// Tetrahedra of an estimate's mesh: from 60,000 of `cgal` to this many the moduli of a synthetic patient moved by +14 and
+/// Tetrahedra of an estimate's mesh: from 60,000 (of the engine `cgal`) to this many the moduli of a synthetic patient moved by +14 and
 /// -13 %, towards what another engine's mesh gave.
 const ESTIMATE_CELLS: usize = 160_000;
 
@@ -35,6 +36,12 @@ pub fn settings(analysis: &AnalysisOptions, mesh: &MeshOptions, session: &Sessio
         own.set("mesh.size.cells", Some(ESTIMATE_CELLS));
     }
     analysis.over(&mut flags);
+    if analysis.population.given() && !analysis.estimate {
+        return Err(Failure::Rejected(anyhow!(
+            "--population is a prior of estimates, and a sweep tries the literature's samples: add --estimate, or leave it out"
+        )));
+    }
+    analysis.population.over(&mut flags)?;
     mesh.over(&mut flags);
     session.settings_over(&own.0, flags)
 }

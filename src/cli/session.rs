@@ -1,8 +1,9 @@
 //! What every subcommand shares: global options, settings from a file, output, progress, input files.
 
+use super::call::Caller;
 use super::failure::Failure;
 use super::flags::{Flags, word};
-use super::listener::{Listener, bar};
+use super::listener::{Ear, Listener, bar};
 use super::output::print_line;
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
@@ -14,10 +15,21 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
 
 /// Whether a result has been printed: then stdout is whole, and a failure is told on stderr and by the exit code alone.
 static EMITTED: AtomicBool = AtomicBool::new(false);
+
+/// What ends a command that runs until it is told to, in the place of ending at once.
+static AT_SIGNAL: OnceLock<Box<dyn Fn() + Send + Sync>> = OnceLock::new();
+
+/// Has the first Ctrl-C (or closed terminal, or SIGTERM) call this instead of ending the program; the next one ends it.
+pub fn at_signal(end: impl Fn() + Send + Sync + 'static) {
+    // A program runs one command.
+    AT_SIGNAL.set(Box::new(end)).ok();
+}
 
 /// See [`EMITTED`].
 pub fn has_emitted() -> bool {
@@ -64,6 +76,7 @@ pub struct Session {
     /// The programs of this machine.
     pub programs: Programs,
     config: toml::Table,
+    caller: Option<Caller>,
 }
 
 impl Session {
@@ -91,12 +104,20 @@ impl Session {
             return Err(Failure::Rejected(anyhow!("--threads 0: give 1 or more, or leave it out for all cores")));
         }
         rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build_global().ok();
-        let config = match &options.config {
-            None => toml::Table::new(),
-            Some(path) => Settings::layer(&read_text(path)?, &path.display().to_string())?,
-        };
+        let config = config(&options)?;
         let programs = Programs::look_up(std::env::current_exe().ok().as_deref(), |name| std::env::var_os(name));
-        Ok(Self { options, programs, config })
+        Ok(Self { options, programs, config, caller: None })
+    }
+
+    /// For a caller: no signal handlers, no thread pool, no logs, nothing printed. `beside` is where programs are looked for
+    /// before the `PATH`.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn within(options: GlobalOptions, beside: Option<&Path>, caller: Caller) -> Result<Self, Failure> {
+        let config = config(&options)?;
+        let programs = Programs::look_up(beside, |name| std::env::var_os(name));
+        Ok(Self { options, programs, config, caller: Some(caller) })
     }
 
     /// The settings of a job that makes something new: the defaults, over them the settings file, over that the options.
@@ -120,14 +141,12 @@ impl Session {
     /// # Errors
     /// As [`Session::settings`].
     pub fn settings_over(&self, own: &toml::Table, mut flags: Flags) -> Result<Settings, Failure> {
-        let mut base = Flags::default();
-        base.set("mesh.engine", Some(self.programs.engines().preferred()));
         flags.set("image.prefer", self.options.prefer);
         flags.set("image.volume", self.options.volume);
         for room in ["register", "gp", "synth"] {
             flags.set(&format!("{room}.seed"), self.options.seed);
         }
-        Ok(Settings::resolve([&base.0, own, &self.config, &flags.0])?)
+        Ok(Settings::resolve([own, &self.config, &flags.0])?)
     }
 
     /// Where a job is done.
@@ -136,12 +155,15 @@ impl Session {
     }
 
     /// Whoever listens to a job.
-    pub fn listener(&self) -> Listener {
-        Listener::new(self.shows_bars())
+    pub fn listener(&self) -> Ear {
+        match &self.caller {
+            Some(caller) => Ear::Caller(Arc::clone(&caller.progress)),
+            None => Ear::Terminal(Listener::new(self.shows_bars())),
+        }
     }
 
     fn shows_bars(&self) -> bool {
-        !self.options.quiet && std::io::stderr().is_terminal()
+        self.caller.is_none() && !self.options.quiet && std::io::stderr().is_terminal()
     }
 
     /// Prints the result: `value` with `--json`, else the text.
@@ -149,6 +171,10 @@ impl Session {
     /// # Errors
     /// A value that cannot be serialised.
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
+        if let Some(caller) = &self.caller {
+            *caller.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(serde_json::to_string(value)?);
+            return Ok(());
+        }
         EMITTED.store(true, Ordering::Relaxed);
         if self.options.json {
             print_line(&serde_json::to_string_pretty(value)?)?;
@@ -164,11 +190,24 @@ impl Session {
     }
 }
 
+fn config(options: &GlobalOptions) -> Result<toml::Table, Failure> {
+    Ok(match &options.config {
+        None => toml::Table::new(),
+        Some(path) => Settings::layer(&read_text(path)?, &path.display().to_string())?,
+    })
+}
+
 /// On Ctrl-C, a closed terminal or a scheduler's SIGTERM: lets the file that is being written become whole, then ends.
 fn end_between_files() -> std::io::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::spawn(move || {
-        if let Some(signal) = signals.forever().next() {
+        let mut told = false;
+        for signal in signals.forever() {
+            if let Some(end) = AT_SIGNAL.get().filter(|_| !told) {
+                told = true;
+                end();
+                continue;
+            }
             let _whole = no_more_writes();
             // As shells tell it.
             std::process::exit(128 + signal);

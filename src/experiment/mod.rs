@@ -9,6 +9,7 @@ pub mod nodal_field;
 pub mod observed;
 pub mod outcome;
 pub mod phantom;
+pub mod population;
 pub mod predict;
 pub mod prior;
 pub mod resection;

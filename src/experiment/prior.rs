@@ -1,6 +1,7 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
 use super::estimate::{LogPrior, Scale, Unknown};
+use super::population::PopulationPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{
     SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
@@ -25,11 +26,39 @@ pub struct PriorSettings {
     /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
     #[schemars(with = "String")]
     pub law: MetaModel,
+    /// What a cohort says of people, in place of the literature's prior in estimates and predictions; a sweep's levels stay the
+    /// literature's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub population: Option<PopulationPrior>,
 }
 
 impl Default for PriorSettings {
     fn default() -> Self {
-        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NEO_HOOKEAN }
+        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NEO_HOOKEAN, population: None }
+    }
+}
+
+impl PriorSettings {
+    /// Refuses a population that is not of patients like this one.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn check(&self, density_kg_per_m3: f64) -> Result<(), String> {
+        self.population.as_ref().map_or(Ok(()), |population| population.check(self.law, density_kg_per_m3))
+    }
+
+    /// The cohort's prior of an unknown where it has one, else what was known before.
+    #[must_use]
+    pub fn learnt(&self, prior: LogPrior) -> LogPrior {
+        match self.population.as_ref().and_then(|population| population.of(&prior.name)) {
+            Some(learnt) => LogPrior { mean: learnt.log_mean, sd: Some(learnt.log_sd), ..prior },
+            None => prior,
+        }
+    }
+
+    /// Patients behind the prior, where a cohort has taught any of it.
+    pub fn patients(&self) -> Option<usize> {
+        self.population.as_ref().filter(|p| !p.parameters.is_empty()).map(|p| p.patients)
     }
 }
 
@@ -178,11 +207,17 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// report). Those curves share their shape far more than studies do, so an exponent's mean and spread are those of the
 /// published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
-/// as another.
+/// as another. What a cohort has taught takes the place of mean and spread.
 ///
 /// # Errors
 /// [`PriorError`].
 pub fn law_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
+    let known = literature_priors(tissue, prior)?;
+    Ok(known.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))).collect())
+}
+
+/// The same as the literature alone has it.
+fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
     let modulus = Unknown::ShearModulus(tissue.clone());
     if prior.law == MetaModel::NEO_HOOKEAN {
         return Ok(vec![(modulus, log_prior(tissue, prior)?)]);

@@ -11,6 +11,7 @@ mod element;
 mod equilibrium;
 mod error;
 mod linear;
+pub mod live;
 mod load;
 #[cfg(test)]
 mod manufactured;

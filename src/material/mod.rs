@@ -7,6 +7,7 @@ pub mod gp;
 pub mod law;
 pub mod literature;
 pub mod meta_model;
+pub mod published;
 pub mod random;
 pub mod rheometry;
 pub mod statistics;

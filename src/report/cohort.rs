@@ -1,5 +1,7 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
+pub use super::cohort_population::{CohortPopulation, Pupil};
+
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
@@ -84,6 +86,9 @@ pub struct Cohort {
     pub median_samples: Vec<MedianSample>,
     /// What a reader must know before comparing the subjects.
     pub warnings: Vec<String>,
+    /// What the subjects say of people, where they were estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub population: Option<CohortPopulation>,
 }
 
 /// Iglewicz and Hoaglin (How to detect and handle outliers, 1993): apart is what lies more than 3.5 robust standard
@@ -130,7 +135,7 @@ impl Cohort {
         let outcomes: Vec<&ExperimentOutcome> = members.iter().filter_map(|m| m.outcome.as_ref()).collect();
         let median_samples = median_samples(&outcomes);
         let program = concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned();
-        Self { program, columns, subjects, median: median_of, mad: mad_of, median_samples, warnings }
+        Self { program, columns, subjects, median: median_of, mad: mad_of, median_samples, warnings, population: None }
     }
 
     /// The table as BIDS writes one: tabs, `n/a` where there is no value, a line for each subject and no other.

@@ -4,7 +4,7 @@ use super::case::Case;
 use super::error::{CaseError, WorkflowError};
 use super::settings::Settings;
 use super::stage_name::Subject;
-use super::stages::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, transforms};
+use super::stages::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, transforms};
 use crate::experiment::field::{ShiftField, carried, inverse};
 use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
 use crate::image::nifti::{self, ReadOptions, decode_displacement};
@@ -176,6 +176,14 @@ impl Map {
     }
 }
 
+/// The state of a case that is meant where none is named: the estimate, else the best sample.
+///
+/// # Errors
+/// A case without any.
+pub fn default_state(case: &Case) -> Result<String, WorkflowError> {
+    named(case, None)
+}
+
 /// The state that is meant: the one named, else the estimate, else the model that the fields were made with.
 fn named(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
     let missing =
@@ -201,8 +209,8 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     let samples = super::plan::samples(&settings, Subject::Patient)?;
     let samples =
         samples.into_iter().map(|s| s.id).filter(|id| case.path(&crate::layout::SAMPLE_STATE.of(id)).exists());
-    let believed_mm = settings.estimate.displacement.depth_mm;
-    let of_case = CaseShift::read(case, model.as_deref(), samples.collect(), (&settings.fields, believed_mm))?;
+    let believed = Believed::of(&settings);
+    let of_case = CaseShift::read(case, model.as_deref(), samples.collect(), (&settings.fields, believed))?;
     let field: ShiftField = of_case.state(state)?;
     let vectors = if family == PRE_FROM_POST_FIELD {
         let value = field.to_pre(&of_case.post_grid, &of_case.post_from_pre.inverse());

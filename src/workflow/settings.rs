@@ -112,7 +112,7 @@ const ROOMS: [Room; 16] = [
     ("mesh", read::<MeshSettings>, |s| kept(s.mesh.check())),
     ("phantom", read::<PhantomSettings>, |s| kept(s.phantom.check())),
     ("predict", read::<PredictSettings>, |s| kept(s.predict.check())),
-    ("prior", read::<PriorSettings>, |_| Ok(())),
+    ("prior", read::<PriorSettings>, |s| s.prior.check(s.resection.density_kg_per_m3)),
     ("register", read::<RigidSettings>, |s| kept(s.register.check())),
     ("resection", read::<ResectionSettings>, |s| kept(s.resection.check())),
     ("segment", read::<SegmentSettings>, |s| kept(s.segment.check())),
@@ -120,8 +120,8 @@ const ROOMS: [Room; 16] = [
     ("tag", read::<TagSettings>, |_| Ok(())),
 ];
 
-/// Tables that are one of several choices: the one above takes the place of the one below.
-const CHOICES: [&str; 1] = ["mesh.size"];
+/// Tables that hold together (one of several choices, one cohort): the one above takes the place of the one below.
+const CHOICES: [&str; 2] = ["mesh.size", "prior.population"];
 
 impl Settings {
     /// The layers over the defaults, the last one over all others; values that no room takes are refused.

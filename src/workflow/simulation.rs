@@ -8,7 +8,7 @@ use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
-    self, ContactOutcome, ConvergenceRecord, ElementKind, Method, Motion, Outcome, Scenario, simulate_from,
+    self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, msh, pvd, vtu};
@@ -80,7 +80,7 @@ pub fn simulate(
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
     let mesh_bytes = read_input(&files.mesh)?;
-    let mesh = mesh(&files.mesh, &mesh_bytes)?;
+    let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
         name: files.scenario.display().to_string(),
         reason: in_words(&e.to_string()),
@@ -104,23 +104,7 @@ pub fn simulate(
     }
     let names = || format!("{} on {}", files.scenario.display(), files.mesh.display());
     let compute = || -> Result<Produced, SimulationError> {
-        let progress = RefCell::new(progress);
-        progress.borrow_mut().begin("simulation", 100);
-        let shown = RefCell::new(0);
-        let show = |p: &fem::Progress| {
-            // A static solve closes in on its residual by orders of magnitude; a motion goes through its time.
-            let closed = p.relative_residual.max(p.goal).ln() / p.goal.ln();
-            let done = if scenario.solver.method == Method::Static { closed } else { p.fraction };
-            let percent = (100.0 * done.clamp(0.0, 1.0)) as usize;
-            let mut progress = progress.borrow_mut();
-            (shown.replace_with(|before| percent.max(*before))..percent).for_each(|_| progress.step());
-            progress.doing(&format!("iteration {} residual {:.1e}", p.iteration, p.relative_residual));
-        };
-        let found = match &start {
-            Some(start) => simulate_from(&mesh, &scenario, start, &show),
-            None => fem::simulate(&mesh, &scenario, &show),
-        };
-        progress.borrow_mut().end();
+        let found = simulate_mesh(&mesh, &scenario, start.as_deref(), progress);
         let outcome = found.map_err(|source| SimulationError::Fem { names: names(), source })?;
         produced(&mesh, &scenario, outcome, reference.as_deref(), &stem)
     };
@@ -130,6 +114,36 @@ pub fn simulate(
     })?;
     let noted = |_| SimulationError::Noted { file: file.clone() };
     Ok((serde_json::from_value(outcome.manifest.facts).map_err(noted)?, outcome.skipped))
+}
+
+/// One deformation, or one motion, of a mesh at hand, from rest or from a displacement (mm) near the answer.
+///
+/// # Errors
+/// As [`fem::simulate`].
+pub fn simulate_mesh(
+    mesh: &TetMesh,
+    scenario: &Scenario,
+    start_mm: Option<&[[f64; 3]]>,
+    progress: &mut dyn Progress,
+) -> Result<Outcome, FemError> {
+    let progress = RefCell::new(progress);
+    progress.borrow_mut().begin("simulation", 100);
+    let shown = RefCell::new(0);
+    let show = |p: &fem::Progress| {
+        // A static solve closes in on its residual by orders of magnitude; a motion goes through its time.
+        let closed = p.relative_residual.max(p.goal).ln() / p.goal.ln();
+        let done = if scenario.solver.method == Method::Static { closed } else { p.fraction };
+        let percent = (100.0 * done.clamp(0.0, 1.0)) as usize;
+        let mut progress = progress.borrow_mut();
+        (shown.replace_with(|before| percent.max(*before))..percent).for_each(|_| progress.step());
+        progress.doing(&format!("iteration {} residual {:.1e}", p.iteration, p.relative_residual));
+    };
+    let found = match start_mm {
+        Some(start) => simulate_from(mesh, scenario, start, &show),
+        None => fem::simulate(mesh, scenario, &show),
+    };
+    progress.borrow_mut().end();
+    found
 }
 
 /// Folder and name of the output.
@@ -144,7 +158,8 @@ fn destination(output: &Path) -> Result<(PathBuf, String), SimulationError> {
     }
 }
 
-fn mesh(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
+/// The mesh in a file's bytes, by the ending of its name.
+pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
     let name = path.display().to_string();
     match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
         Some("vtu") => Ok(vtu::decode(bytes, &name)?.mesh),

@@ -15,7 +15,7 @@ use crate::segment::{SegmentOverrides, atlas, pose_of_head, pose_of_labels, segm
 use std::path::PathBuf;
 
 /// Raised when the code changes the patient of the same settings.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// The files of a synthetic patient.
 #[derive(Clone, Debug, Default)]

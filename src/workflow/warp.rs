@@ -134,6 +134,21 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
     Ok(Warped { output: asked.output.clone(), kind, state, points, streamlines: drawing.streamlines() })
 }
 
+/// Carries points (mm) of one of a case's frames, as [`warp`] carries those of a file; returns the state that carried them
+/// and each point with its spread.
+///
+/// # Errors
+/// A case that has no such state.
+pub fn warp_points(
+    case: &Case,
+    to: WarpTo,
+    state: Option<&str>,
+    points_mm: &[[f64; 3]],
+) -> Result<(String, Vec<Carried>), WorkflowError> {
+    let (map, state) = Map::of_case(case, state, to, Part::Points)?;
+    Ok((state, points_mm.par_iter().map(|x| map.carry(*x)).collect()))
+}
+
 fn image_through(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> Volume<f32, Native> {
     let grid = map.grid.unwrap_or(volume.grid);
     let from = |n: usize| {

@@ -15,6 +15,7 @@ mod heads;
 mod imaging;
 mod job;
 mod kills;
+mod live;
 mod material;
 mod mesh;
 mod pairs;
@@ -42,6 +43,7 @@ fn main() {
         ("study-level", study_level::bars),
         ("fem", fem::bars),
         ("contact", contact::bars),
+        ("live", live::bars),
         ("experiment", experiment::bars),
         ("pairs", pairs::bars),
         ("patients", patients::bars),

@@ -2,6 +2,7 @@
 
 use crate::job::{CHEAP, contents, output, program, sample};
 use crate::made::{copy, finished_phantom, prepared_pair};
+use crate::population::of_brains;
 use crate::python::python_file;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,7 +18,7 @@ fn every_command(folder: &Path) -> BTreeSet<String> {
     let mut names: BTreeSet<String> = contents(&pages).keys().filter_map(name).collect();
     // A level of BIDS is an argument, but it prints a document of its own; `gp` and `law` only hold others.
     names.extend(["bids participant", "bids group"].map(str::to_owned));
-    for holder in ["bids", "gp", "law"] {
+    for holder in ["bids", "gp", "law", "population"] {
         assert!(names.remove(holder));
     }
     // The bundled demo is run and checked by `./run test` itself.
@@ -78,6 +79,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("gp sample", &["gp", "sample", "--task", "hyperelastic-white", "-o", &at("gp")]);
     prints("gp sample", &["gp", "sample", "--task", "hyperelastic-grey", "--draws", "3", "-o", &at("gp")]);
     prints("gp show", &["gp", "show", "--published", "-o", &at("gp")]);
+    prints("gp paper", &["gp", "paper", "--cells", "3000", "-o", &at("paper")]);
     prints("gp fit", &["gp", "fit", "--starts", "1", "-o", &at("gp")]);
     let study_level = ["--model", "study-level", "-o", &at("gp")];
     prints("gp fit", &[&["gp", "fit"], &study_level[..]].concat());
@@ -99,6 +101,11 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("bids participant", &[&bids, &CHEAP[..]].concat());
     prints("bids group", &["bids", &study, &out, "group"]);
     prints("estimate", &["estimate", &case]);
+    for (name, mean) in [("a.toml", 6.4), ("b.toml", 6.6)] {
+        std::fs::write(at(name), of_brains(&[mean])).unwrap();
+    }
+    prints("population merge", &["population", "merge", &at("a.toml"), &at("b.toml"), "-o", &at("both.toml")]);
+    prints("population show", &["population", "show", &at("both.toml")]);
     prints("compare", &["compare", &case]);
     prints("report", &["report", &case]);
     let plan = sample("truth/resected_pre.nii.gz").display().to_string();
@@ -116,6 +123,9 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     );
     let phantom = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "-o"];
     prints("phantom", &[&phantom[..], &[&at("phantom")]].concat());
+    let posed = [&at("phantom/mesh/rest.vtu")[..], &at("scenario.toml")];
+    std::fs::write(at("session.jsonl"), recording(posed.map(Path::new))).unwrap();
+    prints("live", &["live", posed[0], posed[1], "--replay", &at("session.jsonl"), "-o", &at("live.vtu")]);
     prints("simulate", &["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("s.vtu")]);
 
     let printed = checks.iter().filter_map(|check| check.split_once('=')).map(|(command, _)| command.to_owned());
@@ -137,6 +147,14 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     let words = ["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("t.vtu")];
     let shown = on_terminal(&words);
     assert!(shown.contains("(left "), "a terminal sees the time left: {shown}");
+}
+
+/// A recorded session of three steps.
+fn recording([mesh, scenario]: [&Path; 2]) -> String {
+    let settings = hgm::workflow::Settings::default();
+    let posed = hgm::workflow::posed_mesh(mesh, Some(scenario), &settings).unwrap();
+    let body = hgm::live::LiveBody::of(posed, &settings.prior);
+    hgm::live::Recording { steps: 3, ..hgm::live::Recording::new(&body) }.to_text()
 }
 
 /// What a command shows where it has a terminal: util-linux's `script` gives it one.

@@ -83,6 +83,32 @@ fn show_writes_both_figures_the_table_and_the_papers_tests() {
 }
 
 #[test]
+fn slow_every_figure_and_table_of_the_paper_is_made_in_one_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("paper");
+    let made = json(&["gp", "paper", "--cells", "3000", "-o", out.to_str().unwrap()]);
+    // Every printed modulus within a pascal, every printed statistic to its last digit.
+    let moduli = made["result"]["moduli"].as_array().unwrap();
+    let number = |row: &serde_json::Value, key: &str| row[key].as_f64().unwrap();
+    assert_eq!(moduli.len(), 15);
+    assert!(moduli.iter().all(|row| (number(row, "printed_pa") - number(row, "as_published_pa")).abs() < 0.7));
+    let tests = made["result"]["tests"].as_array().unwrap();
+    assert!(tests.iter().all(|t| (number(t, "printed_h") - number(&t["as_published"], "h")).abs() < 0.005));
+    // Fig. 4: nine tasks of nine samples, and the nearest to the truth (333.28 Pa) is the best.
+    let tasks = made["result"]["phantom"].as_array().unwrap();
+    assert_eq!(tasks.len(), 9);
+    assert_eq!(made["result"]["best_sample"], "hyperelastic-healthy-03");
+    let figures = ["fig-2-posterior.svg", "fig-3-meta-models.svg", "fig-4-phantom.svg"];
+    assert!(figures.iter().all(|figure| text(&out.join(figure)).starts_with("<svg xmlns=")));
+    let page = text(&out.join("paper.md"));
+    assert!(figures.iter().all(|figure| page.contains(figure)) && page.contains("hyperelastic-healthy-03"));
+    assert_eq!(text(&out.join("table-1.csv")).lines().count(), 16);
+    // Cells of 3,000 may leave out a sample without an equilibrium, never a whole task.
+    let samples = tasks.iter().map(|task| task["samples"].as_array().unwrap().len()).sum::<usize>();
+    assert_eq!(text(&out.join("fig-4-phantom.csv")).lines().count(), samples + 1);
+}
+
+#[test]
 fn a_study_of_ones_own_moves_the_posterior_and_a_bad_row_is_refused_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("mine.csv");

@@ -23,6 +23,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "layout",
         "report",
         "workflow",
+        "live",
     ];
     BTreeMap::from([
         ("anatomy", vec![]),
@@ -44,6 +45,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
             vec!["geometry", "artefact", "image", "register", "segment", "mesh", "material", "experiment", "layout"],
         ),
         ("workflow", all[..15].to_vec()),
+        ("live", vec!["artefact", "mesh", "material", "fem", "experiment", "workflow"]),
         ("cli", all.to_vec()),
     ])
 }

@@ -1,7 +1,8 @@
-//! `hgm gp fit|sample|show|studies`: the generative model of brain tissue.
+//! `hgm gp fit|sample|show|paper|studies`: the generative model of brain tissue.
 
 mod fit;
 mod options;
+mod paper;
 mod sample;
 mod show;
 mod studies;
@@ -25,6 +26,7 @@ enum Command {
     Fit(fit::Args),
     Sample(sample::Args),
     Show(show::Args),
+    Paper(paper::Args),
     Studies(studies::Args),
 }
 
@@ -33,6 +35,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Fit(args) => fit::run(args, session),
         Command::Sample(args) => sample::run(args, session),
         Command::Show(args) => show::run(args, session),
+        Command::Paper(args) => paper::run(args, session),
         Command::Studies(args) => studies::run(args, session),
     }
 }

@@ -22,15 +22,16 @@ mod verdict_of_fit;
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};
 pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
-pub use evidence::{Evidence, NOISE_LOG_SD, STRONG, Unexplained, weights};
+pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, STRONG, Unexplained, weights};
 pub use findings::{Odds, ProblemError, Shift};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
 pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, solve_problem};
 pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace};
-pub use process::Process;
-pub use re_registration::{Instrument, InstrumentError, ReRegistration, moved_by};
+pub use process::{Factor, Process, spread_out};
+pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, moved_by};
+pub use rigid_remainder::RigidModes;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@ use super::correlated::{self, CorrelatedErrors};
 use super::evidence::Unexplained;
 use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
-use super::re_registration::{Instrument, without_own_error};
+use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, Z_95, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
@@ -65,6 +65,9 @@ pub struct EstimateOutcome {
     pub posterior: Posterior,
     /// What was known before.
     pub prior: Vec<LogPrior>,
+    /// Patients of the cohort that the prior was learnt from; absent where it is the literature's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taught_by: Option<usize>,
     /// Largest standard deviation of ln(modulus) that the mesh itself adds to the intervals.
     #[serde(default)]
     pub model_log_sd: f64,
@@ -121,6 +124,9 @@ pub struct Estimate {
     pub displacement_sd_mm: Vec<f64>,
     /// The 95 % bound of how far every node moves: |mean| + 1.96 sd along the mean, mm.
     pub displacement_95_mm: Vec<f64>,
+    /// Nodes held against the model, with what was seen of them, the instrument's own error taken out (mm); none where
+    /// surfaces are.
+    pub seen: Vec<MovedNode>,
     /// The tissues' materials at the mode, by tissue.
     pub materials: BTreeMap<String, Material>,
     /// The unknowns' numbers at the mode, as [`Problem::start`] takes them.
@@ -215,6 +221,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     };
     let correlated = fitted.correlated;
     let outcome = EstimateOutcome {
+        taught_by: None,
         limits: verdict.because(),
         verdict,
         observations: fitted.observations,
@@ -236,7 +243,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         prior,
     };
     let numbers = fitted.descent.log_parameters;
-    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials, numbers })
+    let seen = body.observed_nodes().to_vec();
+    Ok(Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, seen, materials, numbers })
 }
 
 /// The material of every tissue at these parameters.

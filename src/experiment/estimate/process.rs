@@ -2,7 +2,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, Par};
 use nalgebra::{DMatrix, Vector3};
 use schemars::JsonSchema;
@@ -68,6 +68,23 @@ impl Factor {
         DMatrix::from_fn(rows.nrows(), columns, |row, column| parts[(row / 3, 3 * column + row % 3)])
     }
 
+    /// The inverse covariance times every column, component by component.
+    pub fn solve(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let (n, columns) = (self.lower.nrows(), rows.ncols());
+        let mut parts = Mat::from_fn(n, 3 * columns, |place, k| rows[(3 * place + k % 3, k / 3)]);
+        solve_lower_triangular_in_place(self.lower.as_ref(), parts.as_mut(), Par::Seq);
+        solve_upper_triangular_in_place(self.lower.transpose(), parts.as_mut(), Par::Seq);
+        DMatrix::from_fn(rows.nrows(), columns, |row, column| parts[(row / 3, 3 * column + row % 3)])
+    }
+
+    /// How much of the variance of one component at each of some points is known from the places (mm2): `covariance_mm2` of
+    /// a place (by its number) with a point.
+    pub fn known_mm2(&self, points: usize, covariance_mm2: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut parts = Mat::from_fn(self.lower.nrows(), points, covariance_mm2);
+        solve_lower_triangular_in_place(self.lower.as_ref(), parts.as_mut(), Par::Seq);
+        parts.col_iter().map(|column| column.squared_norm_l2()).collect()
+    }
+
     /// L^T of every column, component by component: the square of its length is the variance of that sum of errors.
     pub fn lower_transposed_times(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.lower.nrows();
@@ -126,9 +143,14 @@ mod tests {
             if row % 3 == 1 { process.covariance_mm2(distance) } else { 0.0 }
         });
         let white = factor.whiten(&covariance);
+        let again = factor.solve(&covariance);
+        let known = factor.known_mm2(120, |place, c| covariance[(3 * place + 1, c)]);
         for c in [0, 50, 119] {
             let variance: f64 = white.column(c).norm_squared();
             assert!((variance / 0.09 - 1.0).abs() < 1e-4, "{variance}");
+            assert!((known[c] - variance).abs() < 1e-9);
+            // The covariance's own columns come back as unit vectors, but for what a place has to itself.
+            assert!((again[(3 * c + 1, c)] - 1.0).abs() < 1e-3, "{}", again[(3 * c + 1, c)]);
         }
     }
 

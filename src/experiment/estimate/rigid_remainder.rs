@@ -5,13 +5,15 @@
 
 use super::projection::Projection;
 use super::{Forward, Linearisation, LogPrior, Scale};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3};
 
 /// The six rigid movements of some places about their middle.
 #[derive(Clone, Debug)]
 pub struct RigidModes {
     /// Displacement of every place, three components each, per mm (shifts) and per radian (turns).
     pub columns_mm: DMatrix<f64>,
+    /// What they turn about, mm.
+    middle_mm: Vector3<f64>,
     /// Standard deviations: mm for shifts, radians for turns.
     sd: [f64; 6],
 }
@@ -27,15 +29,23 @@ impl RigidModes {
         let middle_mm = places_mm.iter().map(|x| Vector3::from(*x)).sum::<Vector3<f64>>() / count;
         let arm = |x: &[f64; 3]| Vector3::from(*x) - middle_mm;
         let mean_squared_arm = places_mm.iter().map(|x| arm(x).norm_squared()).sum::<f64>() / count;
-        let columns_mm = DMatrix::from_fn(3 * places_mm.len(), RIGID, |row, k| {
-            let mut unit = Vector3::zeros();
-            unit[k % 3] = 1.0;
-            if k < 3 { unit[row % 3] } else { unit.cross(&arm(&places_mm[row / 3]))[row % 3] }
-        });
+        let columns_mm =
+            DMatrix::from_fn(3 * places_mm.len(), RIGID, |row, k| column(k, &arm(&places_mm[row / 3]))[row % 3]);
         // Three shifts of s: mean square 3 s^2. Turns of t about three axes: 2 t^2 arm^2.
         let shift = (error_mm * error_mm / 6.0).sqrt();
         let turn = (error_mm * error_mm / 4.0 / mean_squared_arm.max(1e-12)).sqrt();
-        Self { columns_mm, sd: [shift, shift, shift, turn, turn, turn] }
+        Self { columns_mm, middle_mm, sd: [shift, shift, shift, turn, turn, turn] }
+    }
+
+    /// The same movements of any point, one column each.
+    pub fn at(&self, x_mm: [f64; 3]) -> Matrix3x6<f64> {
+        let arm = Vector3::from(x_mm) - self.middle_mm;
+        Matrix3x6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| column(k, &arm)))
+    }
+
+    /// The inverse covariance of what is known of them beforehand.
+    pub fn precision(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&DVector::from_iterator(RIGID, self.sd.iter().map(|sd| 1.0 / (sd * sd))))
     }
 
     /// What is known of them beforehand.
@@ -47,6 +57,13 @@ impl RigidModes {
         };
         names.into_iter().zip(self.sd).map(prior)
     }
+}
+
+/// How a point moves at this arm from the middle, per mm of a shift or radian of a turn.
+fn column(k: usize, arm: &Vector3<f64>) -> Vector3<f64> {
+    let mut unit = Vector3::zeros();
+    unit[k % 3] = 1.0;
+    if k < 3 { unit } else { unit.cross(arm) }
 }
 
 /// A model held against the part of what was seen that it could do itself, with the rigid remainder behind its own
@@ -115,6 +132,7 @@ mod tests {
         for (n, x) in places.iter().enumerate() {
             let there = carried(&places, *x, &amounts);
             assert!((0..3).all(|a| (there[a] - moved[3 * n + a]).abs() < 1e-12));
+            assert!((rigid.at(*x) * DVector::from_column_slice(&amounts) - there).norm() < 1e-12);
         }
         // Lengths between places stay, to first order.
         let between = |a: usize, b: usize, moved: f64| {

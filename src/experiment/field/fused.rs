@@ -1,25 +1,19 @@
-//! Model and seen displacement together: the model everywhere, put right by a process over what it leaves unexplained.
+//! Model and seen displacement together: the model everywhere, put right by what it leaves of the seen displacement.
+//!
+//! What is left at the places that were seen is a remainder of the rigid registration (the fields are given beside that
+//! registration, so it belongs to them), a discrepancy of the model, alike over a distance, and noise of the registration,
+//! alike over another: the most probable ones are found as an estimate finds them ([`LinearModel`]), and model, remainder
+//! and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with
+//! explicit basis functions).
 
-use super::process::{Process, Residual};
+use crate::experiment::estimate::{
+    CorrelatedErrors, Factor, LinearModel, MovedNode, RigidModes, Unexplained, spread_out,
+};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
-/// How far the images say that a node has moved.
-#[derive(Clone, Copy, Debug)]
-pub struct SeenNode {
-    /// The node.
-    pub node: u32,
-    /// Its displacement, mm.
-    pub displacement_mm: [f64; 3],
-    /// Standard deviation of one component, mm.
-    pub noise_mm: f64,
-}
-
-/// Most residuals that a process is conditioned on: its cost grows with their cube.
-const MOST: usize = 320;
-/// Edges of the cells that leave one node each, mm; tried until few enough are left. A registration's errors are alike
-/// over less than the first.
-const CELLS_MM: [f64; 8] = [12.0, 14.0, 16.0, 18.0, 21.0, 25.0, 32.0, 45.0];
+/// Nodes per task; part of the determinism, not to depend on the machine.
+const NODES_AT_ONCE: usize = 512;
 
 /// A state of the model put right by what was seen.
 #[derive(Clone, Debug)]
@@ -28,66 +22,165 @@ pub struct Fused {
     pub displacement_mm: Vec<[f64; 3]>,
     /// Standard deviation of every node (root of the trace), mm.
     pub sd_mm: Vec<f64>,
-    /// The 95 % reach of every node, mm.
-    pub reach95_mm: Vec<f64>,
-    /// The discrepancy; `None` where the model leaves nothing unexplained.
-    pub process: Option<Process>,
-    /// Nodes whose residuals it was conditioned on.
-    pub conditioned_on: usize,
+    /// The same of the model alone: its own spread, and all that it leaves.
+    pub model_sd_mm: Vec<f64>,
+    /// What is left and how it is explained; `None` where nothing was seen.
+    pub left: Option<Left>,
 }
 
-/// The model's displacement with the most probable discrepancy added. `model_sd_mm`: of every node, from the posterior.
-pub fn fused(nodes_mm: &[[f64; 3]], model_mm: &[[f64; 3]], model_sd_mm: &[f64], seen: &[SeenNode]) -> Fused {
-    let chosen = thinned(nodes_mm, seen);
-    let residuals: Vec<Residual> = chosen
-        .iter()
-        .map(|s| {
-            let model = model_mm[s.node as usize];
-            let value_mm = [0, 1, 2].map(|a| s.displacement_mm[a] - model[a]);
-            Residual { x_mm: nodes_mm[s.node as usize], value_mm, noise_mm: s.noise_mm }
-        })
-        .collect();
-    let process = Process::fitted(&residuals);
-    let corrected: Vec<([f64; 3], f64)> =
-        nodes_mm.par_iter().map(|x| process.as_ref().map_or(([0.0; 3], 0.0), |process| process.at(*x))).collect();
-    let displacement_mm: Vec<[f64; 3]> =
-        model_mm.iter().zip(&corrected).map(|(u, (d, _))| [0, 1, 2].map(|a| u[a] + d[a])).collect();
-    let sd_mm: Vec<f64> =
-        model_sd_mm.iter().zip(&corrected).map(|(model, (_, sd))| model.hypot(3f64.sqrt() * sd)).collect();
-    let reach = |(u, sd): (&[f64; 3], &f64)| {
-        // Along the mean, of a spread that is alike in all directions.
-        u.iter().map(|x| x * x).sum::<f64>().sqrt() + 1.96 / 3f64.sqrt() * sd
+/// What a model leaves of the seen displacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Left {
+    /// Noise and discrepancy.
+    pub unexplained: Unexplained,
+    /// Standard deviation of the noise as it was stated, mm.
+    pub stated_noise_mm: f64,
+    /// Size of the rigid remainder over the places, mm.
+    pub rigid_mm: f64,
+    /// Places that were looked at.
+    pub places: usize,
+}
+
+/// The model's displacement with the most probable remainder and discrepancy added. `model_sd_mm`: of every node, from the
+/// posterior. `None` of a process is a spread of the model's own.
+pub fn fused(
+    nodes_mm: &[[f64; 3]],
+    model_mm: &[[f64; 3]],
+    model_sd_mm: &[f64],
+    seen: &[MovedNode],
+    errors: &CorrelatedErrors,
+) -> Fused {
+    let Some(rest) = Rest::of(nodes_mm, model_mm, seen, errors) else {
+        let sd = model_sd_mm.to_vec();
+        return Fused { displacement_mm: model_mm.to_vec(), sd_mm: sd.clone(), model_sd_mm: sd, left: None };
     };
-    let reach95_mm = displacement_mm.iter().zip(&sd_mm).map(reach).collect();
-    Fused { displacement_mm, sd_mm, reach95_mm, process, conditioned_on: residuals.len() }
+    let Unexplained { noise, discrepancy } = rest.left.unexplained;
+    let (moved, variance_mm2): (Vec<[f64; 3]>, Vec<f64>) =
+        nodes_mm.par_chunks(NODES_AT_ONCE).flat_map_iter(|points| rest.at(points)).unzip();
+    let displacement_mm = model_mm.iter().zip(&moved).map(|(u, d)| [0, 1, 2].map(|a| u[a] + d[a])).collect();
+    // Whether noise or model is at fault for what is left like noise, nobody can tell: it is the model's spread too.
+    let noise_mm2 = 3.0 * noise.sd_mm.powi(2);
+    let with = |more_mm2: f64| move |model: &f64| (model * model + more_mm2).sqrt();
+    let alone_mm2 = noise_mm2 + 3.0 * discrepancy.sd_mm.powi(2) + rest.left.rigid_mm.powi(2);
+    Fused {
+        displacement_mm,
+        sd_mm: model_sd_mm.iter().zip(variance_mm2).map(|(model, v)| with(noise_mm2 + v)(model)).collect(),
+        model_sd_mm: model_sd_mm.iter().map(with(alone_mm2)).collect(),
+        left: Some(rest.left),
+    }
 }
 
-/// One node of each cell of a grid, the one with the least noise (the first of equals); cells as small as the number of
-/// nodes allows.
-fn thinned(nodes_mm: &[[f64; 3]], seen: &[SeenNode]) -> Vec<SeenNode> {
-    let mut few = Vec::new();
-    for cell_mm in CELLS_MM {
-        let mut cells: BTreeMap<[i64; 3], SeenNode> = BTreeMap::new();
-        for s in seen {
-            let cell = nodes_mm[s.node as usize].map(|x| (x / cell_mm).floor() as i64);
-            let kept = cells.entry(cell).or_insert(*s);
-            if s.noise_mm < kept.noise_mm {
-                *kept = *s;
-            }
+/// What is left, conditioned on what was seen.
+struct Rest {
+    left: Left,
+    places_mm: Vec<[f64; 3]>,
+    factor: Factor,
+    rigid: RigidModes,
+    /// Amounts of the rigid movements, and their covariance.
+    amounts: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Inverse covariance of the places times what remains without the rigid movements, and times those.
+    weights: DMatrix<f64>,
+    weights_of_rigid: DMatrix<f64>,
+}
+
+impl Rest {
+    /// `None` where too little was seen.
+    fn of(nodes_mm: &[[f64; 3]], model_mm: &[[f64; 3]], seen: &[MovedNode], errors: &CorrelatedErrors) -> Option<Self> {
+        let positions: Vec<[f64; 3]> = seen.iter().map(|(n, _)| nodes_mm[*n as usize]).collect();
+        let chosen = spread_out(&positions, errors.places);
+        let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
+        if places_mm.len() < 10 {
+            return None;
         }
-        few = cells.into_values().collect();
-        if few.len() <= MOST {
-            break;
-        }
+        let left_mm = DVector::from_fn(3 * places_mm.len(), |row, _| {
+            let (node, u) = seen[chosen[row / 3]];
+            u[row % 3] - model_mm[node as usize][row % 3]
+        });
+        let rigid = RigidModes::new(&places_mm, errors.rigid_mm);
+        let precision = rigid.precision();
+        let minus = -&left_mm;
+        let linear = LinearModel {
+            places_mm: &places_mm,
+            residuals_mm: &minus,
+            jacobian_mm: &rigid.columns_mm,
+            away: DVector::zeros(precision.nrows()),
+            precision: precision.clone(),
+        };
+        let (wrong, exact) = (linear.with_discrepancy(errors.noise)?, linear.with_noise_alone(errors.noise)?);
+        // A discrepancy that is not needed is none.
+        let unexplained = if wrong.log_evidence > exact.log_evidence { wrong.unexplained } else { exact.unexplained };
+        let factor = unexplained.factor(&places_mm)?;
+        let weights_of_rigid = factor.solve(&rigid.columns_mm);
+        let covariance = (rigid.columns_mm.transpose() * &weights_of_rigid + precision).try_inverse()?;
+        let amounts = &covariance * (weights_of_rigid.transpose() * &left_mm);
+        let moved = &rigid.columns_mm * &amounts;
+        let remains = &left_mm - &moved;
+        let weights = factor.solve(&DMatrix::from_column_slice(remains.len(), 1, remains.as_slice()));
+        let left = Left {
+            unexplained,
+            stated_noise_mm: errors.noise.sd_mm,
+            rigid_mm: (moved.norm_squared() / places_mm.len() as f64).sqrt(),
+            places: places_mm.len(),
+        };
+        Some(Self { left, places_mm, factor, rigid, amounts, covariance, weights, weights_of_rigid })
     }
-    few.truncate(MOST);
-    few
+
+    /// Remainder and discrepancy at some points (mm), and the sum of their three variances (mm2).
+    fn at(&self, points_mm: &[[f64; 3]]) -> Vec<([f64; 3], f64)> {
+        let process = self.left.unexplained.discrepancy;
+        let count = self.places_mm.len();
+        // A process of no size is known to be nothing everywhere.
+        let shared = |place: usize, point: usize| {
+            let squared = |a: usize| (self.places_mm[place][a] - points_mm[point][a]).powi(2);
+            process.covariance_mm2((squared(0) + squared(1) + squared(2)).sqrt())
+        };
+        let there = process.sd_mm > 0.0;
+        let shared = if there { DMatrix::from_fn(count, points_mm.len(), shared) } else { DMatrix::zeros(0, 0) };
+        let known = if there {
+            self.factor.known_mm2(points_mm.len(), |place, point| shared[(place, point)])
+        } else {
+            vec![0.0; points_mm.len()]
+        };
+        let point = |p: usize| {
+            let mut basis = self.rigid.at(points_mm[p]);
+            let mut mean = basis * &self.amounts;
+            if there {
+                for (place, k) in shared.column(p).iter().enumerate() {
+                    for a in 0..3 {
+                        mean[a] += k * self.weights[(3 * place + a, 0)];
+                        for column in 0..basis.ncols() {
+                            basis[(a, column)] -= k * self.weights_of_rigid[(3 * place + a, column)];
+                        }
+                    }
+                }
+            }
+            let of_rigid = (basis * &self.covariance * basis.transpose()).trace();
+            let of_process = 3.0 * (process.sd_mm.powi(2) - known[p]).max(0.0);
+            (mean.into(), of_rigid + of_process)
+        };
+        (0..points_mm.len()).map(point).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::estimate::Process;
     use crate::experiment::phantom::block;
+    use crate::material::random::CounterRng;
+
+    const ERRORS: CorrelatedErrors =
+        CorrelatedErrors { noise: Process { sd_mm: 0.05, length_mm: 10.0 }, rigid_mm: 0.1, places: 300 };
+
+    fn every_fourth(u: &[[f64; 3]]) -> Vec<MovedNode> {
+        (0..u.len()).step_by(4).map(|n| (n as u32, u[n])).collect()
+    }
+
+    fn rms(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+        let squares = a.iter().zip(b).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>());
+        (squares.sum::<f64>() / a.len() as f64).sqrt()
+    }
 
     /// A model that moves half as far as the tissue, seen at every fourth node.
     #[test]
@@ -96,39 +189,75 @@ mod tests {
         let nodes = mesh.nodes_mm();
         let truth: Vec<[f64; 3]> = nodes.iter().map(|x| [0.0, 0.02 * x[1], -3.0 + 0.03 * x[2]]).collect();
         let model: Vec<[f64; 3]> = truth.iter().map(|u| u.map(|x| 0.5 * x)).collect();
-        let seen: Vec<SeenNode> = (0..nodes.len())
-            .step_by(4)
-            .map(|n| SeenNode { node: n as u32, displacement_mm: truth[n], noise_mm: 0.05 })
-            .collect();
-        let found = fused(nodes, &model, &vec![0.1; nodes.len()], &seen);
-        let off = |u: &[[f64; 3]]| {
-            let squares = u.iter().zip(&truth).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>());
-            (squares.sum::<f64>() / nodes.len() as f64).sqrt()
-        };
-        assert!(off(&found.displacement_mm) < 0.1 * off(&model), "{} {}", off(&found.displacement_mm), off(&model));
-        assert!(found.conditioned_on <= MOST && found.process.is_some());
-        assert!(found.sd_mm.iter().all(|sd| *sd >= 0.1));
+        let found = fused(nodes, &model, &vec![0.1; nodes.len()], &every_fourth(&truth), &ERRORS);
+        let off = rms(&found.displacement_mm, &truth);
+        assert!(off < 0.1 * rms(&model, &truth), "{off} {}", rms(&model, &truth));
+        let left = found.left.unwrap();
+        assert!(left.places <= ERRORS.places && left.unexplained.discrepancy.sd_mm > 0.0);
+        assert!(found.sd_mm.iter().zip(&found.model_sd_mm).all(|(sd, alone)| *sd >= 0.1 && alone > sd));
     }
 
     #[test]
     fn a_model_that_explains_all_is_left_as_it_is() {
         let mesh = block(4);
         let u: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| [0.01 * x[2], 0.0, 1.0]).collect();
-        let seen: Vec<SeenNode> = u
-            .iter()
-            .enumerate()
-            .map(|(n, u)| SeenNode { node: n as u32, displacement_mm: *u, noise_mm: 0.1 })
-            .collect();
-        let sd = vec![0.2; u.len()];
-        let found = fused(mesh.nodes_mm(), &u, &sd, &seen);
-        assert!(found.process.is_none() && found.displacement_mm == u && found.sd_mm == sd);
+        let found = fused(mesh.nodes_mm(), &u, &vec![0.2; u.len()], &every_fourth(&u), &ERRORS);
+        assert!(found.displacement_mm == u && found.left.unwrap().unexplained.discrepancy.sd_mm == 0.0);
+        assert!(found.sd_mm.iter().all(|sd| (0.2..0.21).contains(sd)));
+    }
+
+    /// What the rigid registration has taken up, the field gives back: beside it, the two carry a point where it went.
+    #[test]
+    fn a_remainder_of_the_rigid_registration_belongs_to_the_field() {
+        let mesh = block(6);
+        let model: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| [0.01 * x[2], 0.0, 1.0]).collect();
+        let turned = |x: &[f64; 3], u: &[f64; 3]| [u[0] + 0.06 - 1e-3 * x[1], u[1] + 1e-3 * x[0], u[2]];
+        let truth: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&model).map(|(x, u)| turned(x, u)).collect();
+        let found = fused(mesh.nodes_mm(), &model, &vec![0.0; model.len()], &every_fourth(&truth), &ERRORS);
+        let [after, before] = [rms(&found.displacement_mm, &truth), rms(&model, &truth)];
+        assert!(after < 0.2 * before && found.left.unwrap().rigid_mm > 0.5 * before, "{after} of {before}");
     }
 
     #[test]
     fn nothing_seen_leaves_the_model_alone() {
         let mesh = block(3);
         let u = vec![[1.0, 0.0, 0.0]; mesh.nodes_mm().len()];
-        let found = fused(mesh.nodes_mm(), &u, &vec![0.0; u.len()], &[]);
-        assert!(found.displacement_mm == u && found.conditioned_on == 0);
+        let found = fused(mesh.nodes_mm(), &u, &vec![0.3; u.len()], &[], &ERRORS);
+        assert!(found.displacement_mm == u && found.sd_mm == found.model_sd_mm && found.left.is_none());
+    }
+
+    /// A smooth discrepancy of random waves under smooth noise: nineteen of twenty places lie in their reach.
+    #[test]
+    fn the_spread_covers_the_error() {
+        let mesh = block(8);
+        let nodes = mesh.nodes_mm();
+        let model = vec![[0.0, 0.0, -1.0]; nodes.len()];
+        // A sum of waves of random direction, of this size and length.
+        let waves = |stream: u64, size: f64, length: f64, x: &[f64; 3], a: usize| {
+            let rng = CounterRng::new(21, stream + 100 * a as u64);
+            let wave = |k: u64| {
+                let direction = [0, 1, 2].map(|b| rng.between(10 * k + b, -1.0, 1.0));
+                let along: f64 = (0..3).map(|b| direction[b] * x[b]).sum();
+                (along / length + rng.between(10 * k + 5, 0.0, std::f64::consts::TAU)).cos()
+            };
+            size * (2.0 / 24.0f64).sqrt() * (0..24).map(wave).sum::<f64>()
+        };
+        let (mut inside, mut all) = (0, 0);
+        for stream in 0..8 {
+            let add = |u: &[[f64; 3]], stream: u64, size: f64, length: f64| -> Vec<[f64; 3]> {
+                let of = |(x, u): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|a| u[a] + waves(stream, size, length, x, a));
+                nodes.iter().zip(u).map(of).collect()
+            };
+            let truth = add(&model, 2 * stream, 0.4, 30.0);
+            let seen = every_fourth(&add(&truth, 2 * stream + 1, 0.05, 8.0));
+            let found = fused(nodes, &model, &vec![0.0; nodes.len()], &seen, &ERRORS);
+            for (n, u) in found.displacement_mm.iter().enumerate() {
+                let reach = 1.96 * found.sd_mm[n] / 3f64.sqrt();
+                inside += (0..3).filter(|&a| (u[a] - truth[n][a]).abs() < reach).count();
+                all += 3;
+            }
+        }
+        let share = f64::from(inside as u32) / f64::from(all);
+        assert!(share > 0.9, "{share}");
     }
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// Newton steps before a voxel is given up.
 const STEPS: usize = 40;
 /// How near the point carried back must come to the one it started from, in voxels.
-const NEAR: f64 = 1e-5;
+const NEAR: f64 = 1e-4;
 
 /// The inverse on the same grid: `y + inverse(y) = x` where `x + field(x) = y`, by Newton's method on the field as it is
 /// read, linear between voxels. Where no point of the grid is carried to a voxel, the field is continued with its value

@@ -32,11 +32,13 @@ pub fn mended<F: Frame>(mut field: Volume<[f32; 3], F>, least: f64) -> Mended<F>
     let stride = [1, dims[0], dims[0] * dims[1]];
     let slope = slope(&field);
     let mut changed = vec![false; field.data.len()];
+    // After the first round only cells with a corner that has changed can have changed.
+    let mut looked_at: Vec<u32> = (0..cells(dims) as u32).collect();
     for round in 0..ROUNDS {
-        let folded: Vec<u32> = (0..cells(dims))
-            .into_par_iter()
-            .filter(|&c| lowest(&field, &slope, c) < least)
-            .map(|c| first_of(dims, c) as u32)
+        let folded: Vec<u32> = looked_at
+            .par_iter()
+            .filter(|&&c| lowest(&field, &slope, c as usize) < least)
+            .map(|&c| first_of(dims, c as usize) as u32)
             .collect();
         if folded.is_empty() {
             break;
@@ -75,6 +77,9 @@ pub fn mended<F: Frame>(mut field: Volume<[f32; 3], F>, least: f64) -> Mended<F>
             field.data[n as usize] = value;
             changed[n as usize] = true;
         }
+        looked_at = around.iter().flat_map(|&n| cells_at(dims, n as usize)).collect();
+        looked_at.sort_unstable();
+        looked_at.dedup();
     }
     let jacobian_min = jacobian_min(&field);
     Mended { field, changed, jacobian_min }
@@ -82,6 +87,15 @@ pub fn mended<F: Frame>(mut field: Volume<[f32; 3], F>, least: f64) -> Mended<F>
 
 fn cells(dims: [usize; 3]) -> usize {
     dims.iter().map(|n| n.saturating_sub(1)).product()
+}
+
+/// The cells that a voxel is a corner of.
+fn cells_at(dims: [usize; 3], n: usize) -> impl Iterator<Item = u32> {
+    let v = [n % dims[0], n / dims[0] % dims[1], n / (dims[0] * dims[1])];
+    (0..8usize).filter_map(move |c| {
+        let at = |a: usize| v[a].checked_sub(c >> a & 1).filter(|&x| x + 1 < dims[a]);
+        Some((at(0)? + (dims[0] - 1) * (at(1)? + (dims[1] - 1) * at(2)?)) as u32)
+    })
 }
 
 /// The voxel that a cell begins at.
@@ -130,6 +144,21 @@ mod tests {
         assert!((jacobian_min(&field) - 1.1 * 0.8 * 1.3).abs() < 1e-5);
         let mended = mended(field.clone(), 0.1);
         assert!(mended.field == field && !mended.changed.contains(&true), "what does not fold is left alone");
+    }
+
+    #[test]
+    fn a_voxel_is_a_corner_of_the_cells_that_begin_at_most_one_before_it() {
+        let dims = [4, 3, 5];
+        for n in 0..60 {
+            let corner = |c: usize| {
+                let first = first_of(dims, c);
+                (0..8).any(|k| first + (k & 1) + 4 * (k >> 1 & 1) + 12 * (k >> 2 & 1) == n)
+            };
+            let expected: Vec<u32> = (0..cells(dims)).filter(|&c| corner(c)).map(|c| c as u32).collect();
+            let mut found: Vec<u32> = cells_at(dims, n).collect();
+            found.sort_unstable();
+            assert_eq!(found, expected, "voxel {n}");
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! The brain shift in numbers, as `sim/brain_shift.json` keeps it.
 
 use super::explained::Explained;
-use super::process::Process;
+use super::fused::Left;
 use super::shift::ShiftField;
+use crate::experiment::estimate::Unexplained;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,12 +50,14 @@ pub struct StateShift {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Discrepancy {
-    /// Standard deviation of one component, mm.
+    /// Standard deviation of one component, mm; 0 where noise and remainder explain what is left.
     pub size_mm: f64,
     /// Length over which it changes, mm.
     pub length_mm: f64,
-    /// Factor on the noise that was stated.
+    /// Size of what looks like the registration's noise, as a factor on the noise that was stated.
     pub noise_factor: f64,
+    /// Size of what looks like a remainder of the rigid registration, mm.
+    pub rigid_mm: f64,
     /// Nodes it is conditioned on.
     pub nodes: usize,
 }
@@ -81,10 +84,16 @@ impl StateShift {
 }
 
 impl Discrepancy {
-    /// The numbers of a process.
-    pub fn of(process: &Process, nodes: usize) -> Self {
-        let Process { size_mm, length_mm, noise_factor, .. } = *process;
-        Self { size_mm: rounded(size_mm), length_mm, noise_factor, nodes }
+    /// The numbers of what is left.
+    pub fn of(left: &Left) -> Self {
+        let Unexplained { noise, discrepancy } = left.unexplained;
+        Self {
+            size_mm: rounded(discrepancy.sd_mm),
+            length_mm: rounded(discrepancy.length_mm),
+            noise_factor: rounded(noise.sd_mm / left.stated_noise_mm),
+            rigid_mm: rounded(left.rigid_mm),
+            nodes: left.places,
+        }
     }
 }
 

@@ -68,7 +68,7 @@ impl PredictSettings {
         }
         if own.csf.is_none() {
             let density = Unknown::Density.prior(own.density_kg_per_m3.ln(), self.density_log_sd);
-            add(Unknown::Density, density, Cause::Load);
+            add(Unknown::Density, prior.learnt(density), Cause::Load);
         }
         for turn in [Turn::Nodding, Turn::Rolling] {
             let unknown = Unknown::GravityTurn(turn);
@@ -112,7 +112,15 @@ fn rounded(x: f64) -> f64 {
 }
 
 /// What was assumed, a sentence each.
-pub fn assumptions(settings: &PredictSettings, own: &ResectionSettings, supports: &[SupportWeight]) -> Vec<String> {
+pub fn assumptions(
+    settings: &PredictSettings,
+    (own, prior): (&ResectionSettings, &PriorSettings),
+    supports: &[SupportWeight],
+) -> Vec<String> {
+    let stiffness = match prior.patients() {
+        None => "what published studies of brain tissue found".to_owned(),
+        Some(patients) => format!("what the scans of {patients} patients of a cohort have shown"),
+    };
     let mut said = vec![
         "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
@@ -128,7 +136,7 @@ pub fn assumptions(settings: &PredictSettings, own: &ResectionSettings, supports
             ),
         },
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
-        "How stiff this brain is, is not known: it is drawn from what published studies of brain tissue found.".to_owned(),
+        format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
     let words = supports.iter().map(|s| {
         let what = if s.supports == "sliding" { "slides on the skull" } else { "is held at its base and at the falx" };

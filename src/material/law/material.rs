@@ -62,6 +62,20 @@ impl Material {
         Self { law, values, poisson_ratio, compression_resistance_pa: 0.0, inversion_threshold: 0.0 }
     }
 
+    /// The same with another Poisson's ratio.
+    #[must_use]
+    pub fn with_poisson_ratio(self, poisson_ratio: f64) -> Self {
+        Self { poisson_ratio, ..self }
+    }
+
+    /// The same with its energy continued below this volume ratio, so that inverted elements can recover; a law that is
+    /// finite at every ratio, and one that is continued already, stay as they are.
+    #[must_use]
+    pub fn continued_below(self, volume_ratio: f64) -> Self {
+        let needed = self.law.card().continued && self.inversion_threshold == 0.0;
+        Self { inversion_threshold: if needed { volume_ratio } else { self.inversion_threshold }, ..self }
+    }
+
     /// The paper's law.
     pub fn neo_hookean(shear_modulus_pa: f64, poisson_ratio: f64) -> Self {
         Self::new(&super::neo_hookean::Definition, vec![shear_modulus_pa], poisson_ratio)

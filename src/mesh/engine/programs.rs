@@ -28,11 +28,6 @@ impl EnginePrograms {
         engine.mesher().program().is_none() || self.place(engine).is_some()
     }
 
-    /// The engine that is used when none is named: the first of the list that can run.
-    pub fn preferred(&self) -> Engine {
-        Engine::all().find(|engine| self.has(*engine)).unwrap_or(Engine::LATTICE)
-    }
-
     /// The engine's program; `None` for an engine of our own.
     ///
     /// # Errors
@@ -55,9 +50,8 @@ mod tests {
         let programs = EnginePrograms::of(|name| (name == "gmsh").then(|| PathBuf::from("bin/gmsh")));
         assert_eq!(programs.place(Engine::GMSH), Some(Path::new("bin/gmsh")));
         assert!(programs.has(Engine::GMSH) && programs.has(Engine::LATTICE) && !programs.has(Engine::TETGEN));
-        assert_eq!(programs.preferred(), Engine::LATTICE);
         assert!(matches!(programs.check(Engine::CGAL), Err(EngineError::Missing { engine: "cgal", .. })));
         let all = EnginePrograms::of(|name| Some(PathBuf::from(name)));
-        assert_eq!((all.preferred(), all.check(Engine::LATTICE).unwrap()), (Engine::CGAL, None));
+        assert_eq!(all.check(Engine::LATTICE).unwrap(), None);
     }
 }

@@ -35,7 +35,8 @@ pub struct MidplaneSplit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSettings {
-    /// The engine, by its name; where none is named the first that can run (`hgm doctor` tells which can).
+    /// The engine, by its name. The default is part of the program: an answer does not depend on what is installed (`hgm doctor`
+    /// tells which others can run).
     #[schemars(with = "String")]
     pub engine: Engine,
     /// How fine.

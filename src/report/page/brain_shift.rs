@@ -20,8 +20,13 @@ pub fn section(shift: &BrainShift, figure: Option<Markup>, landmarks: Option<&Ev
         (table("Displacement of the tissue that is left", &head, &rows))
         @if let Some(d) = &shift.discrepancy {
             p {
-                "What the model leaves varies by " (number(d.size_mm, 2)) " mm over " (number(d.length_mm, 2))
-                " mm (a Gaussian process over " (d.nodes) " nodes); the state " code { "fused" } " puts it right."
+                @if d.size_mm > 0.0 {
+                    "What the model leaves varies by " (number(d.size_mm, 2)) " mm over " (number(d.length_mm, 2)) " mm"
+                } @else {
+                    "What the model leaves is no more than the registration's errors"
+                }
+                " (" (d.nodes) " places), beside a remainder of the rigid registration of " (number(d.rigid_mm, 2))
+                " mm; the state " code { "fused" } " puts the model right by both."
             } "\n"
         }
         @if let Some(found) = landmarks { (of_landmarks(found)) }

@@ -1,7 +1,7 @@
 //! The page of a cohort.
 
 use super::super::change_chart::{Change, ChangeChart, ChangePanel, Middle};
-use super::super::cohort::{Cohort, Row, Status};
+use super::super::cohort::{Cohort, Pupil, Row, Status};
 use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
 use super::results::{figures, set_name};
@@ -25,6 +25,7 @@ impl Cohort {
             ("errors", "What deformation explains", self.errors_section()),
             ("samples", "Samples over the subjects", self.samples_section()),
             ("figures", "Figures", Some(self.figures_section())),
+            ("population", "What the cohort says of people", self.population_section()),
         ];
         let sections: Vec<Section> =
             bodies.into_iter().filter_map(|(id, heading, body)| Some(Section { id, heading, body: body? })).collect();
@@ -32,6 +33,33 @@ impl Cohort {
         let scripts = html! { script { "\n" (PreEscaped(SCRIPT)) } "\n" };
         let above = html! { @if !first.is_empty() { (notice("warn", "Look here first", &first)) } };
         frame.html(&above, &sections, "The page makes no request to any other place.", &scripts)
+    }
+
+    /// The population with every patient who teaches: what the others say of people draws a figure towards them.
+    fn population_section(&self) -> Option<Markup> {
+        let population = self.population.as_ref()?;
+        let row = |pupil: &Pupil| {
+            html! {
+                @for own in &pupil.shrunken {
+                    tr {
+                        th scope="row" { (pupil.participant_id) }
+                        td { (own.name) }
+                        td { (number(own.value, 3)) " (" (number(own.interval_95[0], 3)) " to " (number(own.interval_95[1], 3)) ")" }
+                    }
+                }
+            }
+        };
+        Some(html! {
+            @for sentence in population.sentences() { p { (sentence) "." } }
+            @if !population.subjects.is_empty() {
+                (sortable(
+                    "Each patient with what the others say (95 % interval)",
+                    &["subject", "parameter", "value"].map(str::to_owned),
+                    &html! { @for pupil in &population.subjects { (row(pupil)) } },
+                    &html! {},
+                ))
+            }
+        })
     }
 
     /// Who did not end well, and who lies apart in what.

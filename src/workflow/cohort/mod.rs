@@ -1,8 +1,10 @@
 //! A cohort: the subjects of a BIDS data set, each as one case, and all of them together.
 
 mod dataset;
+mod population;
 
 pub use dataset::{Dataset, DatasetError, ScanPair};
+pub use population::{Learnt, POPULATION, learn, merge_populations, population_prior, read_population};
 
 use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError, run_to};
 use crate::artefact::{WriteError, sha256_hex, write_whole};

@@ -23,6 +23,7 @@ use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
 use crate::experiment::outcome::{Answer, OutcomeError};
+use crate::experiment::population::{MergeError, PopulationFileError, TooMany};
 use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
@@ -139,6 +140,12 @@ pub enum WorkflowError {
     Predict(#[from] PredictError),
     #[error(transparent)]
     Landmark(#[from] LandmarkError),
+    #[error(transparent)]
+    Population(#[from] PopulationFileError),
+    #[error(transparent)]
+    Merge(#[from] MergeError),
+    #[error("population: {0}")]
+    TooMany(#[from] TooMany),
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
     #[error(transparent)]

@@ -41,7 +41,10 @@ pub(crate) fn compare(
                     let of = if *count == 1 { "brain" } else { "grey and white matter" };
                     let name = format!("{}, {} {of}", body.name(), law.name());
                     work.tell(|p| p.doing(&name));
-                    match bodies.solved(work, input, n, tissues, &PriorSettings { law, ..prior.clone() }) {
+                    // A population is of one law: models are held against each other under the literature's priors.
+                    let prior = PriorSettings { law, population: None, ..prior.clone() };
+                    let rough = bodies.roughly(work, input, n, tissues, &prior)?;
+                    match bodies.solved(work, input, n, tissues, &prior, rough) {
                         Ok(found) => models.push((name, found.outcome)),
                         // A model that has no equilibrium explains nothing; the others are still compared.
                         Err(error) => warnings.push(format!("{name}: left out: {error}")),

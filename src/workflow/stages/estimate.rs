@@ -4,8 +4,8 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown, moved_by,
-    solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown,
+    moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
@@ -26,10 +26,17 @@ use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
+/// Logarithm of the odds from which supports are left to the coarse mesh: no mesh and no error of a registration makes up for
+/// so much, and an answer takes odds of [`STRONG`].
+const FAR_BEHIND: f64 = 100.0;
+/// Array of a state: what the images showed of a node, the registration's own error taken out, mm; zero elsewhere.
+pub(super) const SEEN_DISPLACEMENT: &str = "seen_displacement";
+/// Array of a state: the nodes that the estimate was held against.
+pub(super) const SEEN_AT: &str = "seen";
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
 
@@ -175,17 +182,33 @@ pub(crate) fn estimate(
         let bodies = Bodies::of(work, input)?;
         work.tell(|p| p.begin("estimate", bodies.list.len()));
         let (mut models, mut warnings, mut refused) = (Vec::new(), Vec::new(), None);
-        for (n, body) in bodies.list.iter().enumerate() {
-            match bodies.solved(work, input, n, input.tissues, &work.settings.prior) {
-                Ok(found) => models.push((body.name(), found)),
-                // Supports without an equilibrium explain nothing; the others are still tried.
-                Err(error) => {
-                    warnings.push(format!("{}: left out: {error}", body.name()));
-                    refused.get_or_insert(error);
+        let prior = &work.settings.prior;
+        let rough = (0..bodies.list.len()).map(|n| bodies.roughly(work, input, n, input.tissues, prior));
+        let rough: Vec<Option<Estimate>> = rough.collect::<Result<_, _>>()?;
+        let behind = far_behind(&rough);
+        let (late, near): (Vec<usize>, Vec<usize>) = (0..bodies.list.len()).partition(|&n| behind[n].is_some());
+        let mut left = Vec::new();
+        for (far, numbers) in [(false, near), (true, late)] {
+            for n in numbers {
+                let name = bodies.list[n].name();
+                match (&rough[n], behind[n]) {
+                    // Where nothing near has an equilibrium, what is far behind is solved after all.
+                    (Some(rough), Some(behind)) if far && !models.is_empty() => {
+                        left.push((format!("{name} (coarse mesh)"), rough.clone(), behind));
+                    }
+                    _ => match bodies.solved(work, input, n, input.tissues, prior, rough[n].clone()) {
+                        Ok(found) => models.push((name, found)),
+                        // Supports without an equilibrium explain nothing; the others are still tried.
+                        Err(error) => {
+                            warnings.push(format!("{name}: left out: {error}"));
+                            refused.get_or_insert(error);
+                        }
+                    },
                 }
+                work.tell(|p| p.step());
             }
-            work.tell(|p| p.step());
         }
+        models.extend(beside(&models, left));
         work.tell(|p| p.end());
         let found = match (models.len(), refused) {
             (0, Some(error)) => return Err(error),
@@ -193,12 +216,40 @@ pub(crate) fn estimate(
             (1, None) => (models.remove(0), None),
             _ => chosen(models),
         };
+        let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
+        let found = Estimate { outcome: EstimateOutcome { taught_by, ..found.outcome }, ..found };
         let mut produced = produced(body, input, found, comparison)?;
         produced.warnings.extend(warnings);
         Ok(produced)
     })
+}
+
+/// How far (logarithm of the odds) an estimate on the coarse mesh lies behind the best one there, of those that need no other:
+/// [`FAR_BEHIND`] or more, and both at their minimum.
+fn far_behind(rough: &[Option<Estimate>]) -> Vec<Option<f64>> {
+    let evidence = |found: &Option<Estimate>| {
+        let outcome = &found.as_ref()?.outcome;
+        outcome.convergence.at_minimum().then(|| outcome.odds.map(|odds| odds.log_evidence)).flatten()
+    };
+    let logs: Vec<Option<f64>> = rough.iter().map(evidence).collect();
+    let best = logs.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    logs.into_iter().map(|log| log.map(|log| best - log).filter(|behind| *behind >= FAR_BEHIND)).collect()
+}
+
+/// What was left to the coarse mesh, as far behind the best model as it was there.
+fn beside(models: &[(String, Estimate)], left_behind: Vec<(String, Estimate, f64)>) -> Vec<(String, Estimate)> {
+    let evidence = |(_, found): &(String, Estimate)| found.outcome.odds.map(|odds| odds.log_evidence);
+    let best = models.iter().filter_map(evidence).fold(f64::NEG_INFINITY, f64::max);
+    let placed = |(name, mut found, behind): (String, Estimate, f64)| {
+        if let Some(odds) = &mut found.outcome.odds {
+            odds.log_evidence = best - behind;
+        }
+        (name, found)
+    };
+    // Where the others have no equilibrium on the fine mesh, there is nothing to stand beside.
+    left_behind.into_iter().filter(|_| best.is_finite()).map(placed).collect()
 }
 
 /// The most probable model with the verdict over all of them.
@@ -247,7 +298,76 @@ impl Bodies {
         Ok(Self { list, deep, coarser })
     }
 
-    /// The estimate of one of them under a prior.
+    /// What is estimated of one of them, and its scenario.
+    fn posed(
+        &self,
+        work: &Work<'_>,
+        number: usize,
+        tissues: &[Tissue],
+        prior: &PriorSettings,
+    ) -> Result<(Vec<(Unknown, LogPrior)>, Scenario), WorkflowError> {
+        let options = &work.settings.estimate;
+        let body = &self.list[number];
+        let mut unknowns = Vec::new();
+        for tissue in tissues {
+            unknowns.extend(law_priors(tissue, prior)?);
+        }
+        let loads = options.unknown_loads(&body.scenario.loads);
+        unknowns.extend(loads.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))));
+        unknowns.extend(body.unknown_room());
+        let mut scenario = body.scenario.clone();
+        if matches!(body.reference, Reference::Surfaces(_)) {
+            scenario.solver.element = options.element;
+        }
+        Ok((unknowns, scenario))
+    }
+
+    /// The coarser mesh as one of them is held.
+    fn coarser_of(&self, number: usize) -> Result<Option<TetMesh>, WorkflowError> {
+        let body = &self.list[number];
+        let supported = |coarse: &TetMesh| match &body.settings {
+            Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
+            None => Ok(coarse.clone()),
+        };
+        Ok(self.coarser.as_ref().map(supported).transpose()?)
+    }
+
+    /// The estimate of one of them on the coarse mesh, which knows nearly where to look in a fraction of the time; `None`
+    /// without that mesh, or where it finds none. The same places for every body.
+    pub fn roughly(
+        &self,
+        work: &Work<'_>,
+        input: &EstimateInput<'_>,
+        number: usize,
+        tissues: &[Tissue],
+        prior: &PriorSettings,
+    ) -> Result<Option<Estimate>, WorkflowError> {
+        let options = &work.settings.estimate;
+        let body = &self.list[number];
+        let (Some(bare), Some(coarse), Some(shift)) = (&self.coarser, self.coarser_of(number)?, input.shift) else {
+            return Ok(None);
+        };
+        let (unknowns, scenario) = self.posed(work, number, tissues, prior)?;
+        let (_, errors, noise_mm) = self.observation(body, input, options);
+        let nodes = options.displacement.observed(bare, |x| moved_by(&shift.seen, x));
+        let problem = Problem {
+            mesh: &coarse,
+            template: &scenario,
+            unknowns,
+            poisson_ratio: input.poisson_ratio,
+            observation: Observation::Nodes(nodes),
+            errors,
+            model_log_sd: 0.0,
+            coarser: None,
+            body_known: !matches!(body.reference, Reference::Surfaces(_)),
+            start: Vec::new(),
+            instrument: None,
+        };
+        let settings = EstimateSettings { noise_mm, decrement_tolerance: NEARLY, ..options.descent.clone() };
+        Ok(solve_problem(problem, &settings).ok())
+    }
+
+    /// The estimate of one of them under a prior, from where the coarse mesh has found it.
     pub fn solved(
         &self,
         work: &Work<'_>,
@@ -255,21 +375,13 @@ impl Bodies {
         number: usize,
         tissues: &[Tissue],
         prior: &PriorSettings,
+        rough: Option<Estimate>,
     ) -> Result<Estimate, WorkflowError> {
         let options = &work.settings.estimate;
         let body = &self.list[number];
         let mesh = &body.mesh;
-        let mut unknowns = Vec::new();
-        for tissue in tissues {
-            unknowns.extend(law_priors(tissue, prior)?);
-        }
-        unknowns.extend(options.unknown_loads(&body.scenario.loads));
-        unknowns.extend(body.unknown_room());
+        let (unknowns, scenario) = self.posed(work, number, tissues, prior)?;
         let patient = matches!(body.reference, Reference::Surfaces(_));
-        let mut scenario = body.scenario.clone();
-        if patient {
-            scenario.solver.element = options.element;
-        }
         let (observation, errors, noise_mm) = self.observation(body, input, options);
         let believed = &options.displacement;
         let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
@@ -279,30 +391,7 @@ impl Bodies {
                 Ok(self.deep.iter().map(|(n, x)| (*n, moved_by(&shown, *x))).collect())
             }
         });
-        let supported = |coarse: &TetMesh| match &body.settings {
-            Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
-            None => Ok(coarse.clone()),
-        };
-        let coarser = self.coarser.as_ref().map(supported).transpose()?;
-        // A coarse mesh knows nearly where to look, in a fraction of the time.
-        let start = coarser.as_ref().zip(input.shift).and_then(|(coarse, shift)| {
-            let nodes = options.displacement.observed(coarse, |x| moved_by(&shift.seen, x));
-            let problem = Problem {
-                mesh: coarse,
-                template: &scenario,
-                unknowns: unknowns.clone(),
-                poisson_ratio: input.poisson_ratio,
-                observation: Observation::Nodes(nodes),
-                errors: errors.clone(),
-                model_log_sd: 0.0,
-                coarser: None,
-                body_known: !patient,
-                start: Vec::new(),
-                instrument: None,
-            };
-            let settings = EstimateSettings { noise_mm, decrement_tolerance: NEARLY, ..options.descent.clone() };
-            solve_problem(problem, &settings).ok()
-        });
+        let coarser = self.coarser_of(number)?;
         let problem = Problem {
             mesh,
             template: &scenario,
@@ -313,7 +402,7 @@ impl Bodies {
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             coarser: coarser.as_ref(),
             body_known: !patient,
-            start: start.map_or_else(Vec::new, |found| found.numbers),
+            start: rough.map_or_else(Vec::new, |found| found.numbers),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
@@ -356,7 +445,7 @@ fn produced(
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
     let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
-    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, materials, numbers: _ } = found;
+    let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, seen, materials, numbers: _ } = found;
     let errors = body.reference.errors(mesh, &state.displacement_mm);
     let tissue = |t: &Tissue| {
         // The parameters are named after the tissue.
@@ -386,6 +475,11 @@ fn produced(
         file: Some(file.clone()),
     };
     let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
+    let mut seen_at = vec![0.0; mesh.nodes_mm().len()];
+    let mut seen_mm = vec![[0.0; 3]; mesh.nodes_mm().len()];
+    for (n, u) in seen {
+        (seen_at[n as usize], seen_mm[n as usize]) = (1.0, u);
+    }
     let points = [
         Field::vector("displacement", &state.displacement_mm),
         Field::vector("reaction_n", &state.reaction_n),
@@ -394,6 +488,8 @@ fn produced(
         Field::vector("displacement_mean", &state.displacement_mm),
         Field::scalar("displacement_sd", displacement_sd_mm),
         Field::scalar("displacement_95", displacement_95_mm),
+        Field::vector(SEEN_DISPLACEMENT, &seen_mm),
+        Field::scalar(SEEN_AT, seen_at),
     ];
     let cells = [
         Field::scalar("jacobian", state.jacobian),

@@ -1,6 +1,6 @@
 //! Stage `fields`: the brain shift as displacement fields of the scans, and the pre-operative images carried by it.
 
-use super::shift::{CaseShift, FUSED, OBSERVED};
+use super::shift::{Believed, CaseShift, FUSED, OBSERVED};
 use crate::artefact::{Manifest, Produced};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
 use crate::geometry::{Frame, Position, Pre};
@@ -18,7 +18,7 @@ use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Point3;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const NAME: StageName = StageName::Fields;
 
 /// What the fields are made from.
@@ -33,8 +33,9 @@ pub(crate) struct FieldsInput<'a> {
 /// Writes (or skips) the fields of every state that is asked for.
 pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) -> Result<BrainShift, WorkflowError> {
     let settings = &work.settings.fields;
-    let believed_mm = work.settings.estimate.displacement.depth_mm;
-    let posed = serde_json::json!({ "fields": settings, "model": input.model, "believed_mm": believed_mm });
+    let believed = Believed::of(work.settings);
+    let of_images = serde_json::json!({ "displacement": work.settings.estimate.displacement, "rigid_mm": believed.errors.rigid_mm });
+    let posed = serde_json::json!({ "fields": settings, "model": input.model, "believed": of_images });
     let mut stage = work.stage(made, &NAME, VERSION, &posed).frame(Pre::NAME);
     if let Some(estimate) = made.get(&StageName::Estimate) {
         stage = stage.after(estimate);
@@ -46,7 +47,7 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
             Some(StageName::Sample(id)) if !m.outputs.is_empty() => Some(id),
             _ => None,
         });
-        let case = CaseShift::read(&work.case, input.model.as_deref(), ids.collect(), (settings, believed_mm))?;
+        let case = CaseShift::read(&work.case, input.model.as_deref(), ids.collect(), (settings, believed.clone()))?;
         let mut produced = Produced::default();
         let mut shift = BrainShift {
             model: input.model.clone(),

@@ -37,6 +37,8 @@ pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,
     reference_stage,
 };
-pub(crate) use registration::{mni_from_gravity_frame, registration, registration_stage, transforms};
+pub(crate) use registration::{
+    mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
+};
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
-pub(crate) use shift::{CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
+pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};

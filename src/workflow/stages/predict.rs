@@ -29,7 +29,7 @@ use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Vector3;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -67,7 +67,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             plan: input.plan.clone(),
             threshold_mm: settings.predict.threshold_mm,
             draws: settings.predict.draws,
-            assumptions: assumptions(&settings.predict, &settings.resection, &supports),
+            assumptions: assumptions(&settings.predict, (&settings.resection, &settings.prior), &supports),
             supports,
             ..Prediction::default()
         };

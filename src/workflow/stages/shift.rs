@@ -1,10 +1,11 @@
 //! The brain shift of a case in any of its states, from what its folder holds.
 
+use super::estimate::{SEEN_AT, SEEN_DISPLACEMENT};
 use super::registration::transforms;
-use crate::experiment::estimate::moved_by;
+use crate::experiment::estimate::{CorrelatedErrors, MovedNode, moved_by};
 use crate::experiment::field::{
-    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, SeenNode, ShiftField, Surroundings, depth_mm,
-    explained, fused, shift_field,
+    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, depth_mm, explained,
+    fused, shift_field,
 };
 use crate::geometry::{Frame, Mni, Native, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
@@ -19,6 +20,7 @@ use crate::register::deformable::DisplacementField;
 use crate::segment::native::mask_on;
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
+use crate::workflow::settings::Settings;
 use std::cell::OnceCell;
 
 /// Name of the estimate's state.
@@ -44,7 +46,27 @@ struct Model {
     mesh: TetMesh,
     nodes: Nodes,
     depth_mm: Vec<f64>,
+    /// What the images showed of some nodes, the registration's own error taken out; empty where no estimate did that.
+    seen: Vec<MovedNode>,
     fused: OnceCell<Fused>,
+}
+
+/// How far what the images show is believed.
+#[derive(Clone, Debug)]
+pub(crate) struct Believed {
+    /// From this depth on, mm.
+    pub depth_mm: f64,
+    /// With these errors.
+    pub errors: CorrelatedErrors,
+}
+
+impl Believed {
+    /// As an estimate believes it.
+    pub fn of(settings: &Settings) -> Self {
+        let displacement = &settings.estimate.displacement;
+        let errors = displacement.errors(settings.resection.registration_error_mm);
+        Self { depth_mm: displacement.depth_mm, errors }
+    }
 }
 
 /// What every state of a case shares.
@@ -52,8 +74,7 @@ struct Model {
 pub(crate) struct CaseShift<'a> {
     case: &'a Case,
     settings: &'a FieldSettings,
-    /// From this depth on the images are believed, mm.
-    believed_mm: f64,
+    believed: Believed,
     pub post_from_pre: RigidTransform<Pre, Post>,
     pub mni_from_pre: RigidTransform<Pre, Mni>,
     /// Grid of the fields in the post-operative scan's frame.
@@ -101,7 +122,7 @@ impl<'a> CaseShift<'a> {
         case: &'a Case,
         model: Option<&str>,
         samples: Vec<String>,
-        (settings, believed_mm): (&'a FieldSettings, f64),
+        (settings, believed): (&'a FieldSettings, Believed),
     ) -> Result<Self, WorkflowError> {
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let pre_grid: Grid<Pre> = grid_of(case, PRE_NATIVE_BRAIN)?;
@@ -114,7 +135,7 @@ impl<'a> CaseShift<'a> {
         let mut shift = Self {
             case,
             settings,
-            believed_mm,
+            believed,
             post_from_pre: pre_from_post.inverse(),
             mni_from_pre,
             post_grid: spaced(grid_of(case, POST_NATIVE_BRAIN)?, settings.spacing_mm),
@@ -140,8 +161,18 @@ impl<'a> CaseShift<'a> {
             _ => self.spread_of_samples(&displacement_mm)?,
         };
         let depth_mm = depth_mm(&state.mesh);
+        let seen = match (scalar(SEEN_AT), vectors(SEEN_DISPLACEMENT)) {
+            (Some(at), Some(u)) => at
+                .iter()
+                .zip(&u)
+                .enumerate()
+                .filter(|(_, (at, _))| **at == 1.0)
+                .map(|(n, (_, u))| (n as u32, *u))
+                .collect(),
+            _ => Vec::new(),
+        };
         let nodes = Nodes { displacement_mm, sd_mm, reach95_mm };
-        Ok(Model { name: name.to_owned(), mesh: state.mesh, nodes, depth_mm, fused: OnceCell::new() })
+        Ok(Model { name: name.to_owned(), mesh: state.mesh, nodes, depth_mm, seen, fused: OnceCell::new() })
     }
 
     /// How far the samples of the sweep lie apart at every node, and the reach with it, mm.
@@ -167,7 +198,7 @@ impl<'a> CaseShift<'a> {
             ((squares / n - of_mean).max(0.0) * n / f64::max(n - 1.0, 1.0)).sqrt()
         };
         let sd: Vec<f64> = sums.iter().map(sd).collect();
-        let reach = mean.iter().zip(&sd).map(|(u, sd)| length(u) + 1.96 / 3f64.sqrt() * sd).collect();
+        let reach = reaches(mean, &sd);
         Ok((sd, reach))
     }
 
@@ -177,7 +208,12 @@ impl<'a> CaseShift<'a> {
             (OBSERVED, _) | (FUSED, None) => self.observed(),
             (FUSED, Some(model)) => {
                 let found = self.put_right(model);
-                Ok(self.field(&model.mesh, &found.displacement_mm, (&found.sd_mm, &found.reach95_mm), None))
+                Ok(self.field(
+                    &model.mesh,
+                    &found.displacement_mm,
+                    (&found.sd_mm, &reaches(&found.displacement_mm, &found.sd_mm)),
+                    None,
+                ))
             }
             (_, Some(model)) if model.name == name => Ok(self.of_model(model)),
             _ => {
@@ -189,7 +225,13 @@ impl<'a> CaseShift<'a> {
 
     fn of_model(&self, model: &Model) -> ShiftField {
         let Nodes { displacement_mm, sd_mm, reach95_mm } = &model.nodes;
-        self.field(&model.mesh, displacement_mm, (sd_mm, reach95_mm), None)
+        // The spread of moduli is not the error of a field: what the model leaves of the seen displacement counts too.
+        let found = self.put_right(model);
+        if found.left.is_none() {
+            return self.field(&model.mesh, displacement_mm, (sd_mm, reach95_mm), None);
+        }
+        let sd_mm = &found.model_sd_mm;
+        self.field(&model.mesh, displacement_mm, (sd_mm, &reaches(displacement_mm, sd_mm)), None)
     }
 
     fn observed(&self) -> Result<ShiftField, WorkflowError> {
@@ -202,8 +244,7 @@ impl<'a> CaseShift<'a> {
         };
         let displacement_mm: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| moved_by(&self.seen, *x)).collect();
         let sd_mm: Vec<f64> = depth.iter().map(|d| 3f64.sqrt() * self.settings.seen_noise_at(*d)).collect();
-        let reach95_mm: Vec<f64> =
-            displacement_mm.iter().zip(&sd_mm).map(|(u, sd)| length(u) + 1.96 / 3f64.sqrt() * sd).collect();
+        let reach95_mm = reaches(&displacement_mm, &sd_mm);
         let seen = &self.seen;
         Ok(self.field(mesh, &displacement_mm, (&sd_mm, &reach95_mm), Some(&|x| moved_by(seen, x))))
     }
@@ -219,21 +260,20 @@ impl<'a> CaseShift<'a> {
         shift_field(&state, seen, &self.mni_from_pre.inverse(), &self.around, self.settings)
     }
 
-    fn seen_nodes(&self, model: &Model) -> Vec<SeenNode> {
+    /// What the images show in the depth of the brain.
+    fn seen_nodes(&self, model: &Model) -> Vec<MovedNode> {
+        if !model.seen.is_empty() {
+            return model.seen.clone();
+        }
         let nodes = model.mesh.nodes_mm().iter().zip(&model.depth_mm).enumerate();
-        nodes
-            .map(|(n, (x, depth))| SeenNode {
-                node: n as u32,
-                displacement_mm: moved_by(&self.seen, *x),
-                noise_mm: self.settings.seen_noise_at(*depth),
-            })
-            .collect()
+        let deep = nodes.filter(|(_, (_, depth))| **depth >= self.believed.depth_mm);
+        deep.map(|(n, (x, _))| (n as u32, moved_by(&self.seen, *x))).collect()
     }
 
     /// The share of the seen shift that the model explains, in the depth of the brain.
     pub fn explained(&self) -> Option<Explained> {
         let model = self.model.as_ref()?;
-        let deep = (0..model.depth_mm.len()).filter(|&n| model.depth_mm[n] >= self.believed_mm);
+        let deep = (0..model.depth_mm.len()).filter(|&n| model.depth_mm[n] >= self.believed.depth_mm);
         Some(explained(deep.map(|n| {
             let x = model.mesh.nodes_mm()[n];
             let noise_mm = self.settings.seen_noise_at(model.depth_mm[n]);
@@ -244,14 +284,21 @@ impl<'a> CaseShift<'a> {
     /// The process over what the model leaves.
     pub fn discrepancy(&self) -> Option<Discrepancy> {
         let found = self.put_right(self.model.as_ref()?);
-        found.process.as_ref().map(|process| Discrepancy::of(process, found.conditioned_on))
+        found.left.as_ref().map(Discrepancy::of)
     }
 
     /// The model put right by what was seen.
     fn put_right<'m>(&self, model: &'m Model) -> &'m Fused {
         let Nodes { displacement_mm, sd_mm, .. } = &model.nodes;
-        model.fused.get_or_init(|| fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model)))
+        model.fused.get_or_init(|| {
+            fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model), &self.believed.errors)
+        })
     }
+}
+
+/// The 95 % reach of every node along its mean, of a spread that is alike in all directions, mm.
+fn reaches(displacement_mm: &[[f64; 3]], sd_mm: &[f64]) -> Vec<f64> {
+    displacement_mm.iter().zip(sd_mm).map(|(u, sd)| length(u) + 1.96 / 3f64.sqrt() * sd).collect()
 }
 
 fn length(u: &[f64; 3]) -> f64 {

@@ -1,0 +1,291 @@
+//! `population.toml`: what a cohort says of people, and the moments that it says so from.
+
+use super::hierarchy::{Inferred, MEAN_SD, Population, SPREAD_SCALE, TooMany};
+use super::learnt::{LearntPrior, PopulationPrior};
+use super::moments::Moments;
+use crate::material::meta_model::MetaModel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Raised when the keys change their meaning.
+const FORMAT: u32 = 1;
+/// Fewer patients than this are one study's worth, whatever their moduli: of a spread they say next to nothing.
+const LEAST_PATIENTS: usize = 5;
+/// A mean known no better than this share of the literature's own spread is one more study among the literature's.
+const LEAST_KNOWN: f64 = 0.5;
+
+/// A population, as its file has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PopulationFile {
+    /// Version of the keys.
+    pub format: u32,
+    /// The program that wrote it.
+    pub program: String,
+    /// The law that every patient was estimated with.
+    #[schemars(with = "String")]
+    pub law: MetaModel,
+    /// The effective density that every patient was estimated under, kg/m3.
+    pub density_kg_per_m3: f64,
+    /// Patients who teach.
+    pub patients: usize,
+    /// Patients who do not, by the reason.
+    #[serde(default)]
+    pub left_out: BTreeMap<String, usize>,
+    /// What they teach, in the order of the moments.
+    pub parameters: Vec<Taught>,
+    /// What the scans of each patient say, by value and without names.
+    pub moments: Vec<Moments>,
+}
+
+/// What a cohort says of one parameter; logarithms are natural, intervals 95 %.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Taught {
+    /// As estimates call it.
+    pub name: String,
+    /// Patients whose scans say something of it.
+    pub patients: usize,
+    /// Mean of the logarithm over people.
+    pub log_mean: f64,
+    /// Its interval.
+    pub log_mean_95: [f64; 2],
+    /// Standard deviation of the logarithm between people.
+    pub log_spread: f64,
+    /// Its interval.
+    pub log_spread_95: [f64; 2],
+    /// The median over people, in the unit of the name.
+    pub median: f64,
+    /// Its interval.
+    pub median_95: [f64; 2],
+    /// Mean of the next patient's logarithm.
+    pub next_log_mean: f64,
+    /// Its standard deviation: of people, and of what is not known of them.
+    pub next_log_sd: f64,
+    /// Where the next patient will lie, in the unit of the name.
+    pub next_95: [f64; 2],
+    /// Mean of the logarithm that the literature expects.
+    pub literature_log_mean: f64,
+    /// Its standard deviation.
+    pub literature_log_sd: f64,
+    /// Whether the next patient's prior is this one; else the cohort is one study's worth and the literature's prior stands.
+    pub moves_prior: bool,
+}
+
+/// Why a population's file is refused.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{file}: {reason}; make it with `hgm bids BIDS_DIR OUT group`")]
+pub struct PopulationFileError {
+    /// The file.
+    pub file: String,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+/// Why cohorts cannot be merged.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum MergeError {
+    #[error(
+        "{file}: its patients were estimated {its}, those of {first} {those}; moduli of both are not alike: merge cohorts of one kind"
+    )]
+    Otherwise { file: String, first: String, its: String, those: String },
+    #[error("{file}: {count} of its patients are in another file, too; merge each cohort once")]
+    Twice { file: String, count: usize },
+    #[error(
+        "{file}: `{name}` has another prior of the literature than in {first}; make both files with the same version of hgm"
+    )]
+    Literature { file: String, first: String, name: String },
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
+}
+
+/// What is known of a parameter before any patient: mean and standard deviation of its logarithm.
+pub type Literature = (f64, f64);
+
+impl PopulationFile {
+    /// From what the scans of each patient say of these parameters, each with what the literature expects of it.
+    ///
+    /// # Errors
+    /// [`TooMany`].
+    pub fn new(
+        (law, density_kg_per_m3): (MetaModel, f64),
+        parameters: &[(String, Literature)],
+        mut moments: Vec<Moments>,
+        left_out: BTreeMap<String, usize>,
+    ) -> Result<Self, TooMany> {
+        // The order of the files that they came from says nothing, and sums in one order give the same bytes.
+        moments.sort_by(Moments::by_value);
+        let names: Vec<String> = parameters.iter().map(|(name, _)| name.clone()).collect();
+        let found = Population::infer(&names, &moments)?;
+        let taught = |(n, (name, literature)): (usize, &(String, Literature))| {
+            let patients = moments.iter().filter(|m| m.tells_of(n)).count();
+            let [mean, spread, next]: [Inferred; 3] = [found.mean(n), found.spread(n), found.next(n)];
+            Taught {
+                name: name.clone(),
+                patients,
+                log_mean: mean.mean,
+                log_mean_95: mean.interval_95,
+                log_spread: spread.mean,
+                log_spread_95: spread.interval_95,
+                median: mean.mean.exp(),
+                median_95: mean.interval_95.map(f64::exp),
+                next_log_mean: next.mean,
+                next_log_sd: next.sd,
+                next_95: next.interval_95.map(f64::exp),
+                literature_log_mean: literature.0,
+                literature_log_sd: literature.1,
+                moves_prior: patients >= LEAST_PATIENTS && mean.sd <= LEAST_KNOWN * literature.1,
+            }
+        };
+        Ok(Self {
+            format: FORMAT,
+            program: concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned(),
+            law,
+            density_kg_per_m3,
+            patients: moments.len(),
+            left_out,
+            parameters: parameters.iter().enumerate().map(taught).collect(),
+            moments,
+        })
+    }
+
+    /// The population behind it, for its own patients.
+    ///
+    /// # Errors
+    /// [`TooMany`].
+    pub fn population(&self) -> Result<Population, TooMany> {
+        let names: Vec<String> = self.parameters.iter().map(|taught| taught.name.clone()).collect();
+        Population::infer(&names, &self.moments)
+    }
+
+    /// The prior of the next patient: the parameters that the cohort knows well enough.
+    pub fn prior(&self) -> PopulationPrior {
+        let learnt =
+            |t: &Taught| LearntPrior { name: t.name.clone(), log_mean: t.next_log_mean, log_sd: t.next_log_sd };
+        PopulationPrior {
+            law: self.law,
+            density_kg_per_m3: self.density_kg_per_m3,
+            patients: self.patients,
+            parameters: self.parameters.iter().filter(|taught| taught.moves_prior).map(learnt).collect(),
+        }
+    }
+
+    /// The file's text.
+    ///
+    /// # Panics
+    /// Never: the figures are plain data.
+    pub fn to_toml(&self) -> String {
+        let head = format!(
+            "# What a cohort says of people (hgm; Pa, kg/m3, natural logarithms, intervals of 95 %). `--population` of `hgm estimate`,\n\
+             # `hgm run --estimate` and `hgm predict` takes it; `hgm population merge` joins it with those of other cohorts.\n\
+             # It holds no name, no image and no date. Of each patient who teaches there is one Gaussian over the logarithms of the\n\
+             # parameters, in their order: what the scans alone say, the prior of the estimate divided out, by value. `precision` is the\n\
+             # inverse of its covariance, `information` that times its mean. All other figures follow from these.\n\
+             # A patient's logarithms are normal about the population's mean, independent between parameters. Priors: means normal about\n\
+             # ln 1000 (a density's: ln 100) with standard deviation {MEAN_SD}, spreads half normal of scale {SPREAD_SCALE}.\n\
+             # `moves_prior = false`: fewer than {LEAST_PATIENTS} patients, or a mean known no better than {LEAST_KNOWN} of the literature's\n\
+             # spread. That is one study's worth, and the literature's prior stands.\n\n"
+        );
+        head + &toml::to_string(self).expect("figures are plain data")
+    }
+
+    /// From a file's text.
+    ///
+    /// # Errors
+    /// [`PopulationFileError`] with the file and what is wrong.
+    pub fn from_toml(text: &str, file: &str) -> Result<Self, PopulationFileError> {
+        let refused = |reason: String| PopulationFileError { file: file.to_owned(), reason };
+        let read: Self = toml::from_str(text).map_err(|error| {
+            let line = crate::material::toml_text::line_of(&error, text);
+            refused(format!("line {line}: {}", error.message().trim().replace('\n', " ")))
+        })?;
+        read.check().map_err(refused)?;
+        Ok(read)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.format != FORMAT {
+            return Err(format!("`format` is {}, and this hgm reads {FORMAT}", self.format));
+        }
+        if self.patients != self.moments.len() {
+            return Err(format!("`patients` is {}, and there are {} `moments`", self.patients, self.moments.len()));
+        }
+        if self.parameters.is_empty() {
+            return Err("there are no `parameters`".to_owned());
+        }
+        if !(self.density_kg_per_m3 > 0.0 && self.density_kg_per_m3.is_finite()) {
+            return Err(format!("`density_kg_per_m3` is {}: it must be above 0", self.density_kg_per_m3));
+        }
+        for (n, taught) in self.parameters.iter().enumerate() {
+            let name = &taught.name;
+            if self.parameters[..n].iter().any(|earlier| earlier.name == *name) {
+                return Err(format!("`parameters` holds `{name}` twice"));
+            }
+            let above_zero = [
+                ("log_spread", taught.log_spread),
+                ("next_log_sd", taught.next_log_sd),
+                ("literature_log_sd", taught.literature_log_sd),
+            ];
+            if let Some((key, value)) = above_zero.into_iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+                return Err(format!("`{key}` of `{name}` is {value}: it must be above 0"));
+            }
+            let finite = [
+                ("log_mean", taught.log_mean),
+                ("next_log_mean", taught.next_log_mean),
+                ("literature_log_mean", taught.literature_log_mean),
+            ];
+            if let Some((key, value)) = finite.into_iter().find(|(_, v)| !v.is_finite()) {
+                return Err(format!("`{key}` of `{name}` is {value}: it must be a number"));
+            }
+        }
+        let moments = self.moments.iter().enumerate();
+        moments
+            .map(|(n, m)| m.check(self.parameters.len()).map_err(|e| format!("`moments` number {}: {e}", n + 1)))
+            .collect()
+    }
+}
+
+/// Cohorts as one, each with the name of its file: as if all patients had been in one cohort.
+///
+/// # Errors
+/// [`MergeError`].
+pub fn merged(files: &[(String, PopulationFile)]) -> Result<PopulationFile, MergeError> {
+    let (first_name, first) = &files[0];
+    let how = |f: &PopulationFile| format!("with the law {} under {} kg/m3", f.law, f.density_kg_per_m3);
+    let mut parameters: BTreeMap<String, Literature> = BTreeMap::new();
+    let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
+    for (name, file) in files {
+        if (file.law, file.density_kg_per_m3) != (first.law, first.density_kg_per_m3) {
+            let (file, first) = ((name.clone(), how(file)), (first_name.clone(), how(first)));
+            return Err(MergeError::Otherwise { file: file.0, first: first.0, its: file.1, those: first.1 });
+        }
+        for taught in &file.parameters {
+            let own = (taught.literature_log_mean, taught.literature_log_sd);
+            let known = *parameters.entry(taught.name.clone()).or_insert(own);
+            if (known.0 - own.0).abs() > 1e-6 || (known.1 - own.1).abs() > 1e-6 {
+                let (file, first, name) = (name.clone(), first_name.clone(), taught.name.clone());
+                return Err(MergeError::Literature { file, first, name });
+            }
+        }
+        for (reason, count) in &file.left_out {
+            *left_out.entry(reason.clone()).or_default() += count;
+        }
+    }
+    let parameters: Vec<(String, Literature)> = parameters.into_iter().collect();
+    let mut moments: Vec<Moments> = Vec::new();
+    for (name, file) in files {
+        let place = |wanted: &String| file.parameters.iter().position(|taught| taught.name == *wanted);
+        let places: Vec<Option<usize>> = parameters.iter().map(|(wanted, _)| place(wanted)).collect();
+        let own: Vec<Moments> = file.moments.iter().map(|m| m.among(&places)).collect();
+        // Two people with the same figures to the last bit are one.
+        let count = own.iter().filter(|m| moments.contains(m)).count();
+        if count > 0 {
+            return Err(MergeError::Twice { file: name.clone(), count });
+        }
+        moments.extend(own);
+    }
+    Ok(PopulationFile::new((first.law, first.density_kg_per_m3), &parameters, moments, left_out)?)
+}

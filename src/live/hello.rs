@@ -1,0 +1,47 @@
+//! What the page is told of the body: what can be set, and how it stands.
+
+use super::body::LiveBody;
+use super::session::Session;
+use crate::material::law::LAWS;
+
+/// What the page needs to know of the body.
+pub(super) fn hello(body: &LiveBody, session: &Session) -> String {
+    let scenario = session.scenario();
+    let mesh = session.mesh();
+    let tissues: Vec<serde_json::Value> = body
+        .tissues
+        .iter()
+        .filter_map(|tissue| {
+            let material = scenario.materials.get(&tissue.name)?;
+            Some(serde_json::json!({
+                "name": tissue.name,
+                "prior": tissue.prior,
+                "posterior": tissue.posterior,
+                "shear_modulus_pa": material.shear_modulus_pa(),
+                "poisson_ratio": material.poisson_ratio(),
+                "law": material.name(),
+            }))
+        })
+        .collect();
+    let held: Vec<&String> = scenario.held().collect();
+    let sets: Vec<&String> = mesh.node_sets.keys().collect();
+    let pressed: Vec<&String> = mesh.node_sets.keys().chain(mesh.facet_sets.keys()).collect();
+    let laws: Vec<&str> = LAWS.into_iter().map(|law| law.card().name).collect();
+    serde_json::json!({
+        "name": body.name,
+        "notes": body.notes,
+        "nodes": mesh.nodes_mm().len(),
+        "tets": mesh.tets().len(),
+        "tissues": tissues,
+        "laws": laws,
+        "sets": sets,
+        "held": held,
+        "pressed": pressed,
+        "pressure": scenario.loads.pressure,
+        "gravity_m_per_s2": scenario.loads.gravity_m_per_s2,
+        "density_kg_per_m3": scenario.loads.density_kg_per_m3,
+        "quasi_static": session.is_quasi_static(),
+        "csf_level_mm": scenario.loads.csf.map(|csf| csf.level_mm),
+    })
+    .to_string()
+}

@@ -1,0 +1,228 @@
+//! What a cohort's estimates say of people: who teaches, the population, and each patient with what the others say.
+
+use super::case_folder;
+use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::population::{Literature, Moments, PopulationFile, PopulationPrior, merged};
+use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
+use crate::experiment::sample::Tissue;
+use crate::experiment::verdict::Finding;
+use crate::material::meta_model::MetaModel;
+use crate::report::cohort::{CohortPopulation, Member, Pupil, Status};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::user_file::{read_text, shown};
+use crate::workflow::{Case, Settings};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The file of a cohort's population below the derivatives.
+pub const POPULATION: &str = "population.toml";
+/// Names of the parameters that a population is of begin with one of these; room, pressure and direction are a scan's own.
+const OF_PEOPLE: [&str; 2] = ["shear_modulus_pa of ", "effective density_kg_per_m3"];
+
+/// A population, where somebody teaches, and what is told of it.
+pub type Learnt = (Option<PopulationFile>, CohortPopulation);
+
+/// One patient whose figures are an answer.
+struct Teacher<'a> {
+    id: &'a str,
+    estimate: &'a EstimateOutcome,
+    settings: Settings,
+}
+
+impl Teacher<'_> {
+    /// What moduli must have in common to be one population's: the law, and the density that they are in proportion to.
+    fn kind(&self) -> (MetaModel, f64) {
+        (self.settings.prior.law, self.settings.resection.density_kg_per_m3)
+    }
+}
+
+/// The population of a cohort and what it says of its own patients; nothing where no subject was estimated, and no population
+/// where nobody teaches.
+///
+/// # Errors
+/// A case whose settings cannot be read, a prior that does not exist, more parameters than can be inferred together.
+pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, WorkflowError> {
+    let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
+    let mut leave = |why: &str| *left_out.entry(why.to_owned()).or_default() += 1;
+    let mut estimated = 0;
+    let mut teachers = Vec::new();
+    for member in members {
+        let Some(outcome) = &member.outcome else { continue };
+        let Some(estimate) = &outcome.estimate else { continue };
+        estimated += 1;
+        let finding = outcome.verdict.finding;
+        match member.status {
+            Status::Done if matches!(finding, Finding::Identified | Finding::Widened) => {
+                let own = Case::at(&case_folder(cases, &member.participant_id)).settings()?;
+                teachers.push(Teacher { id: &member.participant_id, estimate, settings: Settings::resolve([&own])? });
+            }
+            Status::Done => leave(finding.short()),
+            _ => leave(member.status.name()),
+        }
+    }
+    let kinds = |t: &Teacher<'_>| teachers.iter().filter(|other| other.kind() == t.kind()).count();
+    // The first of the most frequent kinds, in the order of the subjects.
+    let most = teachers.iter().map(kinds).max().unwrap_or(0);
+    let chosen = teachers.iter().find(|t| kinds(t) == most).map(Teacher::kind);
+    teachers.retain(|t| {
+        let same = Some(t.kind()) == chosen;
+        if !same {
+            leave("another law or density than most");
+        }
+        same
+    });
+    let mut names: Vec<String> = teachers.iter().flat_map(|t| t.estimate.posterior.names.clone()).collect();
+    names.retain(|name| OF_PEOPLE.iter().any(|begin| name.starts_with(begin)));
+    names.sort();
+    names.dedup();
+    let mut taught = Vec::new();
+    for teacher in teachers {
+        match Moments::of_estimate(teacher.estimate, &names) {
+            Some(moments) => taught.push((teacher, moments)),
+            None => leave("figures that are no Gaussian"),
+        }
+    }
+    let (Some((first, _)), Some(chosen)) = (taught.first(), chosen) else {
+        let told = CohortPopulation { patients: 0, left_out, parameters: Vec::new(), subjects: Vec::new() };
+        return Ok((estimated > 0).then_some((None, told)));
+    };
+    let parameters = names
+        .into_iter()
+        .map(|name| literature(&name, &first.settings).map(|known| (name, known)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let moments: Vec<Moments> = taught.iter().map(|(_, moments)| moments.clone()).collect();
+    let file = PopulationFile::new(chosen, &parameters, moments, left_out)?;
+    let population = file.population()?;
+    let pupil = |(teacher, moments): &(Teacher<'_>, Moments)| Pupil {
+        participant_id: teacher.id.to_owned(),
+        shrunken: population.shrunken(moments),
+    };
+    let subjects: Vec<Pupil> = taught.iter().map(pupil).collect();
+    let told = CohortPopulation {
+        patients: file.patients,
+        left_out: file.left_out.clone(),
+        parameters: file.parameters.clone(),
+        subjects,
+    };
+    Ok(Some((Some(file), told)))
+}
+
+/// What the literature expects of a parameter.
+fn literature(name: &str, settings: &Settings) -> Result<Literature, PriorError> {
+    let Some(tissue) = name.strip_prefix(OF_PEOPLE[0]) else {
+        return Ok((settings.resection.density_kg_per_m3.ln(), settings.estimate.density_log_sd));
+    };
+    let tissue = Tissue { name: tissue.to_owned(), labels: Vec::new() };
+    let prior = PriorSettings { population: None, ..settings.prior.clone() };
+    let known = law_priors(&tissue, &prior)?;
+    let modulus = known.into_iter().map(|(_, known)| known).find(|known| known.name == name);
+    Ok(modulus.map_or((0.0, 1.0), |known| (known.mean, known.sd.unwrap_or(1.0))))
+}
+
+/// A cohort's population from its file.
+///
+/// # Errors
+/// A file that cannot be read or is no population.
+pub fn read_population(path: &Path) -> Result<PopulationFile, WorkflowError> {
+    Ok(PopulationFile::from_toml(&read_text(path)?, &path.display().to_string())?)
+}
+
+/// The prior that a job takes from a population's file.
+///
+/// # Errors
+/// As [`read_population`].
+pub fn population_prior(path: &Path) -> Result<PopulationPrior, WorkflowError> {
+    Ok(read_population(path)?.prior())
+}
+
+/// Several cohorts' files as one.
+///
+/// # Errors
+/// A file that is no population; cohorts of different kinds, or one that was given twice.
+pub fn merge_populations(paths: &[PathBuf]) -> Result<PopulationFile, WorkflowError> {
+    let files = paths
+        .iter()
+        .map(|path| Ok((shown(path), read_population(path)?)))
+        .collect::<Result<Vec<_>, WorkflowError>>()?;
+    Ok(merged(&files)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::ExperimentOutcome;
+    use crate::experiment::verdict::Verdict;
+    use serde_json::json;
+
+    const BRAIN: &str = "shear_modulus_pa of brain";
+
+    /// A subject whose brain was found to have this modulus, known to a seventh, under the prior of these settings.
+    fn member(n: usize, modulus_pa: f64, finding: Finding, settings: &Settings) -> Member {
+        let (mean, sd) = literature(BRAIN, settings).unwrap();
+        let log_sd = 0.15;
+        let estimate: EstimateOutcome = serde_json::from_value(json!({
+            "posterior": {
+                "names": [BRAIN], "mode": [modulus_pa], "log_sd": [log_sd], "interval_95": [[1.0, 2.0]],
+                "log_covariance": [[log_sd * log_sd]],
+                "identifiability": {
+                    "verdicts": ["identified"], "sensitivity_correlation": [], "condition": 1.0, "valley": [],
+                    "valley_log_sd": 1.0,
+                },
+            },
+            "prior": [{"name": BRAIN, "mean": mean, "sd": sd}], "observations": 1, "independent_observations": 1.0,
+            "noise_mm": 0.2, "residual_rms_mm": 0.2, "convergence": "step-below-tolerance", "solves": 1, "tangent_solves": 1,
+            "limits": [],
+        }))
+        .unwrap();
+        let verdict = Verdict { finding, ..Verdict::default() };
+        let outcome = ExperimentOutcome { estimate: Some(estimate), verdict, ..ExperimentOutcome::default() };
+        Member {
+            participant_id: format!("sub-{n:02}"),
+            status: Status::Done,
+            message: None,
+            outcome: Some(outcome),
+            settings_sha256: None,
+        }
+    }
+
+    #[test]
+    fn those_whose_stiffness_is_an_answer_teach_and_the_others_are_counted_by_their_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = Settings::default();
+        let mut members: Vec<Member> =
+            (0..8).map(|n| member(n, 500.0 + 25.0 * n as f64, Finding::Identified, &settings)).collect();
+        members.push(member(8, 640.0, Finding::Widened, &settings));
+        members.push(member(9, 9000.0, Finding::Conflict, &settings));
+        members.push(member(10, 600.0, Finding::NoShift, &settings));
+        members.push(Member { status: Status::QualityGate, ..member(11, 600.0, Finding::Identified, &settings) });
+        // One under another density: its modulus is in proportion to that.
+        let case = case_folder(folder.path(), "sub-12");
+        std::fs::create_dir_all(&case).unwrap();
+        std::fs::write(case.join(crate::layout::SETTINGS), "[resection]\ndensity_kg_per_m3 = 50.0\n").unwrap();
+        members.push(member(12, 300.0, Finding::Identified, &settings));
+        let (file, told) = learn(&members, folder.path()).unwrap().unwrap();
+        let file = file.unwrap();
+        assert_eq!(file.patients, 9);
+        let left: Vec<(&str, usize)> = told.left_out.iter().map(|(why, n)| (why.as_str(), *n)).collect();
+        let expected =
+            ["another law or density than most", "contradicts what is known", "no shift seen", "quality-gate"];
+        assert_eq!(left, expected.map(|why| (why, 1)));
+        assert!(told.sentences()[0].starts_with("9 of 13 estimated patients teach"), "{:?}", told.sentences());
+        // Drawn towards the others, the lowest up and the highest of the eight down.
+        let of = |n: usize| told.subjects[n].shrunken[0].value;
+        assert!(of(0) > 500.0 && of(7) < 675.0 && of(0) < of(7), "{} {}", of(0), of(7));
+        let text = file.to_toml();
+        assert!(!text.contains("sub-"), "a name travels");
+    }
+
+    #[test]
+    fn a_cohort_in_which_nobody_teaches_says_so_and_one_without_estimates_says_nothing() {
+        let settings = Settings::default();
+        let folder = tempfile::tempdir().unwrap();
+        let members = [member(0, 500.0, Finding::Unexplained, &settings)];
+        let (file, told) = learn(&members, folder.path()).unwrap().unwrap();
+        assert!(file.is_none() && told.sentences()[0].starts_with("none of 1 estimated patients teaches"));
+        let none = Member { outcome: None, ..members[0].clone() };
+        assert!(learn(&[none], folder.path()).unwrap().is_none());
+    }
+}

@@ -1,0 +1,122 @@
+//! A body as a case, or a mesh in a file, poses it: what a session that is stepped by hand starts from.
+
+use super::case::Case;
+use super::error::{CaseError, SimulationError, WorkflowError};
+use super::facts::EstimateFacts;
+use super::settings::{Settings, in_words};
+use super::simulation::mesh_in;
+use super::stage_name::Subject;
+use super::stages;
+use super::user_file::{read_input, read_text, shown};
+use crate::anatomy::label;
+use crate::experiment::prior::{PriorSettings, held_material};
+use crate::experiment::resection::{ResectionSettings, Supports};
+use crate::fem::Scenario;
+use crate::layout;
+use crate::material::law::Material;
+use crate::mesh::TetMesh;
+use nalgebra::UnitQuaternion;
+use std::path::Path;
+
+/// Node sets that hold a mesh that comes without a scenario, where it has them.
+const HOLDING: [&str; 3] = ["base", "falx", "fixed"];
+
+/// Tissues that a case of one tissue takes for one.
+const OF_BRAIN: [&str; 2] = ["grey_matter", "white_matter"];
+
+/// Mesh and scenario with all its materials, and the case's estimate where it has one.
+#[derive(Clone, Debug)]
+pub struct Posed {
+    /// The last part of its path.
+    pub name: String,
+    /// The undeformed mesh.
+    pub mesh: TetMesh,
+    /// Materials, loads, supports, solver.
+    pub scenario: Scenario,
+    /// Modes and intervals of the moduli.
+    pub estimate: Option<EstimateFacts>,
+}
+
+/// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are the estimate's, or the
+/// means of the prior.
+///
+/// # Errors
+/// A folder that is no case, and files that are missing or damaged.
+pub fn posed_case(folder: &Path, settings: &Settings) -> Result<Posed, WorkflowError> {
+    let case = Case::open(folder)?;
+    let mesh = case.mesh()?;
+    // Only where the estimate has been made: without it the prior's means stand.
+    let estimate = if case.path(layout::ESTIMATE_JSON).exists() { Some(case.estimate()?) } else { None };
+    let subject = case.subject();
+    let none = || CaseError::NotACase { folder: folder.to_path_buf() };
+    let (mut scenario, ratio) = match subject.ok_or_else(none)? {
+        Subject::Phantom { .. } => (settings.phantom.scenario(), settings.phantom.poisson_ratio),
+        Subject::Patient => {
+            let own = ResectionSettings { supports: Supports::Fixed, ..settings.resection.clone() };
+            let mut scenario = own.scenario(&stages::mni_from_gravity_frame(&case, own.gravity_frame)?);
+            if own.needs_labels() {
+                scenario = own.supported(&scenario, &stages::Anatomy::read(&case)?.labels)?;
+            }
+            (scenario, own.poisson_ratio)
+        }
+        Subject::Plan => {
+            // The way to lie that comes first; its gravity is in the mesh's frame already.
+            let mut own = settings.resection.clone();
+            if let Some(head) = settings.predict.heads.first() {
+                own.gravity_m_per_s2 = head.gravity_m_per_s2(&stages::mni_from_pre(&case)?);
+            }
+            (own.scenario(&UnitQuaternion::identity()), own.poisson_ratio)
+        }
+    };
+    add_materials(&mesh, &mut scenario, ratio, &settings.prior)?;
+    if let Some(facts) = &estimate {
+        for (tissue, &pa) in &facts.record.shear_modulus_pa {
+            let of_tissue = |name: &str| name == tissue || (tissue == "brain" && OF_BRAIN.contains(&name));
+            for (_, material) in scenario.materials.iter_mut().filter(|(name, _)| of_tissue(name)) {
+                *material = Material::neo_hookean(pa, ratio);
+            }
+        }
+    }
+    Ok(Posed { name: shown(folder), mesh, scenario, estimate })
+}
+
+/// The body of a mesh in a file, by the scenario in another; without one every tissue is the mean of its prior under the
+/// effective weight of the settings, held by the sets [`HOLDING`].
+///
+/// # Errors
+/// [`SimulationError`] for files that do not fit.
+pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> Result<Posed, WorkflowError> {
+    let mesh = mesh_in(file, &read_input(file)?)?;
+    let scenario = if let Some(path) = scenario {
+        let name = path.display().to_string();
+        let refused =
+            |e: crate::fem::ScenarioError| SimulationError::Scenario { name, reason: in_words(&e.to_string()) };
+        Scenario::from_toml(&read_text(path)?).map_err(refused)?
+    } else {
+        let own = ResectionSettings { supports: Supports::Fixed, ..settings.resection.clone() };
+        let mut scenario = own.scenario(&UnitQuaternion::identity());
+        scenario.fixed =
+            HOLDING.into_iter().filter(|set| mesh.node_sets.contains_key(*set)).map(str::to_owned).collect();
+        add_materials(&mesh, &mut scenario, own.poisson_ratio, &settings.prior)?;
+        scenario
+    };
+    Ok(Posed { name: shown(file), mesh, scenario, estimate: None })
+}
+
+/// The mean of the prior for every tissue of the mesh that the scenario has no material for.
+fn add_materials(
+    mesh: &TetMesh,
+    scenario: &mut Scenario,
+    poisson_ratio: f64,
+    prior: &PriorSettings,
+) -> Result<(), WorkflowError> {
+    let mut labels = mesh.labels().to_vec();
+    labels.sort_unstable();
+    labels.dedup();
+    for name in labels.into_iter().filter_map(label::name) {
+        if !scenario.materials.contains_key(name) {
+            scenario.materials.insert(name.to_owned(), held_material(name, poisson_ratio, prior)?.material);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Drives the page of `hgm live` in headless Chromium: hand, slider, undo, reset, cut, saving, a second page, a phone's width.
+
+    tests/page/test_live.py HGM CASE|MESH.vtu [SCENARIO.toml] [--pictures DIR] [--seconds N]
+
+Exit code 1 when a check fails. Prints what it measured: steps and pictures a second, hand to picture.
+"""
+
+import argparse
+import json
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from browser import Browser  # noqa: E402
+
+CHECKS = []
+
+
+def check(function):
+    CHECKS.append(function)
+    return function
+
+
+def require(truth, message):
+    if not truth:
+        raise AssertionError(message)
+
+
+class Live:
+    """A server of its own."""
+
+    def __init__(self, options):
+        self.options = options
+
+    def __enter__(self):
+        words = [self.options.hgm, "live", *self.options.body, "--no-browser"]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        self.address = self.process.stdout.readline().strip()
+        require(self.address.startswith("http://127.0.0.1:"), f"no address: {self.address}")
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGINT)
+        try:
+            code = self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        require(code == 0, f"exit code {code}")
+
+
+def enter(browser, live):
+    browser.open(live.address)
+    browser.wait_for("document.getElementById('gl').dataset.ready === 'yes'", 60)
+
+
+def text(browser, name):
+    return browser.evaluate(f"document.getElementById({json.dumps(name)}).textContent")
+
+
+def number(browser, name):
+    return float(text(browser, name).split()[0])
+
+
+def settle(browser, seconds=60):
+    browser.wait_for("document.getElementById('hz').textContent === 'at rest'", seconds)
+
+
+def mouse(browser, kind, x, y, buttons=1):
+    browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=buttons, clickCount=1)
+
+
+def place(browser):
+    """A point of the canvas where the brain is."""
+    x, y, width, height = browser.evaluate(
+        "(() => { const r = document.getElementById('gl').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]; })()")
+    return x + 0.5 * width, y + 0.42 * height
+
+
+def set_slider(browser, name, value):
+    browser.evaluate(
+        f"(() => {{ const s = document.getElementById({json.dumps(name)}); s.value = {value};"
+        " s.dispatchEvent(new Event('input')); })()")
+
+
+@check
+def hand_slider_undo_and_reset_move_the_body_and_bring_it_back(options):
+    with Live(options) as live, Browser() as browser:
+        enter(browser, live)
+        settle(browser)
+        rest = number(browser, "maximum")
+        x, y = place(browser)
+        mouse(browser, "mousePressed", x, y)
+        for n in range(1, 16):
+            mouse(browser, "mouseMoved", x + 6 * n, y - 5 * n)
+            browser.listen(0.03)
+        browser.wait_for("parseFloat(document.getElementById('force').textContent) > 0.01", 20)
+        pulled = number(browser, "maximum")
+        require(abs(pulled - rest) > 1, f"moved by {pulled} mm while pulled, {rest} at rest")
+        if options.pictures:
+            options.pictures.mkdir(parents=True, exist_ok=True)
+            browser.picture(options.pictures / "pulled.png")
+        mouse(browser, "mouseReleased", x + 90, y - 75, 0)
+        settle(browser)
+        require(abs(number(browser, "maximum") - rest) < 0.02, f"{number(browser, 'maximum')} after letting go, {rest} before")
+        browser.evaluate("document.querySelectorAll('input[name=tool]')[2].click()")
+        mouse(browser, "mousePressed", x, y)
+        browser.wait_for("parseFloat(document.getElementById('force').textContent.split(',')[1]) > 0.005", 20)
+        if options.pictures:
+            browser.picture(options.pictures / "ball.png")
+        mouse(browser, "mouseReleased", x, y, 0)
+        settle(browser)
+        set_slider(browser, "modulus-0", browser.evaluate("Number(document.getElementById('modulus-0').value) - 1"))
+        browser.wait_for(f"parseFloat(document.getElementById('maximum').textContent) > {rest + 0.2}", 30)
+        settle(browser)
+        soft = number(browser, "maximum")
+        browser.evaluate("document.getElementById('undo').click()")
+        browser.wait_for(f"parseFloat(document.getElementById('maximum').textContent) < {soft - 0.1}", 30)
+        settle(browser)
+        require(abs(number(browser, "maximum") - rest) < 0.02, "undo does not bring it back")
+        browser.evaluate("document.getElementById('reset').click()")
+        browser.wait_for(f"parseFloat(document.getElementById('maximum').textContent) < {0.9 * rest}", 30)
+        settle(browser)
+        require(abs(number(browser, "maximum") - rest) < 0.02, "reset does not lead to the same rest")
+        require(not browser.complaints(), f"complaints: {browser.complaints()}")
+        outside = [url for url in browser.requests() if not url.startswith(live.address)]
+        require(not outside, f"requests: {outside}")
+        return f"rest {rest} mm, pulled {pulled} mm, softer {soft} mm"
+
+
+@check
+def what_is_saved_is_a_picture_a_vtu_and_a_scenario(options):
+    with Live(options) as live, Browser() as browser:
+        enter(browser, live)
+        settle(browser)
+        browser.evaluate("""
+          window.saved = [];
+          URL.createObjectURL = (blob) => { blob.slice(0, 200).text().then((t) => saved.push([blob.size, t])); return 'data:,'; };
+          HTMLAnchorElement.prototype.click = () => {};
+          ['picture', 'vtu', 'scenario'].forEach((id) => document.getElementById(id).click());""")
+        browser.wait_for("saved.length === 3", 30)
+        heads = browser.evaluate("saved")
+        for start in ["PNG", "VTKFile", "hgm simulate"]:
+            require(any(start in head for _, head in heads), f"nothing begins with {start}: {heads}")
+        return ", ".join(f"{size} bytes" for size, _ in heads)
+
+
+@check
+def a_second_page_is_told_and_the_first_goes_on(options):
+    with Live(options) as live, Browser() as first, Browser() as second:
+        enter(first, live)
+        second.open(live.address)
+        second.wait_for("document.getElementById('said').textContent.includes('another page')", 30)
+        first.evaluate("document.getElementById('reset').click()")
+        first.wait_for("document.getElementById('hz').textContent !== 'at rest'", 30)
+
+
+@check
+def keys_turn_and_pause_a_cut_opens_and_a_phone_needs_no_sideways_scrolling(options):
+    with Live(options) as live, Browser(width=400, height=800, dark=True) as browser:
+        enter(browser, live)
+        wide = browser.evaluate("document.documentElement.scrollWidth")
+        require(wide <= 400, f"{wide} px wide")
+        yaw = browser.evaluate("document.getElementById('gl').focus() || camera.yaw")
+        browser.key("ArrowRight", 39)
+        require(browser.evaluate("camera.yaw") > yaw, "the arrow key turns nothing")
+        browser.evaluate("(() => { const c = document.getElementById('cut'); c.value = '0'; c.dispatchEvent(new Event('change')); })()")
+        browser.wait_for("sections > 10", 20)
+        browser.evaluate("document.activeElement.blur()")
+        browser.key(".", 190)
+        browser.evaluate("document.getElementById('pause').click()")
+        browser.wait_for("document.getElementById('hz').textContent === 'paused'", 20)
+        unlabelled = browser.evaluate(
+            "[...document.querySelectorAll('input, select')].filter((e) => !e.labels.length && !e.ariaLabel).map((e) => e.id)")
+        require(not unlabelled, f"without a label: {unlabelled}")
+        if options.pictures:
+            browser.picture(options.pictures / "phone-dark-cut.png")
+        require(not browser.complaints(), f"complaints: {browser.complaints()}")
+
+
+@check
+def rates_are_measured(options):
+    with Live(options) as live, Browser() as browser:
+        enter(browser, live)
+        x, y = place(browser)
+        mouse(browser, "mousePressed", x, y)
+        begin, n = time.monotonic(), 0
+        rates, pictures = [], []
+        while time.monotonic() < begin + options.seconds:
+            n += 1
+            mouse(browser, "mouseMoved", x + 40 * (n % 40) / 40, y - 60 * (n % 25) / 25)
+            browser.listen(0.015)
+            if n % 40 == 0:
+                said = text(browser, "hz")
+                rates += [float(said.split()[0])] if said.endswith("Hz") else []
+                pictures.append(number(browser, "fps"))
+        mouse(browser, "mouseReleased", x, y, 0)
+        browser.listen(0.6)
+        require(rates and pictures, "nothing was measured")
+        middle = sorted(rates)[len(rates) // 2], sorted(pictures)[len(pictures) // 2]
+        require(middle[0] > 0 and middle[1] > 0, f"stands still: {middle}")
+        return f"{middle[0]:.0f} steps/s, {middle[1]:.0f} pictures/s, hand to picture {text(browser, 'latency')} (medians)"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("hgm")
+    parser.add_argument("body", nargs="+")
+    parser.add_argument("--pictures", type=pathlib.Path, help="folder for pictures")
+    parser.add_argument("--seconds", type=float, default=4, help="how long rates are measured")
+    parser.add_argument("--only", help="run the checks whose name contains this")
+    options = parser.parse_args()
+    if options.pictures:
+        options.pictures.mkdir(parents=True, exist_ok=True)
+    failed = 0
+    for function in CHECKS:
+        if options.only and options.only not in function.__name__:
+            continue
+        try:
+            said = function(options)
+            print(f"  ok     {function.__name__}" + (f": {said}" if said else ""), flush=True)
+        except (AssertionError, RuntimeError, TimeoutError, OSError) as error:
+            failed += 1
+            print(f"  FAILED {function.__name__}: {error}", flush=True)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
