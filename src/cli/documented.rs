@@ -86,7 +86,7 @@ fn every_command_named_within_a_sentence_exists() {
         for span in text.split('`').filter_map(|span| span.strip_prefix("hgm ")) {
             let word = span.split_whitespace().next().unwrap_or_default();
             // `hgm COMMAND`: any of them.
-            let any = word.starts_with('-') || word.chars().all(|letter| letter.is_uppercase());
+            let any = word.starts_with('-') || word.chars().all(char::is_uppercase);
             let known = any || word == "help" || hgm.find_subcommand(word).is_some();
             assert!(known, "{}: there is no `hgm {word}`", document.display());
         }

@@ -17,7 +17,7 @@ pub fn pages(hgm: Command) -> Vec<(String, Vec<u8>)> {
 fn commands(mut hgm: Command) -> String {
     // Usage lines need what parents hand down.
     hgm.build();
-    let mut text = format!("{MADE}# Commands\n{}\n\n", "What `hgm COMMAND --help` says, on one page.");
+    let mut text = format!("{MADE}# Commands\nWhat `hgm COMMAND --help` says, on one page.\n\n");
     for (task, names) in by_tasks(&hgm) {
         let mut listed = String::new();
         let mut told = String::new();
@@ -43,8 +43,7 @@ fn page_of(command: &Command, name: &str, level: usize) -> String {
     let (about, examples) = told(command);
     let mut text = format!("{} {name}\n{about}\n\n", "#".repeat(level));
     if !examples.is_empty() {
-        let lines: String = examples.iter().map(|example| format!("$ {example}\n")).collect();
-        text += &format!("```console\n{lines}```\n\n");
+        text += &format!("```console\n$ {}\n```\n\n", examples.join("\n$ "));
     }
     let usage = command.clone().render_usage().to_string();
     let usage = usage.trim_start_matches("Usage:").trim();
