@@ -25,7 +25,7 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
         std::fs::remove_file(&population_file).ok();
     }
     if let Some((file, population)) = learnt {
-        said = population.sentences().iter().map(|sentence| format!("{sentence}\n")).collect();
+        said = population.sentences().join("\n") + "\n";
         if let Some(file) = file {
             write_whole(&population_file, file.to_toml().as_bytes())?;
             said += &format!("{}\n", population_file.display());

@@ -241,10 +241,10 @@ impl PopulationFile {
                 return Err(format!("`{key}` of `{name}` is {value}: it must be a number"));
             }
         }
-        let moments = self.moments.iter().enumerate();
-        moments
-            .map(|(n, m)| m.check(self.parameters.len()).map_err(|e| format!("`moments` number {}: {e}", n + 1)))
-            .collect()
+        let mut moments = self.moments.iter().enumerate();
+        moments.try_for_each(|(n, m)| {
+            m.check(self.parameters.len()).map_err(|e| format!("`moments` number {}: {e}", n + 1))
+        })
     }
 }
 

@@ -54,7 +54,7 @@ impl PopulationPrior {
     pub fn check(&self, law: MetaModel, density_kg_per_m3: f64) -> Result<(), String> {
         for (n, learnt) in self.parameters.iter().enumerate() {
             let LearntPrior { name, log_mean, log_sd } = learnt;
-            if !log_mean.is_finite() || !(*log_sd > 0.0 && log_sd.is_finite()) {
+            if !(log_mean.is_finite() && *log_sd > 0.0 && log_sd.is_finite()) {
                 return Err(format!(
                     "`population`: of `{name}` `log_mean` is {log_mean} and `log_sd` {log_sd}: the first must be a number and the \
                      second above 0"

@@ -278,13 +278,11 @@ impl Stepper {
             Manner::QuasiStatic => self.step_to_equilibrium(),
         };
         let sound = self.u.iter().chain(&self.v).flatten().all(|x| x.is_finite());
-        match report.filter(|_| sound) {
-            Some(report) => report,
-            None => {
-                self.rest();
-                StepReport { recovered: true, ..StepReport::default() }
-            }
+        if let Some(report) = report.filter(|_| sound) {
+            return report;
         }
+        self.rest();
+        StepReport { recovered: true, ..StepReport::default() }
     }
 
     /// Energy of the hands less the work of the loads, J.
@@ -448,7 +446,9 @@ fn surface(mesh: &TetMesh, model: &Model) -> Vec<SurfaceNode> {
     let mut areas = vec![0.0; model.corners];
     for facet in mesh.boundary_facets(|_| true) {
         let area = Vector3::from(area_m2(mesh, facet)).norm() / 3.0;
-        facet.iter().for_each(|&n| areas[n as usize] += area);
+        for &n in facet {
+            areas[n as usize] += area;
+        }
     }
     let on_surface = areas.iter().enumerate().filter(|(_, area)| **area > 0.0);
     let node = |(n, &area_m2): (usize, &f64)| {
