@@ -34,7 +34,7 @@ pub fn mesh_arrays<'py>(py: Python<'py>, mesh: &TetMesh) -> PyResult<Bound<'py, 
 }
 
 /// One array of a state: a number, or a row of numbers, for each node or cell.
-pub fn field_array<'py>(py: Python<'py>, field: Field) -> PyResult<Bound<'py, PyAny>> {
+pub fn field_array(py: Python<'_>, field: Field) -> PyResult<Bound<'_, PyAny>> {
     let (rows, columns) = (field.values.len() / field.components.max(1), field.components);
     let values = array1(py, field.values);
     if columns == 1 { Ok(values.into_any()) } else { Ok(values.reshape([rows, columns])?.into_any()) }
@@ -82,6 +82,7 @@ pub fn encode_label_map(
 
 /// A label map of a NIfTI file and its affine.
 #[pyfunction]
+#[allow(clippy::type_complexity, reason = "an array and its affine, as Python takes them")]
 pub fn read_label_map(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray3<u8>>, [[f64; 4]; 4])> {
     let read = move || {
         let name = path.display().to_string();

@@ -82,14 +82,14 @@ pub fn frame_bytes(session: &Session, readout: &Readout, pace: &Pace, colour: Co
         report.linear_iterations as f64,
         0.0,
     ];
-    for &x in numbers {
+    for x in numbers {
         bytes.extend((x as f32).to_le_bytes());
     }
     for (x, u) in nodes.iter().zip(&moved) {
         (0..3).for_each(|i| bytes.extend(((x[i] + u[i]) as f32).to_le_bytes()));
     }
     let scalar = if colour == Colour::Energy { nodal_energy(session) } else { sizes };
-    for &x in scalar {
+    for x in scalar {
         bytes.extend((x as f32).to_le_bytes());
     }
     bytes

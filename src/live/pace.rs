@@ -44,6 +44,7 @@ pub struct Driven {
 }
 
 /// The thread's own things.
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Driver<'a> {
     body: &'a LiveBody,
     session: Session,

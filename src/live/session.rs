@@ -338,7 +338,9 @@ impl Session {
         };
         let mut gripped: Vec<(u32, f64)> = self.surface.iter().filter_map(near).collect();
         let whole: f64 = gripped.iter().map(|(_, share)| share).sum();
-        gripped.iter_mut().for_each(|(_, share)| *share /= whole);
+        for (_, share) in &mut gripped {
+            *share /= whole;
+        }
         gripped
     }
 

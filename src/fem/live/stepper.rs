@@ -446,7 +446,7 @@ fn surface(mesh: &TetMesh, model: &Model) -> Vec<SurfaceNode> {
     let mut areas = vec![0.0; model.corners];
     for facet in mesh.boundary_facets(|_| true) {
         let area = Vector3::from(area_m2(mesh, facet)).norm() / 3.0;
-        for &n in facet {
+        for n in facet {
             areas[n as usize] += area;
         }
     }
