@@ -157,6 +157,7 @@ fn estimated(
         observation: Observation::Nodes(observed),
         errors: Errors::Independent { share: 1.0 },
         model_log_sd: 0.0,
+        body_log_sd: 0.0,
         coarser: None,
         body_known: true,
         start,

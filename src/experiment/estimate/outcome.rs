@@ -47,6 +47,8 @@ pub struct Problem<'a> {
     /// Standard deviation of ln(modulus) that mesh and element add; 0 for a body known exactly. Only taken where it cannot be
     /// found from a coarser mesh.
     pub model_log_sd: f64,
+    /// Standard deviation of ln(modulus) that labels and supports add; 0 for a body known exactly.
+    pub body_log_sd: f64,
     /// The same body in a coarser mesh: what mesh and element add is found from it, case by case.
     pub coarser: Option<&'a TetMesh>,
     /// Whether body and load are known exactly (a phantom's): then nothing is held against what is known of tissue.
@@ -74,6 +76,9 @@ pub struct EstimateOutcome {
     /// The same per parameter, in their order, where a coarser mesh was there to find it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh_log_sd: Vec<f64>,
+    /// Standard deviation of ln(modulus) that labels and supports of the body add to the intervals.
+    #[serde(default)]
+    pub body_log_sd: f64,
     /// Observations (nodes of the observed sets, or components of displacements).
     pub observations: usize,
     /// How many of them count as independent.
@@ -198,6 +203,12 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
             model_error.clone_from(&mesh_log_sd);
         }
     }
+    let of_mesh = model_error.iter().copied().fold(0.0, f64::max);
+    for (error, unknown) in model_error.iter_mut().zip(&unknown) {
+        if matches!(unknown, Unknown::ShearModulus(_)) {
+            *error = error.hypot(problem.body_log_sd);
+        }
+    }
     let posterior = posterior.with_model_error(&model_error, &fitted.descent.log_parameters, &prior);
     let posterior = unknown.iter().enumerate().fold(posterior, |posterior, (n, unknown)| match unknown {
         Unknown::Gap(_) => {
@@ -232,7 +243,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         convergence: fitted.descent.convergence,
         solves: body.solves,
         tangent_solves: body.tangent_solves,
-        model_log_sd: model_error.iter().copied().fold(0.0, f64::max),
+        model_log_sd: of_mesh,
+        body_log_sd: problem.body_log_sd,
         mesh_log_sd,
         unexplained: correlated.as_ref().map(|c| c.unexplained),
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
@@ -364,6 +376,7 @@ mod tests {
             observation: Observation::Nodes(observed),
             errors: Errors::Independent { share: 1.0 },
             model_log_sd: 0.0,
+            body_log_sd: 0.0,
             coarser: None,
             body_known: true,
             start: vec![2299f64.ln(), 1195f64.ln()],
@@ -480,10 +493,10 @@ mod tests {
         let (mesh, scenario, observed) = phantom(3);
         let noise = EstimateSettings { noise_mm: 0.05, ..EstimateSettings::default() };
         let exact = solve_problem(problem(&mesh, &scenario, observed.clone()), &noise).unwrap();
-        let rough = Problem { model_log_sd: 0.1, ..problem(&mesh, &scenario, observed) };
+        let rough = Problem { model_log_sd: 0.1, body_log_sd: 0.05, ..problem(&mesh, &scenario, observed) };
         let rough = solve_problem(rough, &noise).unwrap();
         let [narrow, wide] = [&exact, &rough].map(|e| e.outcome.posterior.log_sd[0]);
-        assert!((wide - narrow.hypot(0.1)).abs() < 1e-12, "{narrow} {wide}");
+        assert!((wide - narrow.hypot(0.1).hypot(0.05)).abs() < 1e-12, "{narrow} {wide}");
         assert_eq!(exact.outcome.posterior.mode, rough.outcome.posterior.mode);
         assert_eq!(exact.displacement_sd_mm, rough.displacement_sd_mm);
     }

@@ -138,11 +138,12 @@ impl Moments {
     }
 }
 
-/// Variance that the mesh added to a parameter of an estimate.
+/// Variance that mesh, labels and supports added to a parameter of an estimate.
 fn added(found: &EstimateOutcome, parameter: usize) -> f64 {
     let modulus = found.posterior.names[parameter].starts_with("shear_modulus_pa");
     let expected = if modulus { found.model_log_sd } else { 0.0 };
-    found.mesh_log_sd.get(parameter).copied().unwrap_or(expected).powi(2)
+    let of_body = if modulus { found.body_log_sd } else { 0.0 };
+    found.mesh_log_sd.get(parameter).copied().unwrap_or(expected).powi(2) + of_body.powi(2)
 }
 
 /// The joint covariance of these priors.

@@ -105,6 +105,12 @@ impl HeldBody {
         })
     }
 
+    /// Standard deviation of ln(modulus) that its labels and supports add.
+    fn log_sd(&self, options: &EstimateOptions) -> f64 {
+        let slides = self.settings.as_ref().is_some_and(|s| s.supports == Supports::Sliding);
+        if slides { options.wall_log_sd } else { options.labels_log_sd }
+    }
+
     /// What it assumes, in words.
     pub fn name(&self) -> String {
         self.settings.as_ref().map_or_else(String::new, |s| format!("supports {}", s.supports.name()))
@@ -358,6 +364,7 @@ impl Bodies {
             observation: Observation::Nodes(nodes),
             errors,
             model_log_sd: 0.0,
+            body_log_sd: 0.0,
             coarser: None,
             body_known: !matches!(body.reference, Reference::Surfaces(_)),
             start: Vec::new(),
@@ -400,6 +407,7 @@ impl Bodies {
             observation,
             errors,
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
+            body_log_sd: if patient { body.log_sd(options) } else { 0.0 },
             coarser: coarser.as_ref(),
             body_known: !patient,
             start: rough.map_or_else(Vec::new, |found| found.numbers),
