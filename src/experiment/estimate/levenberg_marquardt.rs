@@ -83,13 +83,6 @@ pub enum Convergence {
     NotSought,
 }
 
-impl Convergence {
-    /// Whether the figures are those of a minimum.
-    pub fn at_minimum(self) -> bool {
-        matches!(self, Self::StepBelowTolerance | Self::NoDescent)
-    }
-}
-
 /// The best point found and the way there.
 #[derive(Clone, Debug)]
 pub struct Descent {

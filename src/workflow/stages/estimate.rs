@@ -30,9 +30,6 @@ const VERSION: u32 = 10;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
-/// Logarithm of the odds from which supports are left to the coarse mesh: no mesh and no error of a registration makes up for
-/// so much, and an answer takes odds of [`STRONG`].
-const FAR_BEHIND: f64 = 100.0;
 /// Array of a state: what the images showed of a node, the registration's own error taken out, mm; zero elsewhere.
 pub(super) const SEEN_DISPLACEMENT: &str = "seen_displacement";
 /// Array of a state: the nodes that the estimate was held against.
@@ -189,32 +186,18 @@ pub(crate) fn estimate(
         work.tell(|p| p.begin("estimate", bodies.list.len()));
         let (mut models, mut warnings, mut refused) = (Vec::new(), Vec::new(), None);
         let prior = &work.settings.prior;
-        let rough = (0..bodies.list.len()).map(|n| bodies.roughly(work, input, n, input.tissues, prior));
-        let rough: Vec<Option<Estimate>> = rough.collect::<Result<_, _>>()?;
-        let behind = far_behind(&rough);
-        let (late, near): (Vec<usize>, Vec<usize>) = (0..bodies.list.len()).partition(|&n| behind[n].is_some());
-        let mut left = Vec::new();
-        for (far, numbers) in [(false, near), (true, late)] {
-            for n in numbers {
-                let name = bodies.list[n].name();
-                match (&rough[n], behind[n]) {
-                    // Where nothing near has an equilibrium, what is far behind is solved after all.
-                    (Some(rough), Some(behind)) if far && !models.is_empty() => {
-                        left.push((format!("{name} (coarse mesh)"), rough.clone(), behind));
-                    }
-                    _ => match bodies.solved(work, input, n, input.tissues, prior, rough[n].clone()) {
-                        Ok(found) => models.push((name, found)),
-                        // Supports without an equilibrium explain nothing; the others are still tried.
-                        Err(error) => {
-                            warnings.push(format!("{name}: left out: {error}"));
-                            refused.get_or_insert(error);
-                        }
-                    },
+        for (n, body) in bodies.list.iter().enumerate() {
+            let rough = bodies.roughly(work, input, n, input.tissues, prior)?;
+            match bodies.solved(work, input, n, input.tissues, prior, rough) {
+                Ok(found) => models.push((body.name(), found)),
+                // Supports without an equilibrium explain nothing; the others are still tried.
+                Err(error) => {
+                    warnings.push(format!("{}: left out: {error}", body.name()));
+                    refused.get_or_insert(error);
                 }
-                work.tell(|p| p.step());
             }
+            work.tell(|p| p.step());
         }
-        models.extend(beside(&models, left));
         work.tell(|p| p.end());
         let found = match (models.len(), refused) {
             (0, Some(error)) => return Err(error),
@@ -230,32 +213,6 @@ pub(crate) fn estimate(
         produced.warnings.extend(warnings);
         Ok(produced)
     })
-}
-
-/// How far (logarithm of the odds) an estimate on the coarse mesh lies behind the best one there, of those that need no other:
-/// [`FAR_BEHIND`] or more, and both at their minimum.
-fn far_behind(rough: &[Option<Estimate>]) -> Vec<Option<f64>> {
-    let evidence = |found: &Option<Estimate>| {
-        let outcome = &found.as_ref()?.outcome;
-        outcome.convergence.at_minimum().then(|| outcome.odds.map(|odds| odds.log_evidence)).flatten()
-    };
-    let logs: Vec<Option<f64>> = rough.iter().map(evidence).collect();
-    let best = logs.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
-    logs.into_iter().map(|log| log.map(|log| best - log).filter(|behind| *behind >= FAR_BEHIND)).collect()
-}
-
-/// What was left to the coarse mesh, as far behind the best model as it was there.
-fn beside(models: &[(String, Estimate)], left_behind: Vec<(String, Estimate, f64)>) -> Vec<(String, Estimate)> {
-    let evidence = |(_, found): &(String, Estimate)| found.outcome.odds.map(|odds| odds.log_evidence);
-    let best = models.iter().filter_map(evidence).fold(f64::NEG_INFINITY, f64::max);
-    let placed = |(name, mut found, behind): (String, Estimate, f64)| {
-        if let Some(odds) = &mut found.outcome.odds {
-            odds.log_evidence = best - behind;
-        }
-        (name, found)
-    };
-    // Where the others have no equilibrium on the fine mesh, there is nothing to stand beside.
-    left_behind.into_iter().filter(|_| best.is_finite()).map(placed).collect()
 }
 
 /// The most probable model with the verdict over all of them.
