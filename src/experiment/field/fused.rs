@@ -7,11 +7,13 @@
 //! explicit basis functions).
 
 use crate::experiment::estimate::{
-    CorrelatedErrors, Factor, LinearModel, MovedNode, RigidModes, Unexplained, spread_out,
+    CorrelatedErrors, Factor, LinearModel, MovedNode, Process, RigidModes, Unexplained, spread_out,
 };
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+/// How many times what was measured of the registration's noise may show before it is the model's fault.
+const MOST_NOISE: f64 = 3.0;
 /// Nodes per task; part of the determinism, not to depend on the machine.
 const NODES_AT_ONCE: usize = 512;
 
@@ -108,8 +110,17 @@ impl Rest {
             precision: precision.clone(),
         };
         let (wrong, exact) = (linear.with_discrepancy(errors.noise)?, linear.with_noise_alone(errors.noise)?);
-        // A discrepancy that is not needed is none.
-        let unexplained = if wrong.log_evidence > exact.log_evidence { wrong.unexplained } else { exact.unexplained };
+        // A discrepancy that is not needed is none. Where there is one, it takes smooth noise for its own: how much noise there
+        // is besides cannot be told from what is left, and what was measured of it stands.
+        let needed =
+            wrong.log_evidence > exact.log_evidence || exact.unexplained.noise.sd_mm > MOST_NOISE * errors.noise.sd_mm;
+        let unexplained = if needed {
+            let found = wrong.unexplained.noise;
+            let noise = Process { sd_mm: found.sd_mm.max(errors.noise.sd_mm), ..found };
+            Unexplained { noise, ..wrong.unexplained }
+        } else {
+            exact.unexplained
+        };
         let factor = unexplained.factor(&places_mm)?;
         let weights_of_rigid = factor.solve(&rigid.columns_mm);
         let covariance = (rigid.columns_mm.transpose() * &weights_of_rigid + precision).try_inverse()?;
@@ -166,7 +177,6 @@ impl Rest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::Process;
     use crate::experiment::phantom::block;
     use crate::material::random::CounterRng;
 
