@@ -81,7 +81,7 @@ pub fn posed_case(folder: &Path, settings: &Settings) -> Result<Posed, WorkflowE
 }
 
 /// The body of a mesh in a file, by the scenario in another; without one every tissue is the mean of its prior under the
-/// effective weight of the settings, held by the sets [`HOLDING`].
+/// effective weight of the settings, held by the sets base and falx.
 ///
 /// # Errors
 /// [`SimulationError`] for files that do not fit.
