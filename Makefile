@@ -1,4 +1,4 @@
 # For hands that type make; everything is in ./run.
-demo test bench lint docs reference engines setup:
+demo test bench lint docs reference wheel live engines setup:
 	./run $@
-.PHONY: demo test bench lint docs reference engines setup
+.PHONY: demo test bench lint docs reference wheel live engines setup
