@@ -17,6 +17,7 @@ mod process;
 mod projection;
 mod re_registration;
 mod rigid_remainder;
+mod spread;
 mod verdict_of_fit;
 
 pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};

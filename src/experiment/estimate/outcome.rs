@@ -6,6 +6,7 @@ use super::evidence::Unexplained;
 use super::findings::{Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::mesh_error::{at_places, left_of_difference};
 use super::re_registration::{Instrument, MovedNode, without_own_error};
+use super::spread::spread;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{Convergence, EstimateSettings, LogPrior, Posterior, Process, Z_95, estimate, information, laplace};
 use crate::experiment::rmse::root_mean_square;
@@ -319,36 +320,6 @@ fn fit_independent(
         correlated: None,
         descent,
     })
-}
-
-/// Standard deviation and 95 % reach of every node by linear propagation of the posterior.
-fn spread(mean: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>], posterior: &Posterior) -> (Vec<f64>, Vec<f64>) {
-    let covariance = &posterior.log_covariance;
-    let at = |n: usize, a: usize, b: usize| -> f64 {
-        let mut sum = 0.0;
-        for (p, row) in covariance.iter().enumerate() {
-            for (q, c) in row.iter().enumerate() {
-                sum += sensitivities[p][n][a] * c * sensitivities[q][n][b];
-            }
-        }
-        sum
-    };
-    let sd = (0..mean.len()).map(|n| (0..3).map(|a| at(n, a, a)).sum::<f64>().max(0.0).sqrt()).collect();
-    let reach = (0..mean.len()).map(|n| {
-        let u = mean[n];
-        let length = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt();
-        if length < 1e-12 {
-            return 0.0;
-        }
-        let mut variance = 0.0;
-        for a in 0..3 {
-            for b in 0..3 {
-                variance += u[a] * at(n, a, b) * u[b] / (length * length);
-            }
-        }
-        length + 1.96 * variance.max(0.0).sqrt()
-    });
-    (sd, reach.collect())
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ use rayon::prelude::*;
 
 /// How many times what was measured of the registration's noise may show before it is the model's fault.
 const MOST_NOISE: f64 = 3.0;
+/// Fewer places say nothing of remainder, discrepancy and noise apart.
+const FEWEST_PLACES: usize = 10;
 /// Nodes per task; part of the determinism, not to depend on the machine.
 const NODES_AT_ONCE: usize = 512;
 
@@ -44,7 +46,7 @@ pub struct Left {
 }
 
 /// The model's displacement with the most probable remainder and discrepancy added. `model_sd_mm`: of every node, from the
-/// posterior. `None` of a process is a spread of the model's own.
+/// posterior. Where too little was seen, the model stands with its own spread.
 pub fn fused(
     nodes_mm: &[[f64; 3]],
     model_mm: &[[f64; 3]],
@@ -92,7 +94,7 @@ impl Rest {
         let positions: Vec<[f64; 3]> = seen.iter().map(|(n, _)| nodes_mm[*n as usize]).collect();
         let chosen = spread_out(&positions, errors.places);
         let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
-        if places_mm.len() < 10 {
+        if places_mm.len() < FEWEST_PLACES {
             return None;
         }
         let left_mm = DVector::from_fn(3 * places_mm.len(), |row, _| {

@@ -57,6 +57,7 @@ pub struct Discrepancy {
     /// Size of what looks like the registration's noise, as a factor on the noise that was stated.
     pub noise_factor: f64,
     /// Size of what looks like a remainder of the rigid registration, mm.
+    #[serde(default)]
     pub rigid_mm: f64,
     /// Nodes it is conditioned on.
     pub nodes: usize,

@@ -43,8 +43,7 @@ pub(crate) fn compare(
                     work.tell(|p| p.doing(&name));
                     // A population is of one law: models are held against each other under the literature's priors.
                     let prior = PriorSettings { law, population: None, ..prior.clone() };
-                    let rough = bodies.roughly(work, input, n, tissues, &prior)?;
-                    match bodies.solved(work, input, n, tissues, &prior, rough) {
+                    match bodies.solved(work, input, n, tissues, &prior) {
                         Ok(found) => models.push((name, found.outcome)),
                         // A model that has no equilibrium explains nothing; the others are still compared.
                         Err(error) => warnings.push(format!("{name}: left out: {error}")),

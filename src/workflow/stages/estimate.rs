@@ -187,8 +187,7 @@ pub(crate) fn estimate(
         let (mut models, mut warnings, mut refused) = (Vec::new(), Vec::new(), None);
         let prior = &work.settings.prior;
         for (n, body) in bodies.list.iter().enumerate() {
-            let rough = bodies.roughly(work, input, n, input.tissues, prior)?;
-            match bodies.solved(work, input, n, input.tissues, prior, rough) {
+            match bodies.solved(work, input, n, input.tissues, prior) {
                 Ok(found) => models.push((body.name(), found)),
                 // Supports without an equilibrium explain nothing; the others are still tried.
                 Err(error) => {
@@ -296,8 +295,8 @@ impl Bodies {
     }
 
     /// The estimate of one of them on the coarse mesh, which knows nearly where to look in a fraction of the time; `None`
-    /// without that mesh, or where it finds none. The same places for every body.
-    pub fn roughly(
+    /// without that mesh, or where it finds none.
+    fn roughly(
         &self,
         work: &Work<'_>,
         input: &EstimateInput<'_>,
@@ -331,7 +330,7 @@ impl Bodies {
         Ok(solve_problem(problem, &settings).ok())
     }
 
-    /// The estimate of one of them under a prior, from where the coarse mesh has found it.
+    /// The estimate of one of them under a prior, begun where the coarse mesh has found it.
     pub fn solved(
         &self,
         work: &Work<'_>,
@@ -339,8 +338,8 @@ impl Bodies {
         number: usize,
         tissues: &[Tissue],
         prior: &PriorSettings,
-        rough: Option<Estimate>,
     ) -> Result<Estimate, WorkflowError> {
+        let rough = self.roughly(work, input, number, tissues, prior)?;
         let options = &work.settings.estimate;
         let body = &self.list[number];
         let mesh = &body.mesh;
