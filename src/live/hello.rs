@@ -3,6 +3,7 @@
 use super::body::LiveBody;
 use super::session::Session;
 use crate::material::law::LAWS;
+use std::collections::BTreeSet;
 
 /// What the page needs to know of the body.
 pub(super) fn hello(body: &LiveBody, session: &Session) -> String {
@@ -25,7 +26,8 @@ pub(super) fn hello(body: &LiveBody, session: &Session) -> String {
         .collect();
     let held: Vec<&String> = scenario.held().collect();
     let sets: Vec<&String> = mesh.node_sets.keys().collect();
-    let pressed: Vec<&String> = mesh.node_sets.keys().chain(mesh.facet_sets.keys()).collect();
+    // A set may be there as nodes and as facets.
+    let pressed: BTreeSet<&String> = mesh.node_sets.keys().chain(mesh.facet_sets.keys()).collect();
     let laws: Vec<&str> = LAWS.into_iter().map(|law| law.card().name).collect();
     serde_json::json!({
         "name": body.name,

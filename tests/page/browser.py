@@ -18,12 +18,14 @@ FLAGS = [
     # WebGL 2 without a graphics card.
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
     # Whatever is asked for outside goes to a port where nobody listens.
-    "--proxy-server=127.0.0.1:9", "--proxy-bypass-list=<-loopback>", "--remote-debugging-pipe",
+    "--proxy-server=127.0.0.1:9", "--remote-debugging-pipe",
 ]
+#: Loopback addresses go there too, or are let through for a page that has a server of its own on this machine.
+NOWHERE, THIS_MACHINE = "--proxy-bypass-list=<-loopback>", "--proxy-bypass-list=127.0.0.1"
 
 
 class Browser:
-    def __init__(self, width=1280, height=900, javascript=True, dark=False, reduced_motion=False):
+    def __init__(self, width=1280, height=900, javascript=True, dark=False, reduced_motion=False, served=False):
         self.profile = tempfile.mkdtemp(prefix="hgm-page-")
         program = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
         if program is None:
@@ -38,7 +40,7 @@ class Browser:
             os.dup2(b, 4)
 
         self.process = subprocess.Popen(
-            [program, *FLAGS, f"--user-data-dir={self.profile}", f"--window-size={width},{height}", "about:blank"],
+            [program, *FLAGS, THIS_MACHINE if served else NOWHERE, f"--user-data-dir={self.profile}", f"--window-size={width},{height}", "about:blank"],
             preexec_fn=wire, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
         os.close(from_browser)

@@ -89,7 +89,7 @@ def set_slider(browser, name, value):
 
 @check
 def hand_slider_undo_and_reset_move_the_body_and_bring_it_back(options):
-    with Live(options) as live, Browser() as browser:
+    with Live(options) as live, Browser(served=True) as browser:
         enter(browser, live)
         settle(browser)
         rest = number(browser, "maximum")
@@ -134,7 +134,7 @@ def hand_slider_undo_and_reset_move_the_body_and_bring_it_back(options):
 
 @check
 def what_is_saved_is_a_picture_a_vtu_and_a_scenario(options):
-    with Live(options) as live, Browser() as browser:
+    with Live(options) as live, Browser(served=True) as browser:
         enter(browser, live)
         settle(browser)
         browser.evaluate("""
@@ -151,7 +151,7 @@ def what_is_saved_is_a_picture_a_vtu_and_a_scenario(options):
 
 @check
 def a_second_page_is_told_and_the_first_goes_on(options):
-    with Live(options) as live, Browser() as first, Browser() as second:
+    with Live(options) as live, Browser(served=True) as first, Browser(served=True) as second:
         enter(first, live)
         second.open(live.address)
         second.wait_for("document.getElementById('said').textContent.includes('another page')", 30)
@@ -161,7 +161,7 @@ def a_second_page_is_told_and_the_first_goes_on(options):
 
 @check
 def keys_turn_and_pause_a_cut_opens_and_a_phone_needs_no_sideways_scrolling(options):
-    with Live(options) as live, Browser(width=400, height=800, dark=True) as browser:
+    with Live(options) as live, Browser(width=400, height=800, dark=True, served=True) as browser:
         enter(browser, live)
         wide = browser.evaluate("document.documentElement.scrollWidth")
         require(wide <= 400, f"{wide} px wide")
@@ -184,7 +184,7 @@ def keys_turn_and_pause_a_cut_opens_and_a_phone_needs_no_sideways_scrolling(opti
 
 @check
 def rates_are_measured(options):
-    with Live(options) as live, Browser() as browser:
+    with Live(options) as live, Browser(served=True) as browser:
         enter(browser, live)
         x, y = place(browser)
         mouse(browser, "mousePressed", x, y)
