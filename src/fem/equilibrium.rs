@@ -48,10 +48,10 @@ const FIRST_FORCING: [f64; 2] = [0.1, 0.01];
 const PATIENCE: usize = 12;
 
 /// How many times softer walls are on the way from rest to their own softness.
-const SOFTER: [f64; 2] = [20.0, 4.5];
+const SOFTER: [f64; 3] = [40.0, 13.0, 4.0];
 
 /// Relative residual that ends a step whose walls are not yet what they are.
-const ROUGHLY: f64 = 1e-2;
+const ROUGHLY: f64 = 0.6;
 
 /// Newton iterations of all load steps together, in units of the most for one: the whole call ends with a verdict.
 const BUDGET: usize = 8;
@@ -178,7 +178,8 @@ impl Model {
     /// at the end. `None` without walls, or where that way leads nowhere.
     ///
     /// A body with room before its wall falls into it in one step of Newton's method, and most of the next steps go to
-    /// finding out which nodes are pressed. Walls as thick as the room catch it softly.
+    /// finding out which nodes are pressed. Walls as thick as the room catch it softly. The way from one softness to the next
+    /// goes on along the last one, as far as the depth behind a wall that gets harder: in proportion to the softness.
     fn through_soft_walls(
         &self,
         laws: &mut Laws,
@@ -193,6 +194,7 @@ impl Model {
         }
         let mut u = vec![[0.0; 3]; self.nodes_m.len()];
         self.move_prescribed(&mut u, 1.0);
+        let mut last: Option<(f64, Vec<[f64; 3]>)> = None;
         for (n, softer) in SOFTER.into_iter().enumerate() {
             laws.walls_softer = softer;
             let first_forcing = FIRST_FORCING[n.min(1)];
@@ -202,6 +204,13 @@ impl Model {
             if !found {
                 return None;
             }
+            let next = SOFTER.get(n + 1).copied().unwrap_or(1.0);
+            let ahead = last.as_ref().map(|(was, old)| {
+                let part = (softer - next) / (was - softer);
+                u.iter().zip(old).map(|(u, o)| [0, 1, 2].map(|i| u[i] + part * (u[i] - o[i]))).collect::<Vec<_>>()
+            });
+            last = Some((softer, u.clone()));
+            u = ahead.filter(|ahead| self.energy(ahead, laws).is_finite()).unwrap_or(u);
         }
         Some(u)
     }

@@ -190,11 +190,12 @@ def rates_are_measured(options):
         mouse(browser, "mousePressed", x, y)
         begin, n = time.monotonic(), 0
         rates, pictures = [], []
-        while time.monotonic() < begin + options.seconds:
+        # A busy machine takes longer to read three times.
+        while time.monotonic() < begin + (60 if len(rates) < 3 else options.seconds):
             n += 1
             mouse(browser, "mouseMoved", x + 40 * (n % 40) / 40, y - 60 * (n % 25) / 25)
             browser.listen(0.015)
-            if n % 40 == 0:
+            if n % 20 == 0:
                 said = text(browser, "hz")
                 rates += [float(said.split()[0])] if said.endswith("Hz") else []
                 pictures.append(number(browser, "fps"))

@@ -30,8 +30,8 @@ pub struct Contact {
     /// in any case, so that the body at rest is not pressed.
     #[serde(default)]
     pub gap_mm: f64,
-    /// Pressure per depth beyond the wall, Pa/mm. Depth is pressure over this: the default keeps a brain's weight
-    /// (1040 kg/m3, 150 mm high: 1500 Pa) within .04 mm.
+    /// Pressure per depth beyond the wall, Pa/mm. Depth is pressure over this: by default 1500 Pa, a column of brain of 150 mm,
+    /// go .017 mm deep.
     #[serde(default = "stiffness_pa_per_mm")]
     pub stiffness_pa_per_mm: f64,
     /// The pressure sets in over this distance, half before the wall and half behind, mm.
@@ -41,12 +41,12 @@ pub struct Contact {
 
 /// Default of [`Contact::stiffness_pa_per_mm`].
 fn stiffness_pa_per_mm() -> f64 {
-    40_000.0
+    90_000.0
 }
 
 /// Default of [`Contact::softness_mm`].
 fn softness_mm() -> f64 {
-    0.1
+    0.05
 }
 
 /// Where a wall is.

@@ -128,6 +128,14 @@ impl Coarse {
         let zero = vec![[0.0; 3]; 2 * count];
         Some(Self { pieces, factor, loads: zero.clone(), motion: zero })
     }
+
+    /// The correction for another tangent of the same body, whose pieces and order of elimination are the same; `None` as for
+    /// [`Self::new`].
+    pub(super) fn renewed(self, tangent: &Tangent) -> Option<Self> {
+        let matrix = matrix(&self.pieces.coupling(tangent), self.pieces.centre.len());
+        let factor = Factor::new(self.factor.symbolic(), &Tangent { matrix, nodal: None })?;
+        Some(Self { factor, ..self })
+    }
 }
 
 impl Pieces {

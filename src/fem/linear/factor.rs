@@ -148,6 +148,11 @@ impl Symbolic {
 }
 
 impl Factor {
+    /// Its order and pattern.
+    pub(super) fn symbolic(&self) -> &Arc<Symbolic> {
+        &self.symbolic
+    }
+
     /// `None` when the tangent is not positive definite. One thread, so that the bytes do not depend on their number.
     pub(super) fn new(symbolic: &Arc<Symbolic>, tangent: &Tangent) -> Option<Self> {
         let n = 3 * symbolic.pattern.rows();

@@ -193,7 +193,10 @@ impl Pcg {
 impl LinearSolver for Pcg {
     fn prepare(&mut self, tangent: &Tangent) {
         if let Some(rows) = self.rows.as_ref().filter(|rows| rows.change || self.coarse.is_none()) {
-            self.coarse = Coarse::new(tangent, rows);
+            self.coarse = match self.coarse.take() {
+                Some(coarse) => coarse.renewed(tangent),
+                None => Coarse::new(tangent, rows),
+            };
         }
         match &mut self.single {
             Some(single) => {

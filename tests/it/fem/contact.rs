@@ -56,7 +56,7 @@ fn even_pressure_goes_through_a_wall_evenly() {
         let wall = &outcome.contact[0];
         assert!((wall.force_n[2] - 200.0 * 16e-4).abs() < 1e-9 && wall.force_n[0].abs() < 1e-12, "{wall:?}");
         // The wall's soft layer: p = k e^2 / 2w at e = w/2 - gap.
-        let gap = 0.05 - (2.0 * 0.1 * 200.0 / 40_000.0f64).sqrt();
+        let gap = 0.025 - (2.0 * 0.05 * 200.0 / 90_000.0f64).sqrt();
         assert!((wall.depth_mm - (-gap).max(0.0)).abs() < 1e-6, "{wall:?}");
     }
 }
@@ -140,7 +140,7 @@ fn blocks_slide_apart_along_a_sheet_without_a_gap() {
     let outcome = solved(&mesh, &text);
     assert_eq!(outcome.displacement_mm.len(), body.nodes_mm().len());
     // p = k e^2 / 2w: how far either side moves into the layer before its wall.
-    let way = (2.0 * 0.1 * 100.0 / 40_000.0f64).sqrt();
+    let way = (2.0 * 0.05 * 100.0 / 90_000.0f64).sqrt();
     let mut sides = [0.0_f64; 2];
     for &n in &body.node_sets["sheet"] {
         let u = outcome.displacement_mm[n as usize];
