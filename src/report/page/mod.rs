@@ -6,6 +6,7 @@ mod estimate;
 mod glance;
 mod methods;
 mod parts;
+mod posterior;
 mod prediction;
 mod results;
 
@@ -256,7 +257,9 @@ impl CasePage {
         add(
             "estimate",
             "Estimate",
-            outcome.and_then(|o| Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref()))),
+            outcome.and_then(|o| {
+                Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref(), &o.reference_shear_modulus_pa))
+            }),
         );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
         add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
