@@ -112,7 +112,8 @@ impl LinkedSlices {
                     }
                 }
             } "\n"
-            p class="where" { output id="cursor" { } }
+            noscript { p { "The slices need JavaScript; the mosaics above show the same scans without it." } }
+            p class="where" { output id="cursor" {} }
             ul class="legend" aria-label="Lines on the slices" {
                 li { svg viewBox="0 0 280 60" width="28" height="6" aria-hidden="true" { path class="o-rest" d="M0 30h280" {} } "undeformed" }
                 li { svg viewBox="0 0 280 60" width="28" height="6" aria-hidden="true" { path class="o-shown" d="M0 30h280" {} } "surface chosen below" }

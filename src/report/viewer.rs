@@ -58,8 +58,8 @@ impl Viewer {
     /// The section's content; everything it needs beside the scripts.
     pub(super) fn section(&self) -> Markup {
         let sides = [
-            ("left", 270, 0),
-            ("right", 90, 0),
+            ("left", 90, 0),
+            ("right", 270, 0),
             ("anterior", 180, 0),
             ("posterior", 0, 0),
             ("superior", 0, 90),

@@ -47,6 +47,7 @@
     const surfaces = data.surfaces.map((s) => ({ name: s.name, positions: new Float32Array(bytes(s.positions).buffer),
       triangles: new Uint32Array(bytes(s.triangles).buffer), colours: bytes(s.colours), ranged: Boolean(s.range) }));
     if (window.hgmStates) surfaces.push(window.hgmStates);
+    window.hgmView = surfaces[0];
     let chosen = data.first;
     const meshes = surfaces.map((s, n) => new NVMesh(s.positions, s.triangles, s.name, s.colours, 1.0, n === chosen, nv.gl));
     meshes.forEach((mesh) => nv.addMesh(mesh));
@@ -124,20 +125,30 @@
       nv.setRenderAzimuthElevation(nv.scene.renderAzimuth + turn[0], nv.scene.renderElevation + turn[1]);
     }, { capture: true });
 
-    // The node of the visible surface that is nearest to the eye among those close to the click.
+    // Where the line of sight through a click first meets the visible surface.
     function at(clientX, clientY) {
-      const box = canvas.getBoundingClientRect(), reach = 9;
+      const box = canvas.getBoundingClientRect(), { positions } = surfaces[chosen], { tris } = meshes[chosen];
       const [m] = nv.calculateMvpMatrix(null, [0, 0, canvas.width, canvas.height], nv.scene.renderAzimuth, nv.scene.renderElevation);
-      const x = clientX - box.left, y = clientY - box.top, { positions } = surfaces[chosen];
-      const used = new Set(meshes[chosen].tris);
+      const x = 2 * (clientX - box.left) / box.width - 1, y = 1 - 2 * (clientY - box.top) / box.height;
+      const seen = new Float32Array(positions.length);
+      for (let n = 0; n < positions.length; n += 3) {
+        const row = (r) => m[r] * positions[n] + m[4 + r] * positions[n + 1] + m[8 + r] * positions[n + 2] + m[12 + r];
+        const w = row(3);
+        seen[n] = row(0) / w - x;
+        seen[n + 1] = row(1) / w - y;
+        seen[n + 2] = row(2) / w;
+      }
       let found = null, nearest = Infinity;
-      for (const n of used) {
-        const p = [0, 1, 2].map((a) => positions[3 * n + a]);
-        const clip = [0, 1, 2, 3].map((row) => m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row]);
-        const dx = (clip[0] / clip[3] + 1) / 2 * box.width - x, dy = (1 - clip[1] / clip[3]) / 2 * box.height - y;
-        if (dx * dx + dy * dy < reach * reach && clip[2] / clip[3] < nearest) {
-          nearest = clip[2] / clip[3];
-          found = p;
+      for (let t = 0; t < tris.length; t += 3) {
+        const [a, b, c] = [3 * tris[t], 3 * tris[t + 1], 3 * tris[t + 2]];
+        const cross = (p, q) => seen[p] * seen[q + 1] - seen[q] * seen[p + 1];
+        const parts = [cross(b, c), cross(c, a), cross(a, b)], area = parts[0] + parts[1] + parts[2];
+        if (!area || parts.some((part) => part / area < 0)) continue;
+        const mean = (values, k) => (parts[0] * values[a + k] + parts[1] * values[b + k] + parts[2] * values[c + k]) / area;
+        const depth = mean(seen, 2);
+        if (depth < nearest) {
+          nearest = depth;
+          found = [0, 1, 2].map((k) => mean(positions, k));
         }
       }
       return found;
@@ -151,7 +162,7 @@
       const mm = at(event.clientX, event.clientY);
       if (!mm) return;
       follow(mm);
-      if (picked) picked.textContent = "Cursor: MNI " + mm.map((x) => x.toFixed(1).replace("-", "\u2212")).join(", ") + " mm (RAS+)";
+      if (picked) picked.textContent = "Cursor: MNI " + mm.map((x) => ((Math.round(10 * x) || 0) / 10).toFixed(1).replace("-", "\u2212")).join(", ") + " mm (RAS+)";
       document.dispatchEvent(new CustomEvent("hgm-picked", { detail: mm }));
     });
     choose(chosen);

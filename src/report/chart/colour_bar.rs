@@ -44,10 +44,13 @@ pub fn colour_bar(scale: &ColourScale) -> String {
     }
     for (value, text) in marks {
         let x = if span > 0.0 { x0 + (x1 - x0) * (value - scale.low) / span } else { x0 };
+        // A long number at the end would be cut off by the picture's edge.
+        let half = 3.4 * text.chars().count() as f64;
+        let middle = x.clamp(half, width - half);
         let _ = write!(
             svg,
             "<path d=\"M{x:.1} 36v4\" stroke=\"currentColor\"/>\
-             <text x=\"{x:.1}\" y=\"54\" text-anchor=\"middle\" fill=\"currentColor\">{text}</text>"
+             <text x=\"{middle:.1}\" y=\"54\" text-anchor=\"middle\" fill=\"currentColor\">{text}</text>"
         );
     }
     svg + "</svg>"

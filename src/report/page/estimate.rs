@@ -32,7 +32,7 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>, truth: &
         let cells = [
             in_words(&posterior.names[n]),
             if claimed { number(posterior.mode[n], 5) } else { "–".to_owned() },
-            if claimed { format!("{} to {}", number(low, 4), number(high, 4)) } else { "–".to_owned() },
+            if claimed { format!("{} to {}", number(low, 5), number(high, 5)) } else { "–".to_owned() },
             before,
             verdict.to_owned(),
         ];

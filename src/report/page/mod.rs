@@ -262,7 +262,9 @@ impl CasePage {
             }),
         );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
-        add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
+        let sliced = self.viewer.as_ref().is_some_and(|viewer| viewer.slices.is_some());
+        let heading = if sliced { "Slices and 3-D view" } else { "3-D view" };
+        add("view", heading, self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));
         add("methods", "Methods", outcome.map(methods::section));
         add("provenance", "Settings and provenance", self.provenance_section());

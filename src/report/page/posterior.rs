@@ -4,7 +4,7 @@ use super::super::chart::{DensityChart, DensityCurve, JointChart, JointGaussian,
 use super::super::html::number;
 use super::results::tissue_name;
 use crate::experiment::estimate::{EstimateOutcome, LogPrior, Scale, Z_95, prior_correlation};
-use crate::experiment::verdict::{Claim, pa, range};
+use crate::experiment::verdict::{Claim, pa, range, with_interval};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 
@@ -63,8 +63,11 @@ fn curve(what: &str, name: &str, scale: Scale, known: Known, before: bool) -> De
         [at(z), (-0.5 * z * z).exp()]
     };
     let ends = [at(-Z_95), at(Z_95)];
+    let said = interval(name, ends);
+    let apart = said.contains(" to ");
     DensityCurve {
-        name: format!("{what}, 95 %: {}", interval(name, ends)),
+        // Where rounding leaves no interval its reach is told instead.
+        name: if apart { format!("{what}, 95 %: {said}") } else { format!("{what}: {}", with_interval(at(0.0), ends)) },
         points: (0..=steps).map(point).collect(),
         interval: ends,
         before,
