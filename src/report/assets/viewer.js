@@ -86,7 +86,12 @@
             kept.push(triangles[t], triangles[t + 1], triangles[t + 2]);
           }
         }
-        mesh.tris = new Uint32Array(kept.length ? kept : triangles.slice(0, 3));
+        // The inner side has nodes of its own, so that it is lit as what it is.
+        const nodes = positions.length / 3, { colours } = surfaces[chosen];
+        const inner = kept.map((_, t) => nodes + kept[t - t % 3 + [0, 2, 1][t % 3]]);
+        mesh.pts = Float32Array.from([...positions, ...positions]);
+        mesh.rgba255 = Uint8Array.from([...colours, ...colours]);
+        mesh.tris = new Uint32Array(kept.length ? [...kept, ...inner] : triangles.slice(0, 3));
       }
       mesh.updateMesh(nv.gl);
     }
@@ -127,7 +132,7 @@
 
     // Where the line of sight through a click first meets the visible surface.
     function at(clientX, clientY) {
-      const box = canvas.getBoundingClientRect(), { positions } = surfaces[chosen], { tris } = meshes[chosen];
+      const box = canvas.getBoundingClientRect(), { pts: positions, tris } = meshes[chosen];
       const [m] = nv.calculateMvpMatrix(null, [0, 0, canvas.width, canvas.height], nv.scene.renderAzimuth, nv.scene.renderElevation);
       const x = 2 * (clientX - box.left) / box.width - 1, y = 1 - 2 * (clientY - box.top) / box.height;
       const seen = new Float32Array(positions.length);
