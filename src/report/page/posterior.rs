@@ -98,8 +98,8 @@ pub fn figures(estimate: &EstimateOutcome, truth: &BTreeMap<String, f64>) -> Mar
             @if !joint.is_empty() {
                 h3 { "Two moduli at once" }
                 p {
-                    "Contours hold 50 % and 95 % of the probability. A long contour along the valley: a stiffer one tissue with a \
-                     softer other explains the scans as well."
+                    "Contours hold 50 % and 95 % of the probability. Where they are long along the valley, one tissue stiffer and the \
+                     other softer explain the scans as well."
                 } "\n"
                 div class="charts" { @for chart in &joint { figure { (PreEscaped(chart.to_svg())) } } } "\n"
             }
