@@ -75,18 +75,18 @@ impl DensityChart {
                 bar - 4.0,
                 bar - 4.0
             );
-            self.legend(&mut svg, n, &curve.name, &format!("stroke=\"{stroke}\" stroke-width=\"2\"{dashes}"));
+            Self::legend(&mut svg, n, &curve.name, &format!("stroke=\"{stroke}\" stroke-width=\"2\"{dashes}"));
         }
         for (n, rule) in self.rules.iter().enumerate() {
             let x = x_axis.at(rule.at);
             let _ = write!(svg, "<path d=\"M{x:.1} {bottom:.1}V{top:.1}\" {RULE}/>");
-            self.legend(&mut svg, self.curves.len() + n, &rule.name, RULE);
+            Self::legend(&mut svg, self.curves.len() + n, &rule.name, RULE);
         }
         foot(&mut svg, &x_axis, bottom, &self.x_label);
         svg + "</svg>"
     }
 
-    fn legend(&self, svg: &mut String, row: usize, name: &str, stroke: &str) {
+    fn legend(svg: &mut String, row: usize, name: &str, stroke: &str) {
         let y = 12.0 + LINE * row as f64;
         let _ = write!(
             svg,

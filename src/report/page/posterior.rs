@@ -174,7 +174,7 @@ fn of_two(estimate: &EstimateOutcome, truth: &BTreeMap<String, f64>) -> Vec<Join
     };
     let direction = pair.map(|n| posterior.identifiability.valley[n]);
     let in_plane = direction[0].hypot(direction[1]) >= IN_PLANE;
-    let valley = in_plane.then(|| Valley { through: after.mean, direction });
+    let valley = in_plane.then_some(Valley { through: after.mean, direction });
     let names = pair.map(|n| tissue_name(tissue_of(&posterior.names[n]).unwrap_or_default()));
     let truth = match pair.map(|n| true_value(&posterior.names[n], truth)) {
         [Some(x), Some(y)] => Some([x, y]),
