@@ -1,123 +1,25 @@
 //! A case directory to a page: reads what is there, says what is not.
 
-use super::colour::ColourScale;
-use super::figure::CaseImages;
+pub use super::case_files::ReportError;
+
+use super::case_files::{Case, best_sample, displaced};
+use super::case_views::add_results;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
-use super::mesh_figure::{cut_views, legend, middle_mm, value_views};
-use super::page::{CaptionedPicture, CasePage, ErrorMap, PredictionFigure, ShiftFigure, title_of};
+use super::mesh_figure::{PICTURE, cut_views, legend, middle_mm};
+use super::page::{CaptionedPicture, CasePage, PredictionFigure, ShiftFigure, title_of};
 use super::shift_figure::{prediction_figure, shift_figure};
-use super::viewer::{ViewedSurface, Viewer};
-use crate::artefact::{WriteError, write_whole};
+use crate::artefact::write_whole;
 use crate::experiment::field::BrainShift;
-use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, OutcomeError};
+use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::Prediction;
-use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
-use crate::image::nifti::{self, NiftiError, ReadOptions};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::geometry::Mni;
+use crate::image::Volume;
+use crate::image::nifti::{self, ReadOptions};
 use crate::layout;
-use crate::mesh::format::{Field, MeshWithFields, ReadError, WriteError as FieldError, gifti, vtu};
-use crate::mesh::{TetMesh, TriMesh};
-use crate::register::transform_text::{self, TransformTextError};
-use serde::de::DeserializeOwned;
+use crate::mesh::TetMesh;
+use crate::mesh::format::Field;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Pixels of the mesh pictures on the page.
-const PICTURE: [usize; 2] = [560, 460];
-
-/// Why a report could not be made.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum ReportError {
-    #[error(
-        "{}: not a case folder: none of its files is there; name a folder made by `hgm run`, `hgm prep` or \
-         `hgm phantom`",
-        folder.display()
-    )]
-    NoCase { folder: PathBuf },
-    #[error(
-        "{}: cannot be read; check that the case folder is a folder and that its files may be read", path.display()
-    )]
-    Read { path: PathBuf, source: std::io::Error },
-    #[error("{file}: not text, so the file is damaged; run `hgm run` or `hgm phantom` again")]
-    Text { file: String },
-    #[error(
-        "{file}: point array `{array}` has {found} numbers for {nodes} nodes: the file is not this case's; make it \
-         again with `hgm run` or `hgm phantom`"
-    )]
-    Array { file: String, array: String, found: usize, nodes: usize },
-    #[error(
-        "{file}: its grid is not that of {other}: one of the two is not this case's; make them again with \
-         `hgm prep PRE POST -o CASE`"
-    )]
-    Grid { file: String, other: String },
-    #[error(transparent)]
-    Image(#[from] NiftiError),
-    #[error(transparent)]
-    Transform(#[from] TransformTextError),
-    #[error(transparent)]
-    Mesh(#[from] ReadError),
-    #[error(transparent)]
-    Outcome(#[from] OutcomeError),
-    #[error("a surface for other viewers: {0}")]
-    HandOff(FieldError),
-    #[error(transparent)]
-    Write(#[from] WriteError),
-}
-
-/// A case directory; files are named relative to it.
-struct Case<'a> {
-    folder: &'a Path,
-}
-
-/// An image and where it is shown.
-type MaskedImage = (Volume<f32, Mni>, Mask<Mni>);
-
-impl Case<'_> {
-    /// The bytes of a file, or `None` when it is not there.
-    fn bytes(&self, file: &str) -> Result<Option<Vec<u8>>, ReportError> {
-        let path = self.folder.join(file);
-        match std::fs::read(&path) {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(source) => Err(ReportError::Read { path, source }),
-        }
-    }
-
-    fn text(&self, file: &str) -> Result<Option<String>, ReportError> {
-        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
-        String::from_utf8(bytes).map(Some).map_err(|_| ReportError::Text { file: file.to_owned() })
-    }
-
-    /// Numbers of ours; `None` when they are not there or another version's.
-    fn numbers<T: DeserializeOwned>(&self, file: &str) -> Result<Option<T>, ReportError> {
-        Ok(self.text(file)?.and_then(|text| serde_json::from_str(&text).ok()))
-    }
-
-    fn mesh(&self, file: &str) -> Result<Option<MeshWithFields>, ReportError> {
-        Ok(self.bytes(file)?.map(|bytes| vtu::decode(&bytes, file)).transpose()?)
-    }
-
-    /// The target surfaces, by name.
-    fn reference_surfaces(&self) -> Result<Vec<(String, TriMesh)>, ReportError> {
-        let family = layout::REFERENCE_SURFACE;
-        let mut sets = Vec::new();
-        for entry in std::fs::read_dir(self.folder.join(family.folder())).into_iter().flatten().flatten() {
-            let file = format!("{}/{}", family.folder(), entry.file_name().to_string_lossy());
-            sets.extend(family.member(&file).map(str::to_owned));
-        }
-        sets.sort();
-        let mut surfaces = Vec::new();
-        for set in sets {
-            let file = family.of(&set);
-            if let Some(bytes) = self.bytes(&file)? {
-                surfaces.push((set.replace('_', " "), gifti::decode_surface(&bytes, &file)?));
-            }
-        }
-        Ok(surfaces)
-    }
-}
 
 /// The brain shift of the model's state on a slice.
 fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftFigure>, ReportError> {
@@ -191,7 +93,7 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     }
     match &outcome {
         Some(outcome) if outcome.kind == ExperimentKind::Prediction => {}
-        Some(outcome) => add_results(&case, outcome, rest.as_ref(), &mut page)?,
+        Some(outcome) => add_results(&case, outcome, rest.as_ref(), images.as_ref(), &mut page)?,
         None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
     }
     page.prediction = case.numbers(layout::PREDICTION_JSON)?;
@@ -260,13 +162,6 @@ pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     Ok(folder.join(layout::PAGE))
 }
 
-/// The best sample's file and its name, when both are there.
-fn best_sample(case: &Case<'_>, outcome: &ExperimentOutcome) -> Result<Option<(String, MeshWithFields)>, ReportError> {
-    let Some(best) = outcome.best() else { return Ok(None) };
-    let file = best.file.clone().unwrap_or_else(|| layout::SAMPLE_STATE.of(&best.id));
-    Ok(case.mesh(&file)?.map(|sample| (file, sample)))
-}
-
 /// Where the mesh is cut: through the resection margin when there is one, else near the middle.
 fn focus_mm(mesh: &TetMesh) -> [f64; 3] {
     let margin = mesh.node_sets.get("margin").filter(|nodes| !nodes.is_empty());
@@ -279,165 +174,13 @@ fn focus_mm(mesh: &TetMesh) -> [f64; 3] {
     )
 }
 
-/// Nodes moved by the point array `displacement`; the nodes themselves when it is absent.
-fn displaced(file: &str, sample: &MeshWithFields) -> Result<Vec<[f64; 3]>, ReportError> {
-    let nodes = sample.mesh.nodes_mm();
-    let Some(field) = sample.point_field("displacement") else { return Ok(nodes.to_vec()) };
-    if field.values.len() != 3 * nodes.len() {
-        let (array, found) = (field.name.clone(), field.values.len());
-        return Err(ReportError::Array { file: file.to_owned(), array, found, nodes: nodes.len() });
-    }
-    let moved = |(p, u): (&[f64; 3], &[f64])| [p[0] + u[0], p[1] + u[1], p[2] + u[2]];
-    Ok(nodes.iter().zip(field.values.chunks_exact(3)).map(moved).collect())
-}
-
-/// The error of every node, NaN where the reference says nothing of it: such a node is not without error.
-fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
-    let errors = sample.point_field("rmse_mm").filter(|f| f.values.len() == sample.mesh.nodes_mm().len())?;
-    let mut seen = vec![f64::NAN; errors.values.len()];
-    // In a file from before node sets were marked, or written again by another program, the array is read as a set.
-    match (sample.point_field("rmse_observed"), sample.mesh.node_sets.get("rmse_observed")) {
-        (Some(observed), _) => {
-            for (n, _) in observed.values.iter().enumerate().filter(|(_, v)| **v == 1.0) {
-                seen[n] = errors.values[n];
-            }
-        }
-        (None, Some(observed)) => observed.iter().for_each(|&n| seen[n as usize] = errors.values[n as usize]),
-        (None, None) => return Some(errors.values.clone()),
-    }
-    Some(seen)
-}
-
-/// Error map and 3-D view from the best sample and the reference.
-fn add_results(
-    case: &Case<'_>,
-    outcome: &ExperimentOutcome,
-    rest: Option<&MeshWithFields>,
-    page: &mut CasePage,
-) -> Result<(), ReportError> {
-    let Some(best) = outcome.best() else {
-        page.absent.push("the error per node (no sample is the best one)".to_owned());
-        return Ok(());
-    };
-    let Some((file, sample)) = best_sample(case, outcome)? else {
-        page.absent.push(format!("the error per node and the 3-D view (the file of {} is not there)", best.id));
-        return Ok(());
-    };
-    let mesh = &sample.mesh;
-    let deformed = displaced(&file, &sample)?;
-    let errors = observed_errors(&sample);
-    let scale = errors.as_ref().and_then(|e| ColourScale::to_95(e.iter().copied(), "error per node (mm)"));
-    if let (Some(errors), Some(scale)) = (&errors, &scale) {
-        let sets = outcome.rmse_sets();
-        let named: Vec<&str> = sets.iter().map(String::as_str).filter(|s| *s != "all").collect();
-        let of_set = |set: &String| {
-            let values = match mesh.node_sets.get(set) {
-                Some(nodes) => nodes.iter().map(|&n| errors[n as usize]).collect(),
-                None if set == "all" => errors.clone(),
-                None => Vec::new(),
-            };
-            let values: Vec<f64> = values.into_iter().filter(|v: &f64| v.is_finite()).collect();
-            (!values.is_empty()).then(|| (set.clone(), values))
-        };
-        page.error_map = Some(ErrorMap {
-            scale: scale.clone(),
-            pictures: value_views(mesh, &deformed, errors, scale, &named, PICTURE),
-            errors_mm: sets.iter().filter_map(of_set).collect(),
-        });
-    } else {
-        page.absent.push(format!("the error per node ({file} has no point array `rmse_mm`)"));
-    }
-    page.viewer = Some(viewer(case, rest, mesh, &deformed, errors, scale)?);
-    Ok(())
-}
-
-fn viewer(
-    case: &Case<'_>,
-    rest: Option<&MeshWithFields>,
-    mesh: &TetMesh,
-    deformed: &[[f64; 3]],
-    errors: Option<Vec<f64>>,
-    scale: Option<ColourScale>,
-) -> Result<Viewer, ReportError> {
-    let facets = mesh.boundary_facets(|_| true);
-    let (surface, old) = TriMesh::from_facets(deformed, &facets);
-    let values = errors.filter(|_| scale.is_some()).map(|e| old.iter().map(|&n| e[n as usize]).collect());
-    let undeformed = rest.map_or(mesh, |r| &r.mesh);
-    let rest_surface = TriMesh::from_facets(undeformed.nodes_mm(), &undeformed.boundary_facets(|_| true)).0;
-    let plain = |name: &str, surface| ViewedSurface { name: name.to_owned(), surface, values: Vec::new() };
-    let mut surfaces = vec![
-        plain("undeformed", rest_surface),
-        ViewedSurface { name: "deformed, with error".to_owned(), surface, values: values.unwrap_or_default() },
-    ];
-    if let Some(reference) = case.mesh(layout::REFERENCE_STATE)? {
-        let nodes = displaced(layout::REFERENCE_STATE, &reference)?;
-        surfaces.push(plain("reference", TriMesh::from_facets(&nodes, &reference.mesh.boundary_facets(|_| true)).0));
-    }
-    for (what, surface) in case.reference_surfaces()? {
-        surfaces.push(plain(&format!("reference: {what}"), surface));
-    }
-    Ok(Viewer { surfaces, scale })
-}
-
-impl Case<'_> {
-    fn mask(&self, file: &str) -> Result<Option<Mask<Mni>>, ReportError> {
-        // Read as labels: a cavity that is empty is a result, not a fault.
-        Ok(self.labels(file)?.map(|labels| labels.map(|l| l != 0)))
-    }
-
-    fn labels(&self, file: &str) -> Result<Option<LabelMap<Mni>>, ReportError> {
-        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
-        Ok(Some(nifti::decode_labels(&bytes, file, &ReadOptions::default())?.0.relabelled()))
-    }
-
-    fn intensities(&self, file: &str) -> Result<Option<Volume<f32, Mni>>, ReportError> {
-        let Some(bytes) = self.bytes(file)? else { return Ok(None) };
-        Ok(Some(nifti::decode(&bytes, file, &ReadOptions::default())?.volume.relabelled()))
-    }
-
-    fn transform<M: Frame, F: Frame>(&self, file: &str) -> Result<Option<RigidTransform<M, F>>, ReportError> {
-        let Some(text) = self.text(file)? else { return Ok(None) };
-        Ok(Some(transform_text::rigid_from_text(&text, file)?))
-    }
-
-    /// An image and its brain mask, which must share a grid; `None` when either is absent.
-    fn masked_image(&self, image: &str, mask: &str) -> Result<Option<MaskedImage>, ReportError> {
-        let (Some(volume), Some(brain)) = (self.intensities(image)?, self.mask(mask)?) else { return Ok(None) };
-        if !volume.grid.coincides(&brain.grid, 1e-3) {
-            return Err(ReportError::Grid { file: mask.to_owned(), other: image.to_owned() });
-        }
-        Ok(Some((volume, brain)))
-    }
-
-    /// The images in the MNI frame; `None` without the pre-operative image and its brain.
-    fn images(&self) -> Result<Option<CaseImages>, ReportError> {
-        let pre = self.masked_image(layout::PRE_T1, layout::PRE_BRAIN)?;
-        let Some((pre, pre_brain)) = pre else { return Ok(None) };
-        let pre_from_post = self.transform::<Post, Pre>(layout::PRE_FROM_POST_TEXT)?;
-        let mni_from_pre = self.transform::<Pre, Mni>(layout::MNI_FROM_PRE_TEXT)?;
-        // As scanned: the coordinates of the one scan are taken for those of the other.
-        let registered_from_scanned = pre_from_post.zip(mni_from_pre).map(|(pre_from_post, mni_from_pre)| {
-            mni_from_pre.inverse().relabelled::<Mni, Post>().then(&pre_from_post).then(&mni_from_pre)
-        });
-        Ok(Some(CaseImages {
-            pre,
-            pre_brain,
-            post: self.masked_image(layout::POST_T1, layout::POST_BRAIN)?,
-            labels: self.labels(layout::PRE_LABELS)?,
-            resected: self.mask(layout::RESECTED)?,
-            cavity: self.mask(layout::CAVITY)?,
-            registered_from_scanned,
-        }))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::experiment::outcome::SampleOutcome;
     use crate::geometry::Position;
-    use crate::image::Grid;
-    use crate::mesh::format::Field;
+    use crate::image::{Grid, Mask};
+    use crate::mesh::format::vtu;
 
     fn mesh() -> TetMesh {
         let nodes = vec![[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0], [50.0, 50.0, 50.0]];

@@ -10,6 +10,9 @@ use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::label;
 use nalgebra::Vector3;
 
+/// Pixels of the mesh pictures on the page.
+pub const PICTURE: [usize; 2] = [560, 460];
+
 /// A cut view: where the mesh is cut and from where it is seen.
 struct CutView {
     axis: usize,

@@ -1,11 +1,14 @@
 //! HTML page, figures, tables, VTK series.
 
 pub mod case;
+mod case_files;
+mod case_views;
 pub mod change_chart;
 pub mod chart;
 pub mod cohort;
 pub mod cohort_population;
 pub mod colour;
+pub mod decimation;
 pub mod derivatives;
 pub mod figure;
 pub mod glance_figure;
@@ -13,6 +16,7 @@ pub mod hand_off;
 pub mod html;
 pub mod in_words;
 pub mod lettering;
+pub mod linked_slices;
 pub mod material_figure;
 pub mod material_tables;
 pub mod median_samples;
@@ -26,4 +30,5 @@ pub mod shift_figure;
 pub mod slice;
 pub mod study_level_figure;
 pub mod study_level_tables;
+pub mod swept_states;
 pub mod viewer;

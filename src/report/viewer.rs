@@ -2,7 +2,10 @@
 
 use super::chart;
 use super::colour::{ColourScale, NO_VALUE};
+use super::decimation::Decimation;
 use super::html::script_json;
+use super::linked_slices::LinkedSlices;
+use super::swept_states::SweptStates;
 use crate::mesh::TriMesh;
 use base64::Engine;
 use maud::{Markup, PreEscaped, html};
@@ -11,9 +14,21 @@ use maud::{Markup, PreEscaped, html};
 const NIIVUE: &[u8] = include_bytes!("assets/niivue-0.69.0.umd.js.gz");
 const NIIVUE_LICENCE: &str = include_str!("assets/LICENSE-niivue.txt");
 const SCRIPT: &str = include_str!("assets/viewer.js");
+const SLICES_SCRIPT: &str = include_str!("assets/slices.js");
+const STATES_SCRIPT: &str = include_str!("assets/states.js");
 
 /// Triangles a surface may have on the page; a larger one is decimated, for the page only.
 const TRIANGLES_MAX: usize = 60_000;
+
+/// What can be cut away beside the cursor: the sign and the axis, and what it is called.
+const CUTS: [(&str, &str); 6] = [
+    ("+0", "what is right of the cursor"),
+    ("-0", "what is left of it"),
+    ("+1", "what is in front of it"),
+    ("-1", "what is behind it"),
+    ("+2", "what is above it"),
+    ("-2", "what is below it"),
+];
 
 /// One surface of the view.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,29 +48,55 @@ pub struct Viewer {
     pub surfaces: Vec<ViewedSurface>,
     /// Colours of the values: exactly their range.
     pub scale: Option<ColourScale>,
+    /// The simulated states that a slider moves between.
+    pub states: Option<SweptStates>,
+    /// The scans, for slices that follow the cursor.
+    pub slices: Option<LinkedSlices>,
 }
 
 impl Viewer {
     /// The section's content; everything it needs beside the scripts.
     pub(super) fn section(&self) -> Markup {
         let sides = [
-            ("left", 270, 0),
-            ("right", 90, 0),
+            ("left", 90, 0),
+            ("right", 270, 0),
             ("anterior", 180, 0),
             ("posterior", 0, 0),
             ("superior", 0, 90),
             ("inferior", 180, -90),
         ];
         html! {
-            p { "Drag to turn, scroll to come nearer; or use the buttons, or the arrow keys with the picture in focus." }
+            @if let Some(slices) = &self.slices { (slices.section()) }
+            p {
+                "Drag to turn, scroll to come nearer; or use the buttons, or the arrow keys with the picture in focus. A click on the \
+                 surface moves the cursor there."
+            }
+            @if self.slices.is_none() { p class="where" { output id="picked" {} } }
             div class="controls" role="group" aria-label="Surface" {
                 @for (n, s) in self.surfaces.iter().enumerate() {
                     button type="button" data-surface=(n) aria-pressed=(if n == self.first() { "true" } else { "false" }) { (s.name) }
                 }
+                @if self.states.is_some() {
+                    button type="button" data-surface=(self.surfaces.len()) aria-pressed="false" { "any sample" }
+                }
             }
+            @if let Some(states) = &self.states { (sliders(states)) }
             div class="controls" role="group" aria-label="Side" {
                 @for (side, azimuth, elevation) in sides {
                     button type="button" data-azimuth=(azimuth) data-elevation=(elevation) { (side) }
+                }
+            }
+            div class="controls" {
+                span {
+                    label for="cut" { "Cut away " }
+                    select id="cut" {
+                        option value="" { "nothing" }
+                        @for (value, what) in CUTS { option value=(value) { (what) } }
+                    }
+                }
+                span class="slider" {
+                    label for="opacity" { "Opacity" }
+                    input type="range" id="opacity" min="0.2" max="1" step="0.05" value="1";
                 }
             }
             div class="stage" id="stage" {
@@ -69,6 +110,9 @@ impl Viewer {
                 div class="bar-row" id="view-bar" data-low=(scale.low) data-high=(scale.high) {
                     (PreEscaped(chart::colour_bar(scale)))
                 } "\n"
+            }
+            @if let Some(states) = &self.states {
+                div class="bar-row" id="states-bar" hidden { (PreEscaped(chart::colour_bar(&states.scale))) } "\n"
             }
             details {
                 summary { "The viewer is niivue 0.69.0 (BSD 2-Clause)" }
@@ -88,7 +132,10 @@ impl Viewer {
             .surfaces
             .iter()
             .map(|s| {
-                let (surface, values) = decimated(&s.surface, &s.values, TRIANGLES_MAX);
+                let small = Decimation::of(&s.surface, TRIANGLES_MAX);
+                let plain: Vec<[f64; 1]> = s.values.iter().map(|v| [*v]).collect();
+                let values: Vec<f64> = if plain.is_empty() { Vec::new() } else { small.means(&plain).concat() };
+                let surface = &small.surface;
                 let positions: Vec<u8> =
                     surface.nodes_mm.iter().flatten().flat_map(|x| (*x as f32).to_le_bytes()).collect();
                 let triangles: Vec<u8> = surface.triangles.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
@@ -96,14 +143,24 @@ impl Viewer {
                     "name": s.name,
                     "positions": base64.encode(positions),
                     "triangles": base64.encode(triangles),
-                    "colours": base64.encode(self.colours(&surface, &values)),
+                    "colours": base64.encode(self.colours(surface, &values)),
                     "range": ColourScale::over(values.iter().copied(), "").map(|r| [r.low, r.high]),
                 })
             })
             .collect();
         let data = script_json(&serde_json::json!({"surfaces": surfaces, "first": self.first()}));
+        let states = self.states.as_ref().map(|states| script_json(&states.json()));
+        let slices = self.slices.as_ref().map(|slices| script_json(&slices.json()));
         html! {
             script type="application/json" id="view-data" { (PreEscaped(data)) } "\n"
+            @if let Some(states) = &states {
+                script type="application/json" id="states-data" { (PreEscaped(states)) } "\n"
+                script { "\n" (PreEscaped(STATES_SCRIPT)) } "\n"
+            }
+            @if let Some(slices) = &slices {
+                script type="application/json" id="slices-data" { (PreEscaped(slices)) } "\n"
+                script { "\n" (PreEscaped(SLICES_SCRIPT)) } "\n"
+            }
             script type="text/plain" id="niivue" { (base64.encode(NIIVUE)) } "\n"
             script { "\n" (PreEscaped(SCRIPT)) } "\n"
         }
@@ -125,90 +182,40 @@ impl Viewer {
     }
 }
 
-/// A surface with at most about `triangles_max` triangles: nodes that share a cube of a lattice become their mean, the
-/// cube as small as will do (J. Rossignac, P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes",
-/// 1993). Values become the mean of the finite ones. A surface that is small enough comes back unchanged.
-pub fn decimated(surface: &TriMesh, values: &[f64], triangles_max: usize) -> (TriMesh, Vec<f64>) {
-    let mut result = (surface.clone(), values.to_vec());
-    let area = surface.area_mm2();
-    // Two triangles per square of the lattice on a flat surface; then larger until it fits.
-    let mut edge_mm = (2.0 * area / triangles_max.max(1) as f64).sqrt();
-    while result.0.triangles.len() > triangles_max && edge_mm > 0.0 {
-        result = clustered(surface, values, edge_mm);
-        edge_mm *= 1.15;
+/// One slider for every way the samples differ, standing on the best one.
+fn sliders(states: &SweptStates) -> Markup {
+    html! {
+        div class="controls sliders" {
+            @for (axis, stops) in states.grid.stops.iter().enumerate() {
+                span class="slider" {
+                    label for={ "states-" (axis) } { (states.grid.label(axis)) }
+                    input type="range" class="states" id={ "states-" (axis) } min="0" max=(stops - 1) step="0.1"
+                        value=(states.grid.best[axis]) aria-valuetext=(states.said(&states.grid.best));
+                }
+            }
+            output id="states-said" { (states.said(&states.grid.best)) }
+        } "\n"
     }
-    result
-}
-
-fn clustered(surface: &TriMesh, values: &[f64], edge_mm: f64) -> (TriMesh, Vec<f64>) {
-    let cube = |p: &[f64; 3]| p.map(|x| (x / edge_mm).floor() as i64);
-    let mut cubes: Vec<[i64; 3]> = surface.nodes_mm.iter().map(cube).collect();
-    cubes.sort_unstable();
-    cubes.dedup();
-    let mut nodes_mm = vec![[0.0; 3]; cubes.len()];
-    let mut counts = vec![0.0; cubes.len()];
-    let (mut sums, mut finite) = (vec![0.0; cubes.len()], vec![0.0; cubes.len()]);
-    let mut number = Vec::with_capacity(surface.nodes_mm.len());
-    for (n, p) in surface.nodes_mm.iter().enumerate() {
-        let new = cubes.binary_search(&cube(p)).unwrap_or(0);
-        number.push(new as u32);
-        (0..3).for_each(|a| nodes_mm[new][a] += p[a]);
-        counts[new] += 1.0;
-        if let Some(v) = values.get(n).filter(|v| v.is_finite()) {
-            sums[new] += v;
-            finite[new] += 1.0;
-        }
-    }
-    for (p, count) in nodes_mm.iter_mut().zip(&counts) {
-        *p = p.map(|x| x / count);
-    }
-    let mut triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(|n| number[n as usize])).collect();
-    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
-    let mean = |n: usize| if finite[n] > 0.0 { sums[n] / finite[n] } else { f64::NAN };
-    let values = if values.is_empty() { Vec::new() } else { (0..cubes.len()).map(mean).collect() };
-    (TriMesh { nodes_mm, triangles }, values)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A square of n x n quads in the plane z = 0, values = x.
-    fn square(n: usize) -> (TriMesh, Vec<f64>) {
-        let at = |i: usize, j: usize| (i * (n + 1) + j) as u32;
-        let nodes_mm: Vec<[f64; 3]> = (0..=n).flat_map(|i| (0..=n).map(move |j| [i as f64, j as f64, 0.0])).collect();
-        let triangles = (0..n)
-            .flat_map(|i| (0..n).map(move |j| (i, j)))
-            .flat_map(|(i, j)| {
-                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                [[a, b, c], [a, c, d]]
-            })
-            .collect();
-        let values = nodes_mm.iter().map(|p| p[0]).collect();
-        (TriMesh { nodes_mm, triangles }, values)
-    }
-
-    #[test]
-    fn decimation_keeps_area_values_and_the_bound() {
-        let (surface, values) = square(60);
-        let (small, means) = decimated(&surface, &values, 2000);
-        assert!(small.triangles.len() <= 2000 && small.triangles.len() > 1000, "{}", small.triangles.len());
-        assert!((small.area_mm2() / surface.area_mm2() - 1.0).abs() < 0.08);
-        assert!(small.nodes_mm.iter().zip(&means).all(|(p, v)| (p[0] - v).abs() < 1e-9));
-    }
-
-    #[test]
-    fn a_small_surface_is_left_alone() {
-        let (surface, values) = square(3);
-        assert_eq!(decimated(&surface, &values, 100), (surface, values));
+    /// Two triangles, values = x.
+    fn square() -> (TriMesh, Vec<f64>) {
+        let nodes_mm = vec![[0.0; 3], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0]];
+        let values = nodes_mm.iter().map(|p: &[f64; 3]| p[0]).collect();
+        (TriMesh { nodes_mm, triangles: vec![[0, 1, 2], [0, 2, 3]] }, values)
     }
 
     #[test]
     fn scripts_hold_no_markup_of_names() {
-        let (surface, values) = square(2);
+        let (surface, values) = square();
         let name = "</script><b>".to_owned();
         let scale = ColourScale::over(values.iter().copied(), "RMSE (mm)");
-        let viewer = Viewer { surfaces: vec![ViewedSurface { name, surface, values }], scale };
+        let surfaces = vec![ViewedSurface { name, surface, values }];
+        let viewer = Viewer { surfaces, scale, states: None, slices: None };
         let scripts = viewer.scripts().into_string();
         assert_eq!(scripts.matches("</script").count(), 3);
         let section = viewer.section().into_string();

@@ -9,6 +9,7 @@ Exit code 1 when a check fails. DIR gets a picture of every section.
 
 import argparse
 import base64
+import importlib.util
 import json
 import pathlib
 import re
@@ -154,6 +155,120 @@ def the_view_shows_every_surface_and_turns_by_keyboard(page, _):
         _, _, after = inked(browser)
         require(before != after, "the arrow keys turn nothing")
         return f"{len(shares)} surfaces, share of the canvas {shares}"
+
+
+@check
+def the_slider_goes_through_the_samples_by_keyboard(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if not has(browser, "#states-0"):
+            return "no slider on this page"
+        view_ready(browser)
+        sliders = browser.evaluate("document.querySelectorAll('input.states').length")
+        positions = "[...window.hgmStates.positions].filter((_, n) => n % 11 === 0)"
+        said = "document.getElementById('states-said').textContent"
+        for n in range(sliders):
+            slider = f"document.getElementById('states-{n}')"
+            put = "(v) => { const s = %s; s.value = v; s.dispatchEvent(new Event('input')); }" % slider
+            states = [browser.evaluate(f"(({put})({value}), {positions})") for value in (1, 2, 1.5)]
+            require(states[0] != states[1], "two samples have one shape")
+            worst = max(abs(m - (a + b) / 2) for a, b, m in zip(*states))
+            require(worst < 1e-3, f"half way is {worst} mm off the middle of both")
+            require("interpolated between" in browser.evaluate(said), browser.evaluate(said))
+            browser.evaluate(f"({put})(2)")
+            require(browser.evaluate(said).endswith("simulated") and "interpolated" not in browser.evaluate(said), browser.evaluate(said))
+            before = browser.evaluate(said)
+            browser.evaluate(f"{slider}.focus()")
+            browser.key("ArrowLeft", 37)
+            browser.listen(0.3)
+            require(browser.evaluate(said) != before, "the arrow keys move no slider")
+            require(browser.evaluate(f"{slider}.getAttribute('aria-valuetext') === {said}"), "a screen reader is told something else")
+            # Back on a sample: what the next slider says is about itself alone.
+            browser.evaluate(f"({put})(2)")
+        pushed = browser.evaluate("document.querySelector('[data-surface][aria-pressed=true]').textContent")
+        require(pushed == "any sample", f"the slider moves what is not shown: {pushed}")
+        require(not browser.evaluate("document.getElementById('states-bar').hidden"), "no bar says what the colours mean")
+        share, colours, _ = inked(browser)
+        require(share > 0.02 and colours > 50, f"{share:.3f} of the canvas, {colours} colours")
+        return f"{sliders} slider(s): {browser.evaluate(said)}"
+
+
+def numbers(text):
+    return [float(n) for n in re.findall(r"-?\d+\.\d+", text.replace("\u2212", "-"))]
+
+
+def press(browser, selector, fractions):
+    x, y, width, height = browser.evaluate(
+        f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+        " return [r.x, r.y, r.width, r.height]; })()")
+    for kind in ["mousePressed", "mouseReleased"]:
+        browser.call("Input.dispatchMouseEvent", type=kind, x=x + fractions[0] * width, y=y + fractions[1] * height,
+                     button="left", buttons=1, clickCount=1)
+    browser.listen(0.4)
+
+
+@check
+def a_click_moves_the_cursor_in_every_slice(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if not has(browser, "canvas.slice"):
+            return "no slices on this page"
+        browser.wait_for("document.querySelector('canvas.slice').dataset.ready === 'yes'", 60)
+        browser.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+        browser.evaluate("document.querySelector('canvas.slice').scrollIntoView({block: 'center'})")
+        data = browser.evaluate("(({size, corner_mm, step_mm}) => ({size, corner_mm, step_mm}))"
+                                "(JSON.parse(document.getElementById('slices-data').textContent))")
+        said = "document.getElementById('cursor').textContent"
+        seen = "[...document.querySelectorAll('canvas.slice')].map((c) => c.toDataURL())"
+        before = browser.evaluate(seen)
+        z = numbers(browser.evaluate(said))[2]
+        press(browser, "canvas[data-plane=axial]", (0.25, 0.4))
+        after, places = browser.evaluate(seen), numbers(browser.evaluate(said))
+        require(all(a != b for a, b in zip(before, after)), "a slice has not followed")
+        expected = [data["corner_mm"][a] + data["step_mm"] * ((1 - f) * data["size"][a] - 0.5) for a, f in ((0, 0.25), (1, 0.4))]
+        require(all(abs(a - b) < 1 for a, b in zip(places, expected)) and places[2] == z, f"{places} instead of {expected}, {z}")
+        # The scanner's coordinates, through the file that other programs read.
+        motion = page.parent / "xfm" / "from-pre_to-MNI.txt"
+        if motion.exists() and len(places) >= 6:
+            rows = [list(map(float, line.split())) for line in motion.read_text().splitlines()[:3]]
+            there = [sum(m * p for m, p in zip(row, places[3:6])) + row[3] for row in rows]
+            require(all(abs(a - b) < 0.2 for a, b in zip(there, places[:3])), f"{there} instead of {places[:3]}")
+        browser.evaluate("document.querySelector('canvas[data-plane=axial]').focus()")
+        browser.key("PageUp", 33)
+        browser.listen(0.3)
+        require(abs(numbers(browser.evaluate(said))[2] - z - 1) < 0.11, "Page Up moves by 1 mm across the slice")
+        browser.key("ArrowLeft", 37)
+        browser.listen(0.3)
+        require(abs(numbers(browser.evaluate(said))[0] - places[0] - 1) < 0.11, "left on an axial slice is the patient's right")
+        return browser.evaluate(said)
+
+
+@check
+def a_click_on_the_surface_finds_the_side_that_is_seen(page, _):
+    with Browser() as browser:
+        browser.open(page.as_uri())
+        if not has(browser, "#gl"):
+            return "no 3-D view on this page"
+        view_ready(browser)
+        browser.evaluate("document.querySelector('[data-surface]').click()")
+        middle = browser.evaluate(
+            "(() => { const p = window.hgmView.positions; const r = [0, 1, 2].map((a) => { let l = 1e9, h = -1e9;"
+            " for (let n = a; n < p.length; n += 3) { l = Math.min(l, p[n]); h = Math.max(h, p[n]); } return (l + h) / 2; }); return r; })()")
+        where = "#cursor" if has(browser, "#cursor") else "#picked"
+        found = []
+        for side, axis, sign in [("left", 0, -1), ("right", 0, 1), ("anterior", 1, 1), ("superior", 2, 1)]:
+            browser.evaluate(f"[...document.querySelectorAll('[data-azimuth]')].find((b) => b.textContent === '{side}').click()")
+            browser.listen(0.3)
+            press(browser, "#gl", (0.5, 0.5))
+            place = numbers(browser.evaluate(f"document.querySelector('{where}').textContent"))
+            require(len(place) >= 3, f"nothing found from the {side}")
+            require(sign * (place[axis] - middle[axis]) > 0, f"from the {side}: {place}")
+            found.append(f"{side} {place[:3]}")
+        before = inked(browser)[2]
+        browser.evaluate("(() => { const c = document.getElementById('cut'); c.value = '+2'; c.dispatchEvent(new Event('input')); })()")
+        browser.listen(0.4)
+        require(inked(browser)[2] != before, "nothing is cut away")
+        return "; ".join(found)
 
 
 @check
@@ -355,23 +470,39 @@ def no_heading_hides_behind_the_bar_on_a_narrow_screen(page, _):
         require(not hidden, f"hidden: {hidden}")
 
 
+def axe_core(options):
+    """The script of axe-core (MPL-2.0), from the Python package that carries it; the package itself is not run."""
+    if options.axe:
+        return options.axe.read_text(encoding="utf-8")
+    found = importlib.util.find_spec("axe_playwright_python")
+    require(found, "axe-core is missing: pip install -r pipelines/requirements-test.txt, or give --axe axe.min.js")
+    return (pathlib.Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8")
+
+
+AXE = """
+axe.run(document, {resultTypes: ['violations']}).then((r) => r.violations.map((v) =>
+  ({id: v.id, impact: v.impact, nodes: v.nodes.length, first: v.nodes[0].html.slice(0, 160)})))
+"""
+
+
+def grave(faults):
+    return [fault for fault in faults if fault["impact"] in ("serious", "critical")]
+
+
 @check
 def axe_finds_no_serious_fault_in_light_or_dark(page, options):
-    if not options.axe:
-        return "no axe-core given (--axe)"
-    script, said = options.axe.read_text(encoding="utf-8"), []
+    script, said = axe_core(options), []
     for dark in (False, True):
         with Browser(dark=dark) as browser:
             browser.open(page.as_uri())
             browser.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
             browser.evaluate(script + "; 0")
-            found = browser.evaluate(
-                "axe.run(document, {resultTypes: ['violations']}).then((r) => r.violations.map((v) =>"
-                " ({id: v.id, impact: v.impact, nodes: v.nodes.length, first: v.nodes[0].html.slice(0, 160)})))")
-            grave = [fault for fault in found if fault["impact"] in ("serious", "critical")]
-            require(not grave, f"{'dark' if dark else 'light'}: {grave[:4]}")
+            found = browser.evaluate(AXE)
+            require(not grave(found), f"{'dark' if dark else 'light'}: {grave(found)[:4]}")
             said.append(f"{len(found)} lesser")
-    return f"0 serious ({', '.join(said)})"
+            browser.evaluate("document.querySelector('main').append(document.createElement('img'))")
+            require(grave(browser.evaluate(AXE)), "the check is asleep")
+    return f"axe-core {re.search(r'axe v([0-9.]+)', script).group(1)}: 0 serious (light {said[0]}, dark {said[1]})"
 
 
 @check
@@ -453,13 +584,15 @@ def a_rating_is_saved_as_json(page, _):
         require("2 of 6" in said, said)
 
 
-def take_pictures(page, folder, dark):
+def take_pictures(page, folder, dark, width):
     folder.mkdir(parents=True, exist_ok=True)
-    with Browser(dark=dark) as browser:
+    with Browser(dark=dark, width=width) as browser:
         browser.open(page.as_uri())
         if has(browser, "#gl"):
             view_ready(browser)
         browser.evaluate("document.querySelector('nav').style.position = 'static'")
+        if has(browser, "canvas.slice"):
+            browser.wait_for("document.querySelector('canvas.slice').dataset.ready === 'yes'", 60)
         for name in browser.evaluate("[...document.querySelectorAll('#glance, #warnings, main > section')].map((e) => e.id)"):
             browser.picture(folder / f"{name}.png", rectangle(browser, f"#{name}"))
 
@@ -469,7 +602,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path, metavar="REPORT.html")
     parser.add_argument("--pictures", type=pathlib.Path, help="folder for a picture of every section")
     parser.add_argument("--slack", type=float, default=1.0, help="factor on the time bars for a loaded machine")
-    parser.add_argument("--axe", type=pathlib.Path, help="axe.min.js of the npm package axe-core (MPL-2.0)")
+    parser.add_argument("--axe", type=pathlib.Path, help="another axe.min.js (npm package axe-core, MPL-2.0) than the installed one")
     parser.add_argument("--only", help="run the checks whose name contains this")
     options = parser.parse_args()
     failed = 0
@@ -485,9 +618,8 @@ def main():
                 failed += 1
                 print(f"  FAILED {function.__name__}: {error}", flush=True)
         if options.pictures:
-            for dark in (False, True):
-                folder = options.pictures / f"page-{number + 1}-{page.parent.name}" / ("dark" if dark else "light")
-                take_pictures(page, folder, dark)
+            for look, dark, width in [("light", False, 1400), ("dark", True, 1400), ("medium", False, 900), ("narrow", False, 400)]:
+                take_pictures(page, options.pictures / f"page-{number + 1}-{page.parent.name}" / look, dark, width)
     sys.exit(1 if failed else 0)
 
 

@@ -29,7 +29,9 @@ pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
 pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, solve_problem};
-pub use posterior::{Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace};
+pub use posterior::{
+    Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace, prior_correlation,
+};
 pub use process::{Factor, Process, spread_out};
 pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, moved_by};
 pub use rigid_remainder::RigidModes;
@@ -78,6 +80,23 @@ impl Scale {
             Self::Angle => number.to_degrees(),
             Self::Plain => number,
             Self::Share => 1.0 / (1.0 + (-number).exp()),
+        }
+    }
+
+    /// The number behind the quantity: the inverse of [`Scale::value`].
+    ///
+    /// ```
+    /// # use hgm::experiment::estimate::Scale;
+    /// for scale in [Scale::Logarithm, Scale::Angle, Scale::Plain, Scale::Share] {
+    ///     assert!((scale.number(scale.value(0.7)) - 0.7).abs() < 1e-12);
+    /// }
+    /// ```
+    pub fn number(self, value: f64) -> f64 {
+        match self {
+            Self::Logarithm => value.ln(),
+            Self::Angle => value.to_radians(),
+            Self::Plain => value,
+            Self::Share => (value / (1.0 - value)).ln(),
         }
     }
 }

@@ -72,6 +72,15 @@ pub fn information(jacobian: &DMatrix<f64>, own: usize, others: &[f64]) -> DMatr
     ours - cross.transpose() * invert(&theirs) * cross
 }
 
+/// How two parameters go together before the patient is seen.
+pub fn prior_correlation(prior: &[LogPrior], a: usize, b: usize) -> f64 {
+    match a.cmp(&b) {
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => prior[a].correlation.get(a - b - 1).copied().unwrap_or(0.0),
+        std::cmp::Ordering::Less => prior_correlation(prior, b, a),
+    }
+}
+
 /// The inverse of the joint covariance of these priors; rows of no prior knowledge are zero.
 pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
     let n = prior.len();
@@ -80,13 +89,8 @@ pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
     }
     let known: Vec<usize> = (0..n).filter(|&p| prior[p].sd.is_some()).collect();
     let sd = |p: usize| prior[p].sd.unwrap_or(0.0);
-    let correlation = |a: usize, b: usize| match a.cmp(&b) {
-        std::cmp::Ordering::Equal => 1.0,
-        std::cmp::Ordering::Greater => prior[a].correlation.get(a - b - 1).copied().unwrap_or(0.0),
-        std::cmp::Ordering::Less => prior[b].correlation.get(b - a - 1).copied().unwrap_or(0.0),
-    };
     let covariance = DMatrix::from_fn(known.len(), known.len(), |r, c| {
-        correlation(known[r], known[c]) * sd(known[r]) * sd(known[c])
+        prior_correlation(prior, known[r], known[c]) * sd(known[r]) * sd(known[c])
     });
     let inverse = invert(&covariance);
     let mut precision = DMatrix::zeros(n, n);

@@ -1,13 +1,16 @@
 //! The estimate: most probable moduli with their intervals, and what the data can tell apart.
 
 use super::super::html::{fixed, number};
+use super::posterior::{figures, parameter};
 use super::results::{Row, table, words};
 use crate::experiment::compare::{Candidate, Comparison};
 use crate::experiment::estimate::{EstimateOutcome, Knowledge};
 use maud::{Markup, html};
+use std::collections::BTreeMap;
 
-/// The section's body; with the models that were tried, where there were several.
-pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Markup {
+/// The section's body; with the models that were tried, where there were several, and with the moduli (Pa) that went into a
+/// reference.
+pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>, truth: &BTreeMap<String, f64>) -> Markup {
     let claimed = estimate.verdict.finding.has_stiffness();
     let posterior = &estimate.posterior;
     let head = ["Parameter", "Most probable", "95 % interval", "Prior 95 %", "What the data say"].map(str::to_owned);
@@ -27,9 +30,9 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Marku
             Knowledge::Withheld => "withheld: the model does not stand",
         };
         let cells = [
-            posterior.names[n].replace('_', " "),
+            in_words(&posterior.names[n]),
             if claimed { number(posterior.mode[n], 5) } else { "–".to_owned() },
-            if claimed { format!("{} to {}", number(low, 4), number(high, 4)) } else { "–".to_owned() },
+            if claimed { format!("{} to {}", number(low, 5), number(high, 5)) } else { "–".to_owned() },
             before,
             verdict.to_owned(),
         ];
@@ -37,10 +40,11 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Marku
     };
     let rows: Vec<Row> = (0..posterior.names.len()).map(row).collect();
     let panel = &posterior.identifiability;
-    let pair = |(name, along): (&String, &f64)| format!("{} {}", name.replace('_', " "), number(*along, 2));
+    let pair = |(name, along): (&String, &f64)| format!("{} {}", parameter(name).0, number(*along, 2));
     let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
     html! {
         (table("Estimate", &head, &rows))
+        (figures(estimate, truth))
         @if let Some(models) = models { (table_of_models(models)) }
         p {
             "Residual " (number(estimate.residual_rms_mm, 3)) " mm over " (estimate.observations) " observations ("
@@ -67,6 +71,12 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>) -> Marku
             ul { @for limit in &estimate.limits { li { (limit) } } }
         }
     }
+}
+
+/// A parameter with its unit, for a table.
+fn in_words(name: &str) -> String {
+    let (name, unit) = parameter(name);
+    if unit.is_empty() { name } else { format!("{name}, {unit}") }
 }
 
 /// What was tried, the most probable first.

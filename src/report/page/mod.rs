@@ -6,6 +6,7 @@ mod estimate;
 mod glance;
 mod methods;
 mod parts;
+mod posterior;
 mod prediction;
 mod results;
 
@@ -256,10 +257,14 @@ impl CasePage {
         add(
             "estimate",
             "Estimate",
-            outcome.and_then(|o| Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref()))),
+            outcome.and_then(|o| {
+                Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref(), &o.reference_shear_modulus_pa))
+            }),
         );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
-        add("view", "3-D view", self.viewer.as_ref().map(Viewer::section));
+        let sliced = self.viewer.as_ref().is_some_and(|viewer| viewer.slices.is_some());
+        let heading = if sliced { "Slices and 3-D view" } else { "3-D view" };
+        add("view", heading, self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));
         add("methods", "Methods", outcome.map(methods::section));
         add("provenance", "Settings and provenance", self.provenance_section());
