@@ -8,6 +8,7 @@ pub mod cohort_population;
 pub mod colour;
 pub mod derivatives;
 pub mod figure;
+pub mod forecast_in_words;
 pub mod glance_figure;
 pub mod hand_off;
 pub mod html;

@@ -24,6 +24,7 @@ mod case;
 mod error;
 mod estimate_options;
 mod evaluate;
+mod evaluate_prediction;
 mod facts;
 mod fresh;
 mod generative;
@@ -59,11 +60,12 @@ pub mod cohort;
 
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, PredictError,
-    SimulationError, WarpError, WorkflowError,
+    CaseError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError,
+    PredictError, SimulationError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};
+pub use evaluate_prediction::{SeenAfterwards, evaluate_prediction};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
 pub use inputs::{Inputs, ScanSums, read_mask_of};

@@ -1,6 +1,7 @@
 //! Why no prediction can be made.
 
 use crate::experiment::predict::PlannedError;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// Why no prediction can be made.
@@ -26,4 +27,6 @@ pub enum PredictError {
          table [resection] or the part that has drained"
     )]
     NoEquilibrium { reason: String },
+    #[error("{}: {file} is not there: an earlier version has made this prediction", folder.display())]
+    NoDraws { folder: PathBuf, file: String },
 }
