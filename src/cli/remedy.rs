@@ -70,8 +70,20 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
-        WorkflowError::Predict(PredictError::Plan(_) | PredictError::NoPlan | PredictError::Ellipsoid { .. }) => {
-            "see --resection and --resection-ellipsoid"
+        WorkflowError::Predict(
+            PredictError::Plan(_)
+            | PredictError::NoPlan
+            | PredictError::Ellipsoid { .. }
+            | PredictError::NoSurface { .. }
+            | PredictError::OpenSurface { .. }
+            | PredictError::NoVoxel { .. }
+            | PredictError::BesideScan { .. },
+        ) => "see --resection and --resection-ellipsoid",
+        WorkflowError::Predict(PredictError::OnePlan { .. }) => "name another folder (-o)",
+        WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
+        WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
+        WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {
+            "see --resection-label"
         }
         WorkflowError::Predict(PredictError::NoTarget { .. } | PredictError::TargetOutside { .. }) => "see --targets",
         WorkflowError::Predict(PredictError::NoDraws { .. }) => "run `hgm predict` on it again",

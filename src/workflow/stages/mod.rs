@@ -34,7 +34,7 @@ pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
 pub(crate) use plan::{PlannedHead, plan};
 pub(crate) use pose::pose;
 pub(crate) use predict::{PredictInput, predict};
-pub(crate) use predicted_draws::{Predicted, read_draws};
+pub(crate) use predicted_draws::{Predicted, read_draws, read_table};
 pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,
     reference_stage,

@@ -1,6 +1,6 @@
 //! The draws of a prediction as its case keeps them: modes on the mesh, and a table of coordinates.
 
-use crate::experiment::predict::{Modes, draws_from_csv, mode_name};
+use crate::experiment::predict::{DrawnState, Modes, draws_from_csv, mode_name};
 use crate::layout::{PREDICTED_DRAWS, PREDICTED_STATE};
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
@@ -35,20 +35,28 @@ pub(crate) struct Predicted {
 /// # Errors
 /// A case whose prediction an earlier version has made, or files that do not belong together.
 pub(crate) fn read_draws(case: &Case, state: &str) -> Result<Predicted, WorkflowError> {
-    let (table, mesh) = (PREDICTED_DRAWS.of(state), PREDICTED_STATE.of(state));
-    if !case.path(&table).exists() {
-        return Err(PredictError::NoDraws { folder: case.folder().to_path_buf(), file: table }.into());
-    }
-    let damaged = |file: &str| CaseError::Damaged {
-        folder: case.folder().to_path_buf(),
-        file: file.to_owned(),
-        subject: case.subject(),
-    };
-    let draws = draws_from_csv(&case.read_text(&table)?).map_err(|_| damaged(&table))?;
+    let draws = read_table(case, state)?;
+    let mesh = PREDICTED_STATE.of(state);
     let read = vtu::decode(&case.read(&mesh)?, &mesh)?;
-    let vectors = |name: &str| read.point_field(name).and_then(Field::vectors).ok_or_else(|| damaged(&mesh));
+    let vectors = |name: &str| read.point_field(name).and_then(Field::vectors).ok_or_else(|| damaged(case, &mesh));
     let mean_mm = vectors("displacement")?;
     let count = draws.first().map_or(0, |draw| draw.coordinates.len());
     let modes_mm = (0..count).map(|n| vectors(&mode_name(n))).collect::<Result<Vec<_>, _>>()?;
     Ok(Predicted { modes: Modes { mean_mm, modes_mm, draws }, mesh: read.mesh })
+}
+
+/// The table of a state's draws alone.
+///
+/// # Errors
+/// As [`read_draws`].
+pub(crate) fn read_table(case: &Case, state: &str) -> Result<Vec<DrawnState>, WorkflowError> {
+    let table = PREDICTED_DRAWS.of(state);
+    if !case.path(&table).exists() {
+        return Err(PredictError::NoDraws { folder: case.folder().to_path_buf(), file: table }.into());
+    }
+    Ok(draws_from_csv(&case.read_text(&table)?).map_err(|_| damaged(case, &table))?)
+}
+
+fn damaged(case: &Case, file: &str) -> CaseError {
+    CaseError::Damaged { folder: case.folder().to_path_buf(), file: file.to_owned(), subject: case.subject() }
 }
