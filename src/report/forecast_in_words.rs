@@ -34,12 +34,14 @@ pub fn evaluation_table(found: &PredictionEvaluation) -> String {
         })
         .collect();
     all.iter().for_each(|(head, over, s)| row(head, over, s));
-    text += "\ninside       over       50 % reach  95 % reach  50 % ellipsoid  95 % ellipsoid   (with the error of what was seen)\n";
+    text += "\ninside       over       foretold      50 % reach  95 % reach  50 % ellipsoid  95 % ellipsoid\n";
     for (head, over, s) in &all {
-        let c = &s.coverage_with_error;
-        let [a, b, c, d] = [c.reach50, c.reach95, c.ellipsoid50, c.ellipsoid95].map(|share| 100.0 * share);
-        text += &format!("{head:<12} {over:<9} {a:>9.0} %  {b:>8.0} %  {c:>12.0} %  {d:>12.0} %\n");
+        for (what, c) in [("with error", s.coverage_with_error), ("draws alone", s.coverage)] {
+            let [a, b, c, d] = [c.reach50, c.reach95, c.ellipsoid50, c.ellipsoid95].map(|share| 100.0 * share);
+            text += &format!("{head:<12} {over:<9} {what:<12} {a:>9.0} %  {b:>8.0} %  {c:>12.0} %  {d:>12.0} %\n");
+        }
     }
+    text += "(with error: the error of what was seen added to every draw)\n";
     for h in found.heads.iter().filter(|h| !h.landmark.is_empty()) {
         text += &format!("\nlandmark (head {})  lies in   seen (mm)  expected  SD     off by  inside 95 %\n", h.head);
         for l in &h.landmark {

@@ -39,6 +39,9 @@ pub struct SeenAfterwards {
 /// A landmark further than this from the predicted tissue belongs to no brain, mm.
 const BESIDE_MM: f64 = 10.0;
 
+/// So many draws of each way of supporting the brain are compared: pairs of them are counted, at every place.
+const DRAWS: usize = 256;
+
 /// Compares a prediction with what was seen, keeps the result in its case (landmarks by number in place of their names) and
 /// makes the page again.
 ///
@@ -177,6 +180,7 @@ impl Foretold {
     fn read(case: &Case, state: &str) -> Result<Self, WorkflowError> {
         let mni_from_pre = mni_from_pre(case)?;
         let mut predicted = read_draws(case, state)?;
+        predicted.modes.draws.retain(|draw| draw.number < DRAWS);
         turn(&mut predicted.modes, &mni_from_pre.inverse().rotation);
         let grid = grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?;
         Ok(Self { predicted, mni_from_pre, resected: mask_of(case, NATIVE_RESECTED, &grid)? })

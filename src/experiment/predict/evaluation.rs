@@ -98,6 +98,13 @@ impl PredictionEvaluation {
                     .to_owned(),
             );
         }
+        if let Some(scores) = self.heads.iter().filter_map(|head| head.field).find(Scores::is_within_error) {
+            self.limits.push(format!(
+                "What was seen ({:.2} mm) is smaller than its own error ({:.2} mm): this operation moved too little, or was seen \
+                 too poorly, to judge the forecast by.",
+                scores.seen_rms_mm, scores.seen_sd_median_mm
+            ));
+        }
         if let Some(taken) = self.taken.filter(TakenAgainstPlan::is_other) {
             self.limits.push(format!(
                 "Other tissue was taken ({:.1} cc) than was planned ({:.1} cc; they agree to {:.2} of 1): part of the \
@@ -135,5 +142,16 @@ mod tests {
         assert!((other.taken.unwrap().dice - 0.2).abs() < 1e-12);
         assert!(other.limits.len() == 3 && other.limits[1].contains("Other tissue"), "{:?}", other.limits);
         assert_eq!(of(18.0, "observed").limits.len(), 1);
+    }
+
+    #[test]
+    fn what_is_seen_within_its_error_is_said_to_judge_nothing() {
+        let of = |seen_rms_mm: f64| {
+            let scores = Scores { places: 9, seen_rms_mm, seen_sd_median_mm: 2.0, ..Scores::default() };
+            let head = HeadEvaluation { field: Some(scores), ..HeadEvaluation::default() };
+            PredictionEvaluation { heads: vec![head], ..PredictionEvaluation::default() }.with_limits().limits
+        };
+        assert!(of(1.0).iter().any(|limit| limit.contains("smaller than its own error")));
+        assert!(!of(3.0).iter().any(|limit| limit.contains("smaller than its own error")));
     }
 }

@@ -76,12 +76,15 @@ impl Modes {
         let modes_mm = kept
             .par_iter()
             .map(|&mode| {
-                let shares: Vec<f64> = (0..count).map(|i| root[i] * signed(mode, i)).collect();
-                let of_node = |n: usize| {
-                    [0, 1, 2]
-                        .map(|a| part((0..count).map(|i| shares[i] * (draws[i].1[n][a] - mean_mm[n][a])).sum::<f64>()))
-                };
-                (0..mean_mm.len()).map(of_node).collect()
+                // Draw by draw: each lies in one piece of memory.
+                let mut sum = vec![[0.0; 3]; mean_mm.len()];
+                for (i, (_, u)) in draws.iter().enumerate() {
+                    let share = root[i] * signed(mode, i);
+                    for ((sum, u), mean) in sum.iter_mut().zip(u).zip(mean_mm) {
+                        (0..3).for_each(|a| sum[a] += share * (u[a] - mean[a]));
+                    }
+                }
+                sum.into_iter().map(|u| u.map(part)).collect()
             })
             .collect();
         let drawn = |(i, (supports, number, over_threshold_cc)): (usize, &(String, usize, f64))| DrawnState {

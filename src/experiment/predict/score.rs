@@ -67,9 +67,16 @@ pub struct Scores {
     pub energy_score_mm: f64,
     /// The same of saying that nothing moves, mm.
     pub energy_score_rest_mm: f64,
-    /// Share of the draws whose displacement as a whole (root mean square over the places, the error of what was seen
-    /// added) is smaller than what was seen: near 0 or 1, and the forecast was too large or too small altogether.
+    /// Share of the draws, as they are, whose displacement as a whole (root mean square over the places) is smaller than what
+    /// was seen: near 0 or 1, and the forecast was too large or too small altogether.
     pub rank_of_seen: f64,
+}
+
+impl Scores {
+    /// Whether what was seen is smaller than its own error: then it judges no forecast.
+    pub fn is_within_error(&self) -> bool {
+        self.places > 0 && self.seen_rms_mm < self.seen_sd_median_mm
+    }
 }
 
 /// The verdict on one place.
@@ -172,10 +179,9 @@ pub fn scores(places: usize, place: &(dyn Fn(usize) -> Compared + Sync)) -> Scor
     let mut sd: Vec<f64> = each.iter().map(|e| e.3).collect();
     sd.sort_by(f64::total_cmp);
     let seen = mean(&|n| square(&each[n].2));
-    let error = mean(&|n| each[n].3.powi(2));
     let weights: Vec<f64> = place(0).draws.iter().map(|d| d.0).collect();
     let all = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let smaller = |d: &usize| mean(&|n| each[n].1[*d]) + error < seen;
+    let smaller = |d: &usize| mean(&|n| each[n].1[*d]) < seen;
     let rank = (0..weights.len()).filter(smaller).map(|d| weights[d] / all).sum::<f64>();
     Scores {
         places,

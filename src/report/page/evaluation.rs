@@ -38,9 +38,14 @@ pub fn in_a_sentence(evaluation: &PredictionEvaluation) -> String {
     } else {
         "no better than saying that nothing moves".to_owned()
     };
+    let judged = if scores.is_within_error() {
+        " What was seen is smaller than its own error, so this case cannot judge the forecast."
+    } else {
+        ""
+    };
     format!(
         "Expected with the head {}: {} mm (root mean square); seen: {} mm; off by {} mm. Of {} places {} % moved no further than the 95 % \
-         reach and {} % no further than the 50 % reach. The forecast scores {} mm (energy score), {better}.",
+         reach and {} % no further than the 50 % reach. The forecast scores {} mm (energy score), {better}.{judged}",
         head.head,
         number(scores.expected_rms_mm, 2),
         number(scores.seen_rms_mm, 2),
