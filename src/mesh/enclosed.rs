@@ -194,7 +194,9 @@ mod tests {
         let turn = Rotation3::from_euler_angles(0.3, -0.5, 0.8).to_homogeneous();
         let spacing = Matrix4::new_nonuniform_scaling(&Vector3::new(0.7, 0.9, 1.1));
         let mut affine = turn * spacing;
-        affine.fixed_view_mut::<3, 1>(0, 3).copy_from(&Vector3::new(-20.0, -20.0, -20.0));
+        // The middle of the grid lies in the middle of the box.
+        let middle = affine.transform_vector(&Vector3::new(35.0, 35.0, 30.0));
+        affine.fixed_view_mut::<3, 1>(0, 3).copy_from(&(Vector3::new(2.5, 2.5, -0.5) - middle));
         let grid = Grid::<Pre>::new([70, 70, 60], affine).unwrap();
         let solid = block([-4.0, -3.0, -6.0], [9.0, 8.0, 5.0]);
         let found = solid.enclosed(&grid).unwrap().count() as f64 * grid.voxel_volume_mm3();
