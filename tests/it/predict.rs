@@ -28,7 +28,10 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         (&["--resection", &open], &["open.stl", "the surface is open", "Close Holes", "--resection"]),
         (&["--resection", &far], &["far.stl", "is empty", "RAS+"]),
         (&["--resection", &points], &["points.csv", "without triangles", ".stl"]),
-        (&["--resection-label", "7", "--dseg", &mask], &["--brain-mask"]),
+        (
+            &["--resection-label", "7", "--dseg", &mask],
+            &["resected_pre.nii.gz", "label 7", "it holds 1", "--resection-label"],
+        ),
         (&["--resection-ellipsoid", "0,0,0,300,300,300"], &["outside the scan"]),
         (&["--resection", &mask, "--resection", &mask], &["given twice"]),
         (&["--resection", &mask, "--resection-ellipsoid", "9000,0,0,5,5,5"], &["is empty"]),
