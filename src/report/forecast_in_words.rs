@@ -33,7 +33,9 @@ pub fn evaluation_table(found: &PredictionEvaluation) -> String {
             field.chain(h.landmarks.iter().map(|s| (h.head.as_str(), "landmarks", s)))
         })
         .collect();
-    all.iter().for_each(|(head, over, s)| row(head, over, s));
+    for (head, over, s) in &all {
+        row(head, over, s);
+    }
     text += "\ninside       over       foretold      50 % reach  95 % reach  50 % ellipsoid  95 % ellipsoid\n";
     for (head, over, s) in &all {
         for (what, c) in [("with error", s.coverage_with_error), ("draws alone", s.coverage)] {

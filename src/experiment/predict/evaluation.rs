@@ -90,6 +90,7 @@ impl TakenAgainstPlan {
 
 impl PredictionEvaluation {
     /// Says what the figures do not.
+    #[must_use]
     pub fn with_limits(mut self) -> Self {
         if self.heads.iter().any(|head| head.field.is_some()) {
             self.limits.push(
