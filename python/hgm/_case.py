@@ -77,6 +77,11 @@ class Case:
         return self._json("prediction")
 
     @property
+    def evaluation(self) -> dict[str, Any]:
+        """A prediction against what was seen afterwards, as ``hgm evaluate`` has compared them."""
+        return self._json("evaluation")
+
+    @property
     def estimate(self) -> dict[str, Any]:
         """The numbers of the estimate: moduli (Pa) with their intervals."""
         return self._json("estimate")

@@ -116,6 +116,7 @@ pub fn names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         ("state", layout::SAMPLE_STATE.0),
         ("samples", layout::SAMPLES_TABLE),
         ("prediction", layout::PREDICTION_JSON),
+        ("evaluation", layout::EVALUATION_JSON),
         ("brain shift", layout::SHIFT_JSON),
         ("estimate", layout::ESTIMATE_JSON),
         ("page", layout::PAGE),

@@ -1,27 +1,54 @@
-//! `hgm evaluate`: landmarks against a case.
+//! `hgm evaluate`: landmarks against a case, and a prediction against what was seen afterwards.
 
 use super::{Failure, Session};
+use crate::report::forecast_in_words::evaluation_table;
 use crate::report::in_words::landmark_table;
-use crate::workflow::{Landmarks, evaluate_landmarks};
+use crate::workflow::{
+    Case, EvaluateError, Landmarks, SeenAfterwards, Subject, WorkflowError, evaluate_landmarks, evaluate_prediction,
+};
 use std::path::PathBuf;
 
-/// Target registration error of landmarks on both scans: rigid motion alone, seen displacement, model, both together
+/// Landmarks against a case (target registration error), or a prediction against the later case (coverage, scores)
 ///
-/// Example: hgm evaluate case --landmarks pre.fcsv --landmarks-post post.fcsv
+/// Example: hgm evaluate plan --against case
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folder made by `hgm run` or `hgm estimate`
+    /// Folder made by `hgm run` or `hgm estimate`; or by `hgm predict`, to see how well it foretold
     case: PathBuf,
+    /// The later case of the same patient, made by `hgm run` from the same pre-operative scan: what a prediction is compared with
+    #[arg(long, value_name = "CASE")]
+    against: Option<PathBuf>,
+    /// Which state of the later case is taken for true: of the images alone, or with the model [default: observed]
+    #[arg(long, value_name = "STATE", value_parser = ["observed", "fused"], requires = "against")]
+    seen: Option<String>,
     /// Landmarks on the pre-operative scan (.csv, .fcsv, .mrk.json), or pairs (.tag)
     #[arg(long, value_name = "FILE")]
-    landmarks: PathBuf,
+    landmarks: Option<PathBuf>,
     /// The same landmarks on the post-operative scan, by name or in the same order
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "landmarks")]
     landmarks_post: Option<PathBuf>,
+    /// How the post-operative scan lies to the pre-operative one, for landmarks on a prediction without --against: a rigid
+    /// transform as `hgm register POST PRE` writes it (4x4 text in RAS, or .tfm)
+    #[arg(long, value_name = "FILE", requires = "landmarks", conflicts_with = "against")]
+    post_to_pre: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let landmarks = Landmarks { pre: args.landmarks.clone(), post: args.landmarks_post.clone() };
-    let found = evaluate_landmarks(&args.case, &landmarks)?;
-    session.emit(&found, &landmark_table(&found))
+    let landmarks = args.landmarks.clone().map(|pre| Landmarks { pre, post: args.landmarks_post.clone() });
+    let planned = Case::open(&args.case)?.subject() == Some(Subject::Plan);
+    if let (false, None, Some(landmarks)) = (planned, args.against.as_ref().or(args.post_to_pre.as_ref()), &landmarks) {
+        let found = evaluate_landmarks(&args.case, landmarks)?;
+        return session.emit(&found, &landmark_table(&found));
+    }
+    if !planned && landmarks.is_none() && args.against.is_none() {
+        return Err(WorkflowError::Evaluate(EvaluateError::NoLandmarks { folder: args.case.clone() }).into());
+    }
+    let seen = SeenAfterwards {
+        case: args.against.clone(),
+        state: args.seen.clone(),
+        landmarks,
+        pre_from_post: args.post_to_pre.clone(),
+    };
+    let found = evaluate_prediction(&args.case, &seen)?;
+    session.emit(&found, &evaluation_table(&found))
 }

@@ -2,8 +2,10 @@
 
 use super::flags::{Flags, MeshOptions, PopulationOption, PriorOptions};
 use super::{Failure, Session};
+use crate::layout::PLANS_PAGE;
+use crate::report::forecast_in_words::plans_table;
 use crate::report::in_words::prediction_table;
-use crate::workflow::{PlanInputs, PlannedResection, PredictError, WorkflowError, predict};
+use crate::workflow::{Case, PlanInputs, PlannedResection, PredictError, WorkflowError, predict, predict_plans};
 use std::path::PathBuf;
 
 /// Before the operation, from one scan and a plan: expected brain shift, how sure it is, where targets will lie
@@ -16,12 +18,16 @@ pub struct Args {
     /// The case folder
     #[arg(short, long, value_name = "CASE", default_value = "case")]
     output: PathBuf,
-    /// A mask of the tissue that is to be taken, in the scan's grid
-    #[arg(long, value_name = "FILE", required_unless_present = "resection_ellipsoid")]
-    resection: Option<PathBuf>,
-    /// An ellipsoid instead: centre and half axes in mm of the scanner's frame (RAS+)
-    #[arg(long, value_name = "X,Y,Z,RX,RY,RZ", conflicts_with = "resection", allow_hyphen_values = true)]
-    resection_ellipsoid: Option<String>,
+    /// The tissue that is to be taken: a mask in the scan's grid, or a closed surface in the scanner's frame (mm, RAS+; .stl,
+    /// .surf.gii, .ply). Again, or with the two below, for several plans: compared, the one that moves least named
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["resection_label", "resection_ellipsoid"])]
+    resection: Vec<PathBuf>,
+    /// A label of the label map (--dseg), by its number there; several with commas are taken together
+    #[arg(long, value_name = "N[,N]", requires = "dseg", allow_hyphen_values = true)]
+    resection_label: Vec<String>,
+    /// An ellipsoid: centre and half axes in mm of the scanner's frame (RAS+)
+    #[arg(long, value_name = "X,Y,Z,RX,RY,RZ", allow_hyphen_values = true)]
+    resection_ellipsoid: Vec<String>,
     /// How the head lies: supine, prone, left, right, sitting, or the way down as x,y,z of the scanner (RAS+); again to
     /// compare several [default: supine]
     #[arg(long, value_name = "HOW", allow_hyphen_values = true)]
@@ -78,14 +84,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("predict.draws", args.draws);
     flags.set("predict.checks", args.checks);
     flags.set("predict.tissues", args.tissues);
-    let resection = match (&args.resection, &args.resection_ellipsoid) {
-        (Some(path), _) => PlannedResection::Mask(path.clone()),
-        (None, Some(text)) => text.parse().map_err(WorkflowError::Predict)?,
-        (None, None) => return Err(WorkflowError::Predict(PredictError::NoPlan).into()),
-    };
+    let mut plans = args.plans()?;
+    let (settings, place) = (session.settings(flags)?, session.place(&args.output));
     let inputs = PlanInputs {
         pre: args.pre.clone(),
-        resection,
+        resection: plans.remove(0),
         targets: args.targets.clone(),
         dseg: args.dseg.clone(),
         labels: args.labels.clone(),
@@ -93,8 +96,24 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         brain_mask: args.brain_mask.clone(),
         ventricle_mask: args.ventricle_mask.clone(),
     };
-    let (settings, place) = (session.settings(flags)?, session.place(&args.output));
-    let (case, prediction) = predict(&inputs, &place, &settings, &mut session.listener())?;
-    session.emit(&prediction, &(prediction_table(&prediction) + &case.page().display().to_string()))?;
-    Ok(case.quality_gate()?)
+    if plans.is_empty() {
+        let (case, prediction) = predict(&inputs, &place, &settings, &mut session.listener())?;
+        session.emit(&prediction, &(prediction_table(&prediction) + &case.page().display().to_string()))?;
+        return Ok(case.quality_gate()?);
+    }
+    let (cases, comparison) = predict_plans(&inputs, &plans, &place, &settings, &mut session.listener())?;
+    let page = args.output.join(PLANS_PAGE);
+    session.emit(&comparison, &(plans_table(&comparison) + &page.display().to_string()))?;
+    Ok(cases.iter().try_for_each(Case::quality_gate)?)
+}
+
+impl Args {
+    /// The plans: files first, then labels, then ellipsoids.
+    fn plans(&self) -> Result<Vec<PlannedResection>, WorkflowError> {
+        let files = self.resection.iter().map(|path| Ok(PlannedResection::file(path.clone())));
+        let labels = self.resection_label.iter().map(|text| PlannedResection::label(text));
+        let ellipsoids = self.resection_ellipsoid.iter().map(|text| PlannedResection::ellipsoid(text));
+        let plans = files.chain(labels).chain(ellipsoids).collect::<Result<Vec<_>, PredictError>>()?;
+        if plans.is_empty() { Err(PredictError::NoPlan.into()) } else { Ok(plans) }
+    }
 }

@@ -8,8 +8,8 @@ use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::{CohortError, DatasetError};
 use crate::workflow::{
-    CaseError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError, SettingsError, SimulationError,
-    Subject, WorkflowError,
+    CaseError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError, SettingsError,
+    SimulationError, Subject, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -70,10 +70,24 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
-        WorkflowError::Predict(PredictError::Plan(_) | PredictError::NoPlan | PredictError::Ellipsoid { .. }) => {
-            "see --resection and --resection-ellipsoid"
+        WorkflowError::Predict(
+            PredictError::Plan(_)
+            | PredictError::NoPlan
+            | PredictError::Ellipsoid { .. }
+            | PredictError::NoSurface { .. }
+            | PredictError::OpenSurface { .. }
+            | PredictError::NoVoxel { .. }
+            | PredictError::BesideScan { .. },
+        ) => "see --resection and --resection-ellipsoid",
+        WorkflowError::Predict(PredictError::OnePlan { .. }) => "name another folder (-o)",
+        WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
+        WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
+        WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {
+            "see --resection-label"
         }
         WorkflowError::Predict(PredictError::NoTarget { .. } | PredictError::TargetOutside { .. }) => "see --targets",
+        WorkflowError::Predict(PredictError::NoDraws { .. }) => "run `hgm predict` on it again",
+        WorkflowError::Evaluate(error) => of_evaluation(error)?,
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
@@ -94,6 +108,26 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         _ => return None,
     };
     Some(said.to_owned())
+}
+
+fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
+    Some(match error {
+        EvaluateError::NothingSeen { .. } => {
+            "--against CASE names the case that `hgm run` has made of both scans, --landmarks points on both"
+        }
+        EvaluateError::NotAPrediction { .. } => {
+            "give the folder of `hgm predict` first and the other after --against; landmarks go without --against"
+        }
+        EvaluateError::NoLandmarks { .. } => "--landmarks takes points on both scans",
+        EvaluateError::NothingAfter { .. } => "--against takes a folder that `hgm run` has made",
+        EvaluateError::NowhereSeen { .. } => "--seen chooses the other state",
+        EvaluateError::NoPose { .. } => {
+            "--against CASE says it, or --post-to-pre FILE, as `hgm register POST PRE -o FILE` writes it"
+        }
+        EvaluateError::OtherScan { .. } | EvaluateError::OtherGrid { .. } | EvaluateError::NoLandmark { .. } => {
+            return None;
+        }
+    })
 }
 
 fn of_settings(error: &SettingsError) -> Option<String> {

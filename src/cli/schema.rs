@@ -5,7 +5,7 @@ use crate::experiment::compare::Comparison;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::population::PopulationFile;
-use crate::experiment::predict::Prediction;
+use crate::experiment::predict::{PlanComparison, Prediction, PredictionEvaluation};
 use crate::material::meta_model::MetaModel;
 use crate::report::cohort::Cohort;
 use schemars::generate::SchemaSettings;
@@ -33,6 +33,8 @@ fn schema() -> serde_json::Result<Value> {
     generator.subschema_for::<Evaluation>();
     generator.subschema_for::<Comparison>();
     generator.subschema_for::<Prediction>();
+    generator.subschema_for::<PredictionEvaluation>();
+    generator.subschema_for::<PlanComparison>();
     generator.subschema_for::<PopulationFile>();
     let mut schema: Value = serde_json::from_str(&with_names(COMMANDS))?;
     for (name, mut definition) in generator.take_definitions(true) {

@@ -96,8 +96,12 @@ pub const SHIFT_REACH_50: Family = Family("xfm/from-pre_to-deformed_desc-{state}
 pub const SHIFT_PROBABILITY: Family = Family("xfm/from-pre_to-deformed_desc-{state}_probability.nii.gz");
 /// The mean state of a prediction.
 pub const PREDICTED_STATE: Family = Family("sim/{state}.vtu");
+/// The draws of a prediction, a line each: their coordinates among the modes of its state.
+pub const PREDICTED_DRAWS: Family = Family("sim/{state}_draws.csv");
 /// A prediction's numbers.
 pub const PREDICTION_JSON: &str = "sim/prediction.json";
+/// A prediction against what was seen afterwards.
+pub const EVALUATION_JSON: &str = "sim/evaluation.json";
 /// Where it is believed.
 pub const SHIFT_MASK: Family = Family("xfm/from-pre_to-deformed_desc-{state}_mask.nii.gz");
 /// The numbers of the fields.
@@ -284,7 +288,14 @@ pub const TABLE: &[Entry] = &[
     file(SHIFT_REACH_50.0, "reach that half of a prediction's draws do not exceed, mm", Space::Pre, Maker::Predict),
     file(SHIFT_PROBABILITY.0, "probability of moving by more than the threshold", Space::Pre, Maker::Predict),
     file(PREDICTED_STATE.0, "mean state of a prediction with its spread", Space::Mni, Maker::Predict),
+    file(PREDICTED_DRAWS.0, "its draws: coordinates among the modes of the state", Space::None, Maker::Predict),
     file(PREDICTION_JSON, "the prediction's numbers", Space::None, Maker::Predict),
+    file(
+        EVALUATION_JSON,
+        "the prediction against what was seen afterwards, of `hgm evaluate`",
+        Space::None,
+        Maker::Report,
+    ),
     file(COMPARISON, "models beside each other, by their evidence", Space::None, Maker::Compare),
     file(OUTCOME, "the experiment's numbers", Space::None, Maker::Outcome),
     file(SAMPLES_TABLE, "a line per sample", Space::None, Maker::Outcome),

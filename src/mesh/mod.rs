@@ -2,6 +2,7 @@
 
 mod closest_point;
 mod cut;
+mod enclosed;
 pub mod engine;
 mod facets;
 pub mod format;
@@ -15,6 +16,7 @@ mod tet_mesh;
 mod tri_mesh;
 
 pub use closest_point::{ClosestPoint, Hit};
+pub use enclosed::OpenSurface;
 pub use isosurface::isosurface;
 pub use label_field::LabelField;
 pub use optimise::OptimiseSettings;

@@ -1,5 +1,6 @@
 //! A drawing, whatever file it came from.
 
+use crate::mesh::TriMesh;
 use std::fmt;
 use thiserror::Error;
 
@@ -22,6 +23,11 @@ pub(super) trait Kept: fmt::Debug {
 
     /// How many lines a file of streamlines holds.
     fn streamlines(&self) -> Option<usize> {
+        None
+    }
+
+    /// The triangles between the points; `None` where the format has none.
+    fn triangles(&self, _points: usize, _name: &str) -> Option<Result<Vec<[u32; 3]>, OverlayError>> {
         None
     }
 }
@@ -88,6 +94,15 @@ impl Drawing {
     pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
         assert_eq!(carried.len(), self.points_mm.len(), "one place for each point");
         self.kept.encode(carried, &self.names)
+    }
+
+    /// The surface that the points are the nodes of (STL, GIFTI, PLY), in the file's order; `None` of a drawing that is none.
+    ///
+    /// # Errors
+    /// [`OverlayError`] for triangles that are damaged.
+    pub fn surface(&self, name: &str) -> Result<Option<TriMesh>, OverlayError> {
+        let triangles = self.kept.triangles(self.points_mm.len(), name).transpose()?.filter(|t| !t.is_empty());
+        Ok(triangles.map(|triangles| TriMesh { nodes_mm: self.points_mm.clone(), triangles }))
     }
 
     /// How many lines a file of streamlines holds.

@@ -10,6 +10,7 @@ mod fcsv;
 mod format;
 mod markups;
 mod ply;
+mod ply_faces;
 mod stl;
 mod surface;
 mod tag;

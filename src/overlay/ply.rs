@@ -1,6 +1,7 @@
 //! PLY, text or binary in either order: the vertices move, everything else stays.
 
 use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned, written};
+use super::ply_faces::{Numbers, triangles};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
@@ -141,5 +142,15 @@ impl Kept for Vertices {
         }
         bytes.extend(&self.bytes[self.end..]);
         bytes
+    }
+
+    fn triangles(&self, points: usize, name: &str) -> Option<Result<Vec<[u32; 3]>, OverlayError>> {
+        let head = String::from_utf8_lossy(&self.bytes[..self.first]).into_owned();
+        let numbers = match self.order {
+            Order::Text => Numbers::Text,
+            Order::Little => Numbers::Little,
+            Order::Big => Numbers::Big,
+        };
+        Some(triangles((&head, &self.bytes[self.end..]), (numbers, points), name))
     }
 }

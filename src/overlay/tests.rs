@@ -74,3 +74,36 @@ fn lines_keep_their_lengths_and_their_numbers() {
     let again = Drawing::decode(&carried, "a.tck").unwrap();
     assert_eq!((again.points_mm[4], again.streamlines()), ([5.0, 0.5, 3.0], Some(2)));
 }
+
+/// A tetrahedron in every format of surfaces, text and binary: the same four faces.
+#[test]
+fn a_surface_has_the_same_triangles_in_every_format() {
+    use crate::mesh::TriMesh;
+    use crate::mesh::format::{gifti, ply, stl};
+    let solid = TriMesh {
+        nodes_mm: vec![[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    let read = |bytes: &[u8], name: &str| Drawing::decode(bytes, name).unwrap().surface(name).unwrap().unwrap();
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\nproperty uchar \
+                red\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n0 10 0\n0 0 10\n9 3 0 2 1\n9 3 0 1 3\n9 3 0 3 2\n9 3 1 2 3\n";
+    for found in [
+        read(text.as_bytes(), "a.ply"),
+        read(&ply::encode(&solid, &[]).unwrap(), "b.ply"),
+        read(&gifti::encode_surface(&solid, gifti::Space::Scanner, "c"), "c.surf.gii"),
+    ] {
+        assert_eq!(found, solid);
+    }
+    let facets = read(&stl::encode(&solid), "d.stl");
+    assert_eq!((facets.triangles.len(), facets.nodes_mm.len()), (4, 12));
+    assert!((facets.enclosed_volume_mm3() - solid.enclosed_volume_mm3()).abs() < 1e-3);
+    // A square is two triangles; what is cut short or names a vertex that is not there is refused.
+    let square = text.replace("element face 4", "element face 1").replace("9 3 0 2 1\n", "9 4 0 1 2 3\n");
+    assert_eq!(read(square.as_bytes(), "e.ply").triangles, [[0, 1, 2], [0, 2, 3]]);
+    let refused =
+        |text: &str| Drawing::decode(text.as_bytes(), "f.ply").unwrap().surface("f.ply").unwrap_err().to_string();
+    assert!(refused(&text.replace("9 3 1 2 3\n", "9 3 1")).contains("cut short"));
+    assert!(refused(&text.replace("9 3 1 2 3", "9 3 1 2 7")).contains("vertex 7 of 4"));
+    let points = Drawing::decode(b"x,y,z\n1,2,3\n", "g.csv").unwrap();
+    assert!(points.surface("g.csv").unwrap().is_none());
+}

@@ -9,10 +9,10 @@ use super::hand_off::{self, CaseFile};
 use super::mesh_figure::{PICTURE, cut_views, legend, middle_mm};
 use super::page::{CaptionedPicture, CasePage, PredictionFigure, ShiftFigure, title_of};
 use super::shift_figure::{prediction_figure, shift_figure};
-use crate::artefact::write_whole;
+use crate::artefact::{sha256_hex, write_whole};
 use crate::experiment::field::BrainShift;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::Prediction;
+use crate::experiment::predict::{Prediction, PredictionEvaluation};
 use crate::geometry::Mni;
 use crate::image::Volume;
 use crate::image::nifti::{self, ReadOptions};
@@ -97,12 +97,20 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
         None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
     }
     page.prediction = case.numbers(layout::PREDICTION_JSON)?;
+    page.evaluation = evaluation_of(&case)?;
     page.prediction_figure = expected_of(&case, page.prediction.as_ref())?;
     page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
     page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
     page.shift_figure = shift_of(&case, page.brain_shift.as_ref())?;
     page.outcome = outcome;
     Ok(page)
+}
+
+/// The prediction against what was seen: nothing where another prediction was evaluated.
+fn evaluation_of(case: &Case<'_>) -> Result<Option<PredictionEvaluation>, ReportError> {
+    let sum = case.bytes(layout::PREDICTION_JSON)?.map(|bytes| sha256_hex(&bytes));
+    let found: Option<PredictionEvaluation> = case.numbers(layout::EVALUATION_JSON)?;
+    Ok(found.filter(|found| sum.as_ref() == Some(&found.prediction_sha256)))
 }
 
 /// Whose case it is: `sub-01` of `sub-01/hgm`, else the folder's name.

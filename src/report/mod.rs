@@ -11,6 +11,7 @@ pub mod colour;
 pub mod decimation;
 pub mod derivatives;
 pub mod figure;
+pub mod forecast_in_words;
 pub mod glance_figure;
 pub mod hand_off;
 pub mod html;

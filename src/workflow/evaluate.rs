@@ -30,9 +30,10 @@ fn read(path: &Path) -> Result<Drawing, WorkflowError> {
 }
 
 /// Name, place before, place after.
-type Pair = (String, [f64; 3], [f64; 3]);
+pub(super) type Pair = (String, [f64; 3], [f64; 3]);
 
-fn pairs(landmarks: &Landmarks) -> Result<Vec<Pair>, WorkflowError> {
+/// The landmarks of both scans.
+pub(super) fn pairs(landmarks: &Landmarks) -> Result<Vec<Pair>, WorkflowError> {
     let pre = read(&landmarks.pre)?;
     let numbered = |n: usize| pre.names.get(n).cloned().unwrap_or_else(|| (n + 1).to_string());
     let Some(path) = &landmarks.post else {

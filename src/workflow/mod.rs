@@ -24,6 +24,7 @@ mod case;
 mod error;
 mod estimate_options;
 mod evaluate;
+mod evaluate_prediction;
 mod facts;
 mod fresh;
 mod generative;
@@ -37,6 +38,7 @@ mod paper;
 mod patient;
 mod phantom;
 mod plan;
+mod planned_resection;
 mod planned_scan;
 mod posed;
 mod prediction;
@@ -45,6 +47,7 @@ mod progress;
 mod refusal;
 mod settings;
 mod settings_manual;
+mod several_plans;
 mod simulation;
 mod stage_name;
 mod stages;
@@ -59,11 +62,12 @@ pub mod cohort;
 
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError, PredictError,
-    SimulationError, WarpError, WorkflowError,
+    CaseError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError,
+    PredictError, SimulationError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};
+pub use evaluate_prediction::{SeenAfterwards, evaluate_prediction};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
 pub use inputs::{Inputs, ScanSums, read_mask_of};
@@ -73,13 +77,15 @@ pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use paper::paper;
 pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
-pub use planned_scan::{PlanInputs, PlannedResection};
+pub use planned_resection::PlannedResection;
+pub use planned_scan::PlanInputs;
 pub use posed::{Posed, posed_case, posed_mesh};
 pub use prediction::predict;
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};
 pub use settings::{Settings, SettingsError, in_words};
 pub use settings_manual::{Setting, annotated, every_setting};
+pub use several_plans::predict_plans;
 pub use simulation::{Simulation, SimulationFiles, simulate, simulate_mesh};
 pub use stage_name::{StageName, Subject};
 pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};

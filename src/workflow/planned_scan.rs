@@ -1,37 +1,20 @@
 //! The files a user gives before an operation: one scan, the plan, points, masks of their own.
 
-use super::error::{MaskRole, PredictError, WorkflowError};
+use super::error::{MaskRole, WorkflowError};
 use super::inputs::{given_labels, given_pose, read_mask_of};
+use super::planned_resection::PlannedResection;
 use super::user_file::{read_input, shown};
 use super::work::Work;
 use crate::artefact::sha256_hex;
-use crate::experiment::predict::{PlannedError, ellipsoid_mask};
+use crate::experiment::outcome::RegistrationOutcome;
 use crate::geometry::{Mni, Native, Pre, RigidTransform};
 use crate::image::nifti::{self, encode_mask};
 use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::register::deformable::AtlasFit;
+use crate::segment::Segmentation;
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
-
-/// What is to be taken out.
-#[derive(Clone, Debug, PartialEq)]
-pub enum PlannedResection {
-    /// A mask in the scan's grid.
-    Mask(PathBuf),
-    /// An ellipsoid along the axes of the scanner's frame: centre and half axes, mm.
-    Ellipsoid([f64; 6]),
-}
-
-impl std::str::FromStr for PlannedResection {
-    type Err = PredictError;
-
-    /// An ellipsoid as `x,y,z,rx,ry,rz`.
-    fn from_str(text: &str) -> Result<Self, PredictError> {
-        let wrong = || PredictError::Ellipsoid { given: text.to_owned() };
-        let numbers: Result<Vec<f64>, _> = text.split(',').map(|x| x.trim().parse()).collect();
-        let six: [f64; 6] = numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
-        let kept = six.iter().all(|x| x.is_finite()) && six[3..].iter().all(|r| *r > 0.0);
-        if kept { Ok(Self::Ellipsoid(six)) } else { Err(wrong()) }
-    }
-}
+use std::rc::Rc;
 
 /// A scan before an operation, and what is to be taken.
 #[derive(Clone, Debug)]
@@ -58,7 +41,7 @@ pub struct PlanInputs {
 type OwnMask = Option<(Mask<Pre>, Vec<u8>)>;
 
 /// The scan, the plan, and the user's own masks.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct PlannedScan {
     /// Checksum of the scan's file.
     pub sum: String,
@@ -74,6 +57,26 @@ pub(crate) struct PlannedScan {
     pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: OwnMask,
     pub ventricle: OwnMask,
+    /// What does not depend on the plan, made for the first of several.
+    pub shared: Rc<Shared>,
+}
+
+/// What several plans of one scan share.
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    /// Where the scan lies, with what was noticed.
+    pub pose: OnceCell<(RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<String>)>,
+    /// Its tissue, and the template carried onto it.
+    pub head: OnceCell<(Segmentation<Pre>, AtlasFit<Mni>)>,
+}
+
+/// What a cell holds, made where it is empty.
+pub(crate) fn once<T, E>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T, E>) -> Result<&T, E> {
+    if let Some(value) = cell.get() {
+        return Ok(value);
+    }
+    let value = make()?;
+    Ok(cell.get_or_init(|| value))
 }
 
 impl PlannedScan {
@@ -88,16 +91,8 @@ impl PlannedScan {
         let mask = |path: &Path, warnings: &mut Vec<String>| -> Result<Mask<Pre>, WorkflowError> {
             Ok(read_mask_of(path, &grid, options, warnings)?.relabelled())
         };
-        let (plan, resection) = match &inputs.resection {
-            PlannedResection::Mask(path) => (shown(path), mask(path, &mut warnings)?),
-            PlannedResection::Ellipsoid([x, y, z, rx, ry, rz]) => {
-                let name = format!("the ellipsoid at ({x}, {y}, {z}) mm");
-                (name, ellipsoid_mask(&pre.grid, [*x, *y, *z], [*rx, *ry, *rz]))
-            }
-        };
-        if resection.count() == 0 {
-            return Err(PredictError::Plan(PlannedError::Empty { plan }).into());
-        }
+        let plan = inputs.resection.to_string();
+        let resection = inputs.resection.mask(&pre.grid, inputs.dseg.as_deref(), options, &mut warnings)?;
         let mut own = |path: &Option<PathBuf>| -> Result<OwnMask, WorkflowError> {
             let Some(path) = path else { return Ok(None) };
             let mask = mask(path, &mut warnings)?;
@@ -108,7 +103,22 @@ impl PlannedScan {
         let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), &pre, work));
         let labels = labels.transpose()?;
         let pose = inputs.pose.as_deref().map(given_pose).transpose()?;
-        Ok(Self { sum: sha256_hex(&bytes), pre, warnings, plan, resection, pose, labels, brain, ventricle })
+        let (sum, shared) = (sha256_hex(&bytes), Rc::default());
+        Ok(Self { sum, pre, warnings, plan, resection, pose, labels, brain, ventricle, shared })
+    }
+
+    /// The same scan with another plan; `inputs` is what it was read from.
+    pub fn with_plan(
+        &self,
+        plan: &PlannedResection,
+        inputs: &PlanInputs,
+        work: &Work<'_>,
+    ) -> Result<Self, WorkflowError> {
+        let mut other = self.clone();
+        let dseg = inputs.dseg.as_deref();
+        other.resection = plan.mask(&self.pre.grid, dseg, &work.settings.image, &mut other.warnings)?;
+        other.plan = plan.to_string();
+        Ok(other)
     }
 
     /// What says where the scan lies, by role.
@@ -122,21 +132,5 @@ impl PlannedScan {
         let masks = [(MaskRole::Brain, &self.brain), (MaskRole::Ventricle, &self.ventricle)];
         let masks = masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, b)| (role, b.as_slice())));
         masks.chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_ellipsoid_is_six_numbers_with_sizes() {
-        assert_eq!(
-            "10,-20,30,5,6,7".parse::<PlannedResection>().unwrap(),
-            PlannedResection::Ellipsoid([10.0, -20.0, 30.0, 5.0, 6.0, 7.0])
-        );
-        for wrong in ["", "1,2,3", "1,2,3,4,5,0", "1,2,3,4,5,-1", "1,2,nan,4,5,6", "a,b,c,d,e,f", "1,2,3,4,5,6,7"] {
-            assert!(wrong.parse::<PlannedResection>().unwrap_err().to_string().contains("x,y,z,rx,ry,rz"), "{wrong}");
-        }
     }
 }

@@ -30,26 +30,50 @@ pub fn predict(
     progress: &mut dyn Progress,
 ) -> Result<(Case, Prediction), WorkflowError> {
     let work = Work::new(place, Subject::Plan, settings, progress);
-    settings.check()?;
-    let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
-    place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
+    can_be_done(&work)?;
     let scan = PlannedScan::read(inputs, &work)?;
-    let targets = inputs.targets.as_deref().map(|path| Ok::<_, WorkflowError>((shown(path), read_input(path)?)));
-    let targets = targets.transpose()?;
+    let targets = targets_of(inputs)?;
+    predict_scan(&work, &scan, targets.as_ref())
+}
+
+/// Refuses what no prediction can be made with.
+pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
+    work.settings.check()?;
+    let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
+    work.place.programs.engines().check(work.settings.mesh.engine).map_err(refused)?;
+    Ok(())
+}
+
+/// A file of targets by its name, with its bytes.
+pub(super) type TargetsFile = (String, Vec<u8>);
+
+/// The file of targets, where one was given.
+pub(super) fn targets_of(inputs: &PlanInputs) -> Result<Option<TargetsFile>, WorkflowError> {
+    let Some(path) = &inputs.targets else { return Ok(None) };
+    Ok(Some((shown(path), read_input(path)?)))
+}
+
+/// Every stage of one plan, then outcome and page.
+pub(super) fn predict_scan(
+    work: &Work<'_>,
+    scan: &PlannedScan,
+    targets: Option<&TargetsFile>,
+) -> Result<(Case, Prediction), WorkflowError> {
+    let settings = work.settings;
     work.hold(true)?;
-    check_scan(&work, &scan.sum)?;
-    keep_settings(&work)?;
+    check_scan(work, &scan.sum)?;
+    keep_settings(work)?;
     let mut made = Made::default();
-    let posed = stages::pose(&work, &mut made, &scan)?;
-    let planned = stages::plan(&work, &mut made, &scan)?;
+    let posed = stages::pose(work, &mut made, scan)?;
+    let planned = stages::plan(work, &mut made, scan)?;
     let head = PlannedHead::read(&work.case)?;
-    let meshed: MeshFacts = stages::mesh(&work, &mut made, &head.labels, Some(&head.template_from_patient))?;
+    let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient))?;
     work.case.drop_stale();
     let bytes = work.case.read(REST_MESH)?;
     let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;
-    let targets = targets.as_ref().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+    let targets = targets.map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
-    let prediction = stages::predict(&work, &mut made, &input)?;
+    let prediction = stages::predict(work, &mut made, &input)?;
     let steps = plan(settings, Subject::Plan, Goal::Predict)?;
     let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
     let outcome = ExperimentOutcome {
@@ -62,7 +86,7 @@ pub fn predict(
         warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
         ..ExperimentOutcome::default()
     };
-    finish(&work, &outcome, &manifests)?;
+    finish(work, &outcome, &manifests)?;
     Ok((work.case.clone(), prediction))
 }
 

@@ -117,6 +117,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     }
     prints("warp", &["warp", &case, &at("pre.csv"), "-o", &at("warped.csv")]);
     prints("evaluate", &["evaluate", &case, "--landmarks", &at("pre.csv"), "--landmarks-post", &at("post.csv")]);
+    prints("evaluate", &["evaluate", &at("planned"), "--against", &case]);
     prints(
         "mesh",
         &[&["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu")], &CHEAP[..]].concat(),

@@ -1,7 +1,7 @@
 //! Before the operation: one scan and a plan from the command line to fields, targets and a page.
 
 use crate::job::{CHEAP, contents, output, sample};
-use crate::made::copy;
+use crate::made::{copy, finished_pair};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -18,7 +18,24 @@ fn plan() -> PathBuf {
 fn what_cannot_be_planned_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let mask = plan().display().to_string();
-    let cases: [(&[&str], &[&str]); 6] = [
+    let at = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        folder.path().join(name).display().to_string()
+    };
+    let (open, far) = (at("open.stl", &triangles(3, 0.0)), at("far.stl", &triangles(4, 4000.0)));
+    let points = at("points.csv", b"x,y,z\n1,2,3\n");
+    let cases: [(&[&str], &[&str]); 14] = [
+        (&["--resection", &open], &["open.stl", "the surface is open", "Close Holes", "--resection"]),
+        (&["--resection", &far], &["far.stl", "is empty", "RAS+"]),
+        (&["--resection", &points], &["points.csv", "without triangles", ".stl"]),
+        (
+            &["--resection-label", "7", "--dseg", &mask],
+            &["resected_pre.nii.gz", "label 7", "it holds 1", "--resection-label"],
+        ),
+        (&["--resection-ellipsoid", "0,0,0,300,300,300"], &["outside the scan"]),
+        (&["--resection", &mask, "--resection", &mask], &["given twice"]),
+        (&["--resection", &mask, "--resection-ellipsoid", "9000,0,0,5,5,5"], &["is empty"]),
+        (&["--resection", &mask, "--resection", &open], &["open.stl", "the surface is open"]),
         (&["--resection-ellipsoid", "1,2,3"], &["1,2,3", "x,y,z,rx,ry,rz", "--resection-ellipsoid"]),
         (&["--resection-ellipsoid", "1,2,3,4,5,0"], &["half axes above 0"]),
         (&["--resection-ellipsoid", "9000,0,0,5,5,5"], &["is empty", "--resection"]),
@@ -36,6 +53,23 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
     }
     let none = planned(&folder.path().join("none"), &[]);
     assert_eq!(none.status.code(), Some(2));
+    let unmapped = planned(&folder.path().join("none"), &["--resection-label", "7"]);
+    assert_eq!(unmapped.status.code(), Some(2));
+}
+
+/// The first faces of a tetrahedron as a binary STL, moved along x (mm): four close it.
+fn triangles(faces: usize, by: f32) -> Vec<u8> {
+    let corners = [[0.0f32, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 20.0]];
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((faces as u32).to_le_bytes());
+    for face in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].into_iter().take(faces) {
+        bytes.extend([0u8; 12]);
+        for [x, y, z] in face.map(|n: usize| corners[n]) {
+            bytes.extend([x + by, y, z].iter().flat_map(|v| v.to_le_bytes()));
+        }
+        bytes.extend([0u8; 2]);
+    }
+    bytes
 }
 
 #[test]
@@ -105,9 +139,11 @@ fn refuses_in_the_case(case: &Path, folder: &Path) {
     let far = folder.join("far.csv");
     std::fs::write(&far, "x,y,z\n20,-10,30\n500,0,0\n").unwrap();
     let (mask, far) = (plan().display().to_string(), far.display().to_string());
-    let cases: [(&[&str], &[&str]); 2] = [
+    let cases: [(&[&str], &[&str]); 4] = [
         (&["--resection", &mask, "--targets", &far], &["far.csv", "target 2", "outside the head"]),
-        (&["--resection-ellipsoid", "0,0,0,300,300,300"], &["outside the brain"]),
+        (&["--resection-ellipsoid", "60,51,39,9,9,9"], &["outside the brain"]),
+        (&["--resection-ellipsoid", "-2,-23,0,60,75,60"], &["more than half of the brain"]),
+        (&["--resection-ellipsoid", "-2,-20,30,78,100,9"], &["cut the brain in two"]),
     ];
     for (more, words) in cases {
         let ended = planned(case, more);
@@ -120,4 +156,119 @@ fn refuses_in_the_case(case: &Path, folder: &Path) {
     let estimate = output(&["estimate", case.to_str().unwrap()]);
     let said = String::from_utf8_lossy(&estimate.stderr).into_owned();
     assert!(estimate.status.code() == Some(3) && said.contains("before an operation"), "{said}");
+}
+
+#[test]
+fn slow_a_prediction_is_held_against_what_was_seen_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (case, pair) = (folder.path().join("plan"), finished_pair());
+    let mask = plan().display().to_string();
+    let ended = planned(&case, &["--resection", &mask, "--draws", "32", "--checks", "0", "-q"]);
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let words = |path: &Path| path.to_str().unwrap().to_owned();
+    let (case_word, pair_word) = (words(&case), words(&pair));
+    let found = evaluated(&[&case_word, "--against", &pair_word]);
+    let field = &found["heads"][0]["field"];
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    assert!(number(&field["places"]) > 100.0 && number(&field["seen_sd_median_mm"]) > 0.0, "{found}");
+    let cover = &field["coverage_with_error"];
+    for [less, more] in [["reach50", "reach95"], ["ellipsoid50", "ellipsoid95"]] {
+        let shares = [less, more].map(|name| number(&cover[name]));
+        assert!(shares[0] <= shares[1] && (0.0..=1.0).contains(&shares[1]), "{cover}");
+    }
+    // The pair was operated on with this mask.
+    assert!(number(&found["taken"]["dice"]) > 0.5, "{found}");
+    let page = std::fs::read_to_string(case.join("report.html")).unwrap();
+    assert!(page.contains("Predicted against seen") && page.contains("Many patients do"));
+
+    // Landmarks that stay where they are: the forecast is off by all that it foretold.
+    let points = folder.path().join("points.csv");
+    std::fs::write(&points, "name,x,y,z\nanna,20,-10,30\nberta,-30,0,20\n").unwrap();
+    let points_word = words(&points);
+    let pose = folder.path().join("same.txt");
+    std::fs::write(&pose, "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
+    let still = [&case_word, "--landmarks", &points_word, "--landmarks-post", &points_word, "--post-to-pre"];
+    let still = evaluated(&[&still[..], &[&words(&pose)]].concat());
+    for landmark in still["heads"][0]["landmark"].as_array().unwrap() {
+        assert_eq!(
+            (&landmark["seen_mm"], &landmark["error_mm"]),
+            (&0.0.into(), &landmark["expected_mm"]),
+            "{landmark}"
+        );
+    }
+    assert!(still["heads"][0]["landmark"][0]["name"] == "anna");
+    let kept = std::fs::read_to_string(case.join("sim/evaluation.json")).unwrap();
+    assert!(!kept.contains("anna") && !kept.contains("points.csv"), "no name of the user's in the case");
+
+    // What cannot be compared is refused, and the evaluation stays.
+    let other = folder.path().join("other");
+    let patient = crate::made::synthetic_patient()[0].display().to_string();
+    let away = ["--resection-ellipsoid", "20,0,40,9,9,9", "--draws", "16", "--checks", "0", "-q"];
+    let ended = output(&[&["predict", &patient, "-o", &words(&other)], &away[..], &CHEAP[..]].concat());
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let cases: [(Vec<&str>, &[&str]); 6] = [
+        (vec![&case_word], &["nothing says what was seen", "--against"]),
+        (vec![&pair_word], &["case of two scans", "--landmarks"]),
+        (vec![&pair_word, "--against", &case_word], &["no prediction"]),
+        (vec![&case_word, "--against", &case_word], &["no case of two scans"]),
+        (vec![other.to_str().unwrap(), "--against", &pair_word], &["another pre-operative scan"]),
+        (
+            vec![&case_word, "--landmarks", &points_word, "--landmarks-post", &points_word],
+            &["points.csv", "--post-to-pre", "--against"],
+        ),
+    ];
+    for (arguments, words) in cases {
+        let ended = output(&[&["evaluate"], &arguments[..]].concat());
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(3), "{arguments:?}: {said}");
+        assert!(words.iter().all(|w| said.contains(w)), "{arguments:?}: {said}");
+    }
+    assert_eq!(std::fs::read_to_string(case.join("sim/evaluation.json")).unwrap(), kept);
+}
+
+fn evaluated(arguments: &[&str]) -> serde_json::Value {
+    let ended = output(&[&["evaluate", "--json"], arguments].concat());
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    serde_json::from_slice(&ended.stdout).unwrap()
+}
+
+#[test]
+fn slow_of_several_plans_each_is_a_case_and_the_one_that_moves_least_is_named_only_where_it_can_be_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = folder.path().join("plans");
+    let mask = plan().display().to_string();
+    // The same piece, and a speck: what is taken decides.
+    let small = "-39,10,-38,6,6,6";
+    let ended = planned(
+        &all,
+        &["--resection", &mask, "--resection-ellipsoid", small, "--draws", "32", "--checks", "0", "--json", "-q"],
+    );
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(found["plans"][0]["given"], "mask");
+    assert_eq!(found["plans"][1]["given"], "ellipsoid");
+    let head = &found["heads"][0];
+    let least = head["least"].as_str().unwrap();
+    let row = head["plans"].as_array().unwrap().iter().find(|row| row["plan"] != least).unwrap();
+    let told = row["more_interval_95_cc"][0].as_f64().unwrap() > 0.0;
+    assert_eq!(head["not_told_from"].as_array().unwrap().is_empty(), told, "{head}");
+    assert_eq!(head["sentence"].as_str().unwrap().contains("cannot be told"), !told, "{head}");
+    let text = std::fs::read_to_string(all.join("plans.json")).unwrap();
+    assert!(!text.contains("resected_pre"), "no name of the user's in what is kept");
+    let page = std::fs::read_to_string(all.join("plans.html")).unwrap();
+    assert!(page.contains(head["sentence"].as_str().unwrap()));
+    for plan in ["plan-1", "plan-2"] {
+        assert!(all.join(plan).join("report.html").exists() && page.contains(plan), "{plan}");
+    }
+    // A plan of several is the same bytes as alone.
+    let alone = folder.path().join("alone");
+    let ended = planned(&alone, &["--resection-ellipsoid", small, "--draws", "32", "--checks", "0", "-q"]);
+    assert!(ended.status.success());
+    for file in ["sim/prediction.json", "sim/predicted_draws.csv", "anat/pre_space-native_dseg.nii.gz"] {
+        let read = |case: &Path| std::fs::read(case.join(file)).unwrap();
+        assert!(read(&alone) == read(&all.join("plan-2")), "{file}");
+    }
+    let again = planned(&alone, &["--resection", &mask, "--resection-ellipsoid", small]);
+    let said = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert!(again.status.code() == Some(3) && said.contains("the case of one plan"), "{said}");
 }

@@ -3,13 +3,16 @@
 mod brain_shift;
 mod cohort;
 mod estimate;
+mod evaluation;
 mod glance;
 mod methods;
 mod parts;
+pub mod plans;
 mod posterior;
 mod prediction;
 mod results;
 
+pub use evaluation::in_a_sentence as evaluation_in_a_sentence;
 pub use methods::{Reference, references};
 pub use prediction::in_a_sentence as expected_in_a_sentence;
 pub use results::set_name;
@@ -23,7 +26,7 @@ use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::Prediction;
+use crate::experiment::predict::{Prediction, PredictionEvaluation};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("../assets/page.css");
@@ -90,6 +93,8 @@ pub struct CasePage {
     pub outcome: Option<ExperimentOutcome>,
     /// How the brain is expected to move.
     pub prediction: Option<Prediction>,
+    /// The same against what was seen afterwards.
+    pub evaluation: Option<PredictionEvaluation>,
     /// The same on slices.
     pub prediction_figure: Option<PredictionFigure>,
     /// The brain shift in numbers.
@@ -246,6 +251,7 @@ impl CasePage {
         let expected = self.prediction_figure.as_ref();
         let expected = expected.map(|f| html! { (shift_pictures(&f.shift)) (shift_pictures(&f.spread)) });
         add("expected", "Expected brain shift", self.prediction.as_ref().map(|p| prediction::section(p, expected)));
+        add("evaluation", "Predicted against seen", self.evaluation.as_ref().map(evaluation::section));
         let compared = outcome.filter(|o| o.kind != ExperimentKind::Prediction);
         add("summary", "Summary", compared.map(results::summary));
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));

@@ -1,6 +1,7 @@
 //! Why a job did not end well.
 
 mod case;
+mod evaluate;
 mod input;
 mod label_map;
 mod landmarks;
@@ -10,6 +11,7 @@ mod simulation;
 mod warp;
 
 pub use case::CaseError;
+pub use evaluate::EvaluateError;
 pub use input::{InputError, MaskRole};
 pub use label_map::LabelMapError;
 pub use landmarks::LandmarkError;
@@ -140,6 +142,8 @@ pub enum WorkflowError {
     Predict(#[from] PredictError),
     #[error(transparent)]
     Landmark(#[from] LandmarkError),
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
     #[error(transparent)]
     Population(#[from] PopulationFileError),
     #[error(transparent)]

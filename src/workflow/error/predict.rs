@@ -1,6 +1,8 @@
 //! Why no prediction can be made.
 
 use crate::experiment::predict::PlannedError;
+use crate::mesh::OpenSurface;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// Why no prediction can be made.
@@ -13,6 +15,36 @@ pub enum PredictError {
     NoPlan,
     #[error("`{given}` is no ellipsoid: give six numbers x,y,z,rx,ry,rz (mm, scanner, RAS+), the half axes above 0")]
     Ellipsoid { given: String },
+    #[error(
+        "`{given}` is no label: give whole numbers above 0 as the label map has them, with commas between (1010,1011)"
+    )]
+    Label { given: String },
+    #[error("{plan}: there is no label map to take it from; give one made of this scan")]
+    NoLabelMap { plan: String },
+    #[error("{file}: not one voxel has the {plan}; it holds {}", holds.join(", "))]
+    NoSuchLabel { file: String, plan: String, holds: Vec<String> },
+    #[error(
+        "{file}: a drawing without triangles: give a surface (.stl, .surf.gii, .ply), or a mask in the scan's grid (.nii, .nii.gz)"
+    )]
+    NoSurface { file: String },
+    #[error(
+        "{file}: {source}; close it (3D Slicer: Surface Toolbox, Fill Holes; MeshLab: Close Holes), or give a mask"
+    )]
+    OpenSurface { file: String, source: OpenSurface },
+    #[error(
+        "{plan}: within the scan it is empty: no voxel's centre lies inside; places are in mm of the scanner's frame (RAS+), correct place \
+         and size"
+    )]
+    NoVoxel { plan: String },
+    #[error(
+        "{plan}: {percent:.0} % of it lie outside the scan; places are in mm of the scanner's frame (RAS+): check that it was drawn on this \
+         scan"
+    )]
+    BesideScan { plan: String, percent: f64 },
+    #[error("{}: the case of one plan, and a folder for several is asked for", folder.display())]
+    OnePlan { folder: PathBuf },
+    #[error("{plan} is given twice")]
+    Twice { plan: String },
     #[error("{file}: holds no point; give the targets as .csv (x,y,z in mm, RAS+), .fcsv or .mrk.json")]
     NoTarget { file: String },
     #[error(
@@ -26,4 +58,6 @@ pub enum PredictError {
          table [resection] or the part that has drained"
     )]
     NoEquilibrium { reason: String },
+    #[error("{}: {file} is not there: an earlier version has made this prediction", folder.display())]
+    NoDraws { folder: PathBuf, file: String },
 }

@@ -13,6 +13,7 @@ mod mesh;
 mod plan;
 mod pose;
 mod predict;
+mod predicted_draws;
 mod reading;
 mod reference;
 mod registration;
@@ -33,6 +34,7 @@ pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
 pub(crate) use plan::{PlannedHead, plan};
 pub(crate) use pose::pose;
 pub(crate) use predict::{PredictInput, predict};
+pub(crate) use predicted_draws::{Predicted, read_draws, read_table};
 pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,
     reference_stage,
@@ -41,4 +43,4 @@ pub(crate) use registration::{
     mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
 };
 pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
-pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of};
+pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, mask_of};

@@ -20,7 +20,7 @@ use crate::segment::atlas;
 use crate::segment::native::mask_on;
 use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
-use crate::workflow::planned_scan::PlannedScan;
+use crate::workflow::planned_scan::{PlannedScan, once};
 use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
@@ -81,7 +81,10 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
             ventricle: scan.ventricle.as_ref().map(|(mask, _)| mask.clone()),
             ..GivenMasks::default()
         };
-        let (before, template, _) = take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?;
+        let (before, template) = once(&scan.shared.head, || {
+            let (before, template, _) = take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?;
+            Ok::<_, WorkflowError>((before, template))
+        })?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());

@@ -7,7 +7,7 @@ use crate::experiment::outcome::RegistrationOutcome;
 use crate::geometry::{Frame, Mni};
 use crate::layout;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::planned_scan::PlannedScan;
+use crate::workflow::planned_scan::{PlannedScan, once};
 use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
@@ -33,10 +33,15 @@ pub(crate) fn pose(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         work.tell(|p| p.doing("pre to MNI"));
         let mut produced = Produced { warnings: scan.warnings.clone(), ..Produced::default() };
         let given = (scan.pose.as_ref().map(|(pose, _)| pose), scan.labels.as_ref().map(|(labels, _)| labels));
-        let (mni_from_pre, fit) = pose_of(&scan.pre, given, &mut produced.warnings)?;
+        let (mni_from_pre, fit, odd) = once(&scan.shared.pose, || {
+            let mut odd = Vec::new();
+            let (mni_from_pre, fit) = pose_of(&scan.pre, given, &mut odd)?;
+            Ok::<_, WorkflowError>((mni_from_pre, fit, odd))
+        })?;
+        produced.warnings.extend_from_slice(odd);
         work.tell(|p| p.end());
-        write_transform(&mut produced, layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK, &mni_from_pre);
-        produced.facts = facts(&PoseFacts { fit });
+        write_transform(&mut produced, layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK, mni_from_pre);
+        produced.facts = facts(&PoseFacts { fit: fit.clone() });
         Ok(produced)
     })
 }

@@ -2,6 +2,7 @@
 
 use super::fields::carried;
 use super::plan::PlannedHead;
+use super::predicted_draws::{mode_fields, over_threshold_cc};
 use super::registration::pose;
 use super::samples::with_held_tissues;
 use super::shift::{grid_of, mask_of, spaced};
@@ -9,16 +10,16 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, Forecast, Found, Head, HeadPrediction, Locator, PREDICTED, Planned, Posed, Prediction, Spread,
-    SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, ellipsoid_95, forecast, spread,
-    variance_shares,
+    Check, Forecast, Found, Head, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction, Spread,
+    SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95, forecast,
+    spread, variance_shares,
 };
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::nifti::{encode_displacement, encode_f32, encode_mask};
 use crate::layout::{
-    NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK, SHIFT_MASK,
-    SHIFT_PROBABILITY, SHIFT_REACH, SHIFT_REACH_50, SHIFT_SD,
+    NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
+    SHIFT_MASK, SHIFT_PROBABILITY, SHIFT_REACH, SHIFT_REACH_50, SHIFT_SD,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
@@ -27,9 +28,10 @@ use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -84,7 +86,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             prediction.checks.extend(found.checks.iter().cloned());
             prediction.heads.push(found.in_numbers(&patient, head, &state));
             let field = patient.field(&found.spread);
-            patient.files(&state, &found.spread, &field, &mut produced)?;
+            patient.files(&state, &found, &field, &mut produced)?;
             if number == 0 {
                 carried(work, &field, &mut produced)?;
             }
@@ -188,11 +190,11 @@ impl<'a> Patient<'a> {
     fn files(
         &self,
         state: &str,
-        spread: &Spread,
+        found: &Lying,
         field: &ShiftField,
         produced: &mut Produced,
     ) -> Result<(), WorkflowError> {
-        let mesh = self.input.mesh.0;
+        let (mesh, spread) = (self.input.mesh.0, &found.spread);
         let pre_from_mni = self.mni_from_pre.inverse();
         let nodes: Vec<[f64; 3]> =
             mesh.nodes_mm().iter().map(|x| pre_from_mni.apply(Position::new(x[0], x[1], x[2])).mm.into()).collect();
@@ -211,14 +213,17 @@ impl<'a> Patient<'a> {
         write(SHIFT_REACH.of(state), encode_f32(&field.on_whole(&field.reach95_mm, 0.0)));
         write(SHIFT_PROBABILITY.of(state), encode_f32(&field.on_whole(&part(1), 0.0)));
         write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
-        let points = [
+        let modes = found.modes(mesh, self.settings.predict.threshold_mm);
+        let mut points = vec![
             Field::vector("displacement", &spread.mean_mm),
             Field::scalar("displacement_sd", spread.sd_mm.clone()),
             Field::scalar("displacement_50", spread.reach50_mm.clone()),
             Field::scalar("displacement_95", spread.reach95_mm.clone()),
             Field::scalar("over_threshold", spread.over.clone()),
         ];
+        points.extend(mode_fields(&modes));
         write(PREDICTED_STATE.of(state), vtu::encode(mesh, &points, &[])?);
+        write(PREDICTED_DRAWS.of(state), draws_to_csv(&modes.draws).into_bytes());
         if field.changed > 0 {
             produced.warnings.push(format!(
                 "{state}: tissue folds over at {} voxels; the displacement field is smoothed there and not believed",
@@ -232,6 +237,8 @@ impl<'a> Patient<'a> {
 /// One head, with the draws of every way of supporting the brain.
 struct Lying {
     draws: Vec<(f64, Vec<[f64; 3]>)>,
+    /// How the brain was supported in each, and its number among those of these supports.
+    named: Vec<(String, usize)>,
     spread: Spread,
     checks: Vec<Check>,
     shares: crate::experiment::predict::Shares,
@@ -276,15 +283,24 @@ impl Lying {
             thinned.iter().map(|(weight, response, unknowns)| (*weight, response, *unknowns)).collect();
         let shares = variance_shares(&models);
         let states = found.iter().map(|(_, f)| f.states).sum();
-        let mut draws = Vec::new();
-        let mut told = Vec::new();
+        let (mut draws, mut named, mut told) = (Vec::new(), Vec::new(), Vec::new());
         for (posed, forecast) in found {
             let weight = posed.weight / all / forecast.draws_mm.len() as f64;
+            named.extend((0..forecast.draws_mm.len()).map(|number| (posed.supports.clone(), number)));
             draws.extend(forecast.draws_mm.into_iter().map(|u| (weight, u)));
             told.extend(forecast.check);
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
-        Ok(Self { draws, spread, checks: told, shares, states })
+        Ok(Self { draws, named, spread, checks: told, shares, states })
+    }
+
+    /// The draws as they are kept.
+    fn modes(&self, mesh: &TetMesh, threshold_mm: f64) -> Modes {
+        let volume = |(_, u): &(f64, Vec<[f64; 3]>)| over_threshold_cc(mesh, u, threshold_mm);
+        let volumes: Vec<f64> = self.draws.par_iter().map(volume).collect();
+        let named: Vec<(String, usize, f64)> =
+            self.named.iter().zip(volumes).map(|((supports, n), cc)| (supports.clone(), *n, cc)).collect();
+        Modes::of(&self.draws, &self.spread.mean_mm, &named)
     }
 
     fn in_numbers(&self, patient: &Patient<'_>, head: &Head, state: &str) -> HeadPrediction {

@@ -100,7 +100,7 @@ pub(crate) fn brain_shift(case: &Case) -> Result<Option<BrainShift>, WorkflowErr
 }
 
 /// A mask of the case on a grid.
-pub(super) fn mask_of<F: Frame>(case: &Case, name: &str, grid: &Grid<F>) -> Result<Mask<F>, WorkflowError> {
+pub(crate) fn mask_of<F: Frame>(case: &Case, name: &str, grid: &Grid<F>) -> Result<Mask<F>, WorkflowError> {
     let (labels, _) = nifti::decode_labels(&case.read(name)?, name, &ReadOptions::default())?;
     let mask: Mask<F> = labels.relabelled::<F>().map(|l| l > 0);
     Ok(if mask.grid.coincides(grid, 1e-3) { mask } else { mask_on(&mask, grid, &RigidTransform::identity()) })

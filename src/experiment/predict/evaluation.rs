@@ -1,0 +1,158 @@
+//! A prediction against what was seen afterwards, as `sim/evaluation.json` keeps it.
+
+use super::score::Scores;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A prediction against what was seen. Lengths in mm, displacements in the pre-operative scanner's frame, RAS+.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PredictionEvaluation {
+    /// SHA-256 of the `sim/prediction.json` that was evaluated.
+    pub prediction_sha256: String,
+    /// What it was compared with: `observed`, `fused` (states of the later case), `landmarks`.
+    pub against: Vec<String>,
+    /// What was taken against what was to be taken, where the later case says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken: Option<TakenAgainstPlan>,
+    /// Each way of lying; the first is the state `predicted`.
+    pub heads: Vec<HeadEvaluation>,
+    /// What the figures do not say by themselves, in plain words.
+    pub limits: Vec<String>,
+}
+
+/// One way of lying.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeadEvaluation {
+    /// As it was said: `supine`, `prone` ...
+    pub head: String,
+    /// Name of its state among the case's files.
+    pub state: String,
+    /// Over the nodes of the prediction's mesh where the later case believes what it sees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<Scores>,
+    /// Over the landmarks outside the tissue that was to be taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub landmarks: Option<Scores>,
+    /// A row for each landmark.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub landmark: Vec<LandmarkForecast>,
+}
+
+/// One landmark.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkForecast {
+    /// Its name or number.
+    pub name: String,
+    /// Where it lies: `tissue`, `fluid`, `removed`. What lies in tissue that was to be taken is listed and not counted.
+    pub place: String,
+    /// How far it was seen to move, mm: its error where nothing is foretold.
+    pub seen_mm: f64,
+    /// How far it was expected to move, mm.
+    pub expected_mm: f64,
+    /// Standard deviation of that (root of the trace of the covariance), mm.
+    pub sd_mm: f64,
+    /// Distance between the two places, mm.
+    pub error_mm: f64,
+    /// Whether it was seen inside the ellipsoid that holds 95 % of the draws.
+    pub inside_95: bool,
+}
+
+/// What was taken against the plan, in the pre-operative scan's grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TakenAgainstPlan {
+    /// What was to be taken, cc.
+    pub planned_cc: f64,
+    /// What was taken, cc.
+    pub taken_cc: f64,
+    /// How far the two agree: twice what they share over their sum.
+    pub dice: f64,
+}
+
+impl TakenAgainstPlan {
+    /// Below this another operation was done than the one foretold.
+    const OTHER_OPERATION: f64 = 0.5;
+
+    /// Volumes (cc) of the plan, of what was taken, and of what they share.
+    pub fn new(planned_cc: f64, taken_cc: f64, shared_cc: f64) -> Self {
+        let dice = 2.0 * shared_cc / (planned_cc + taken_cc).max(f64::MIN_POSITIVE);
+        Self { planned_cc, taken_cc, dice }
+    }
+
+    /// Whether the operation was another one.
+    pub fn is_other(&self) -> bool {
+        self.dice < Self::OTHER_OPERATION
+    }
+}
+
+impl PredictionEvaluation {
+    /// Says what the figures do not.
+    #[must_use]
+    pub fn with_limits(mut self) -> Self {
+        if self.heads.iter().any(|head| head.field.is_some()) {
+            self.limits.push(
+                "The places of one brain move together: one patient says little about how often the reach holds. Many \
+                 patients do."
+                    .to_owned(),
+            );
+        }
+        if let Some(scores) = self.heads.iter().filter_map(|head| head.field).find(Scores::is_within_error) {
+            self.limits.push(format!(
+                "What was seen ({:.2} mm) is smaller than its own error ({:.2} mm): this operation moved too little, or was seen \
+                 too poorly, to judge the forecast by.",
+                scores.seen_rms_mm, scores.seen_sd_median_mm
+            ));
+        }
+        if let Some(taken) = self.taken.filter(TakenAgainstPlan::is_other) {
+            self.limits.push(format!(
+                "Other tissue was taken ({:.1} cc) than was planned ({:.1} cc; they agree to {:.2} of 1): part of the \
+                 difference is the plan's.",
+                taken.taken_cc, taken.planned_cc, taken.dice
+            ));
+        }
+        if self.against.iter().any(|state| state == "fused") {
+            self.limits.push(
+                "The fused state holds a model of the same kind as the prediction: where the images say little the two \
+                 agree by construction. The observed state is of the images alone."
+                    .to_owned(),
+            );
+        }
+        if self.heads.iter().any(|head| head.landmarks.is_some()) {
+            self.limits.push("Landmarks are taken to be without error.".to_owned());
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_operation_and_a_fused_truth_are_said_in_words_and_one_as_planned_is_not() {
+        let of = |shared_cc: f64, against: &str| {
+            let taken = Some(TakenAgainstPlan::new(20.0, 30.0, shared_cc));
+            let head = HeadEvaluation { field: Some(Scores::default()), ..HeadEvaluation::default() };
+            let against = vec![against.to_owned()];
+            PredictionEvaluation { against, taken, heads: vec![head], ..PredictionEvaluation::default() }.with_limits()
+        };
+        let other = of(5.0, "fused");
+        assert!((other.taken.unwrap().dice - 0.2).abs() < 1e-12);
+        assert!(other.limits.len() == 3 && other.limits[1].contains("Other tissue"), "{:?}", other.limits);
+        assert_eq!(of(18.0, "observed").limits.len(), 1);
+    }
+
+    #[test]
+    fn what_is_seen_within_its_error_is_said_to_judge_nothing() {
+        let of = |seen_rms_mm: f64| {
+            let scores = Scores { places: 9, seen_rms_mm, seen_sd_median_mm: 2.0, ..Scores::default() };
+            let head = HeadEvaluation { field: Some(scores), ..HeadEvaluation::default() };
+            PredictionEvaluation { heads: vec![head], ..PredictionEvaluation::default() }.with_limits().limits
+        };
+        assert!(of(1.0).iter().any(|limit| limit.contains("smaller than its own error")));
+        assert!(!of(3.0).iter().any(|limit| limit.contains("smaller than its own error")));
+    }
+}

@@ -1,0 +1,252 @@
+//! A prediction against the later state: what its draws foretold at every place, and what was seen there.
+
+use super::case::Case;
+use super::error::{EvaluateError, WorkflowError};
+use super::evaluate::{Landmarks, Pair, pairs};
+use super::lock::Lock;
+use super::maps::{Map, Part, WarpTo};
+use super::outcome::write_page;
+use super::stage_name::{StageName, Subject};
+use super::stages::{OBSERVED, Predicted, grid_of, mask_of, mni_from_pre, read_draws, transforms};
+use super::user_file::{read_text, shown};
+use crate::artefact::{Manifest, sha256_hex, write_whole};
+use crate::experiment::predict::{
+    Compared, Found, HeadEvaluation, LandmarkForecast, Locator, Modes, Prediction, PredictionEvaluation, Scatter,
+    TakenAgainstPlan, TargetPlace, scores,
+};
+use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
+use crate::image::Mask;
+use crate::layout::{EVALUATION_JSON, NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTION_JSON};
+use crate::overlay::PointState;
+use crate::register::transform_text::rigid_from_text;
+use nalgebra::{UnitQuaternion, Vector3};
+use std::path::{Path, PathBuf};
+
+/// What was seen after an operation.
+#[derive(Clone, Debug, Default)]
+pub struct SeenAfterwards {
+    /// A finished case of two scans of the same patient.
+    pub case: Option<PathBuf>,
+    /// The state of that case that is taken for true: `observed` (of the images alone, the default) or `fused`.
+    pub state: Option<String>,
+    /// Landmarks on both scans.
+    pub landmarks: Option<Landmarks>,
+    /// The rigid motion that carries a point of the later scan to the earlier one, where no case says it: 4x4 text (RAS, mm) or
+    /// ITK's.
+    pub pre_from_post: Option<PathBuf>,
+}
+
+/// A landmark further than this from the predicted tissue belongs to no brain, mm.
+const BESIDE_MM: f64 = 10.0;
+
+/// So many draws of each way of supporting the brain are compared: pairs of them are counted, at every place.
+const DRAWS: usize = 256;
+
+/// Compares a prediction with what was seen, keeps the result in its case (landmarks by number in place of their names) and
+/// makes the page again.
+///
+/// # Errors
+/// [`WorkflowError`] for a case that is no prediction, a later case of another scan, or landmarks that cannot be used.
+pub fn evaluate_prediction(folder: &Path, seen: &SeenAfterwards) -> Result<PredictionEvaluation, WorkflowError> {
+    let case = Case::open(folder)?;
+    if case.subject() != Some(Subject::Plan) {
+        return Err(EvaluateError::NotAPrediction { folder: folder.to_path_buf() }.into());
+    }
+    if seen.case.is_none() && seen.landmarks.is_none() {
+        return Err(EvaluateError::NothingSeen { folder: folder.to_path_buf() }.into());
+    }
+    let later = seen.case.as_deref().map(|against| later_case(&case, against)).transpose()?;
+    let marked = seen.landmarks.as_ref().map(|l| Marked::read(l, later.as_ref(), seen.pre_from_post.as_deref()));
+    let marked = marked.transpose()?;
+    let _alone = Lock::take(folder, true)?;
+    case.check_outcome()?;
+    let (_, prediction): (_, Prediction) = case.stage(&StageName::Predict)?;
+    let mut evaluation = PredictionEvaluation {
+        prediction_sha256: sha256_hex(&case.read(PREDICTION_JSON)?),
+        ..PredictionEvaluation::default()
+    };
+    let mut field = None;
+    if let Some(later) = &later {
+        let state = seen.state.as_deref().unwrap_or(OBSERVED);
+        field = Some((state, Map::of_case(later, Some(state), WarpTo::Deformed, Part::Points)?.0));
+        evaluation.against.push(state.to_owned());
+        evaluation.taken = Some(taken_against_plan(&case, later)?);
+    }
+    evaluation.against.extend(marked.as_ref().map(|_| "landmarks".to_owned()));
+    for head in &prediction.heads {
+        let foretold = Foretold::read(&case, &head.state)?;
+        let mut row =
+            HeadEvaluation { head: head.head.clone(), state: head.state.clone(), ..HeadEvaluation::default() };
+        if let Some((state, map)) = &field {
+            let places = foretold.seen_at_nodes(map);
+            if places.is_empty() {
+                let folder = seen.case.clone().unwrap_or_default();
+                return Err(EvaluateError::NowhereSeen { folder, state: (*state).to_owned() }.into());
+            }
+            row.field = Some(scores(places.len(), &|n| foretold.compared(&places[n])));
+        }
+        if let Some(marked) = &marked {
+            foretold.landmarks(marked, &mut row)?;
+        }
+        evaluation.heads.push(row);
+    }
+    let evaluation = evaluation.with_limits();
+    let mut kept = evaluation.clone();
+    for (n, landmark) in kept.heads.iter_mut().flat_map(|head| head.landmark.iter_mut().enumerate()) {
+        landmark.name = (n + 1).to_string();
+    }
+    let text = format!("{:#}\n", super::work::facts(&kept));
+    write_whole(&case.path(EVALUATION_JSON), text.as_bytes())?;
+    write_page(&case)?;
+    Ok(evaluation)
+}
+
+/// The later case, of the same scan before.
+fn later_case(prediction: &Case, against: &Path) -> Result<Case, WorkflowError> {
+    let later = Case::open(against)?;
+    if later.subject() != Some(Subject::Patient) {
+        return Err(EvaluateError::NothingAfter { folder: against.to_path_buf() }.into());
+    }
+    later.check_outcome()?;
+    let scan = |case: &Case, stage: StageName| {
+        Manifest::of_stage(case.folder(), &stage.to_string()).and_then(|m| m.inputs.get("pre").cloned())
+    };
+    let (before, after) = (scan(prediction, StageName::Pose), scan(&later, StageName::Registration));
+    let both = || (prediction.folder().to_path_buf(), against.to_path_buf());
+    if before.is_none() || before != after {
+        let (prediction, against) = both();
+        return Err(EvaluateError::OtherScan { prediction, against }.into());
+    }
+    let grids = [prediction, &later].map(|case| grid_of::<Pre>(case, PRE_NATIVE_BRAIN));
+    let [before, after] = grids;
+    if !before?.coincides(&after?, 1e-3) {
+        let (prediction, against) = both();
+        return Err(EvaluateError::OtherGrid { prediction, against }.into());
+    }
+    Ok(later)
+}
+
+fn taken_against_plan(prediction: &Case, later: &Case) -> Result<TakenAgainstPlan, WorkflowError> {
+    let grid = grid_of::<Pre>(prediction, PRE_NATIVE_BRAIN)?;
+    let planned: Mask<Pre> = mask_of(prediction, NATIVE_RESECTED, &grid)?;
+    let taken: Mask<Pre> = mask_of(later, NATIVE_RESECTED, &grid)?;
+    let cc = |voxels: usize| (voxels as f64 * grid.voxel_volume_mm3() / 1000.0 * 1e3).round() / 1e3;
+    let shared = planned.data.iter().zip(&taken.data).filter(|(a, b)| **a && **b).count();
+    Ok(TakenAgainstPlan::new(cc(planned.count()), cc(taken.count()), cc(shared)))
+}
+
+/// Landmarks in the frame of the scan before.
+struct Marked {
+    file: String,
+    /// Name, place before, displacement without the rigid motion.
+    rows: Vec<(String, [f64; 3], [f64; 3])>,
+}
+
+impl Marked {
+    fn read(landmarks: &Landmarks, later: Option<&Case>, by_hand: Option<&Path>) -> Result<Self, WorkflowError> {
+        let file = shown(&landmarks.pre);
+        let found: Vec<Pair> = pairs(landmarks)?;
+        let pre_from_post: RigidTransform<Post, Pre> = match (by_hand, later) {
+            (Some(path), _) => rigid_from_text(&read_text(path)?, &shown(path))?,
+            (None, Some(later)) => transforms(later)?.0,
+            (None, None) => {
+                let file = landmarks.post.as_deref().map_or(file, shown);
+                return Err(EvaluateError::NoPose { file }.into());
+            }
+        };
+        let moved = |(name, x, y): Pair| {
+            let back = pre_from_post.apply(Position::new(y[0], y[1], y[2])).mm;
+            (name, x, [0, 1, 2].map(|a| back[a] - x[a]))
+        };
+        Ok(Self { file, rows: found.into_iter().map(moved).collect() })
+    }
+}
+
+/// Where something was seen to move: place in the mesh, displacement and its standard deviation, mm.
+struct Seen {
+    place: Found,
+    moved_mm: [f64; 3],
+    sd_mm: f64,
+}
+
+/// A state of a prediction in the frame of the scan.
+struct Foretold {
+    predicted: Predicted,
+    mni_from_pre: RigidTransform<Pre, Mni>,
+    resected: Mask<Pre>,
+}
+
+impl Foretold {
+    fn read(case: &Case, state: &str) -> Result<Self, WorkflowError> {
+        let mni_from_pre = mni_from_pre(case)?;
+        let mut predicted = read_draws(case, state)?;
+        predicted.modes.draws.retain(|draw| draw.number < DRAWS);
+        turn(&mut predicted.modes, &mni_from_pre.inverse().rotation);
+        let grid = grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?;
+        Ok(Self { predicted, mni_from_pre, resected: mask_of(case, NATIVE_RESECTED, &grid)? })
+    }
+
+    /// The nodes where a later case believes what it sees.
+    fn seen_at_nodes(&self, map: &Map) -> Vec<Seen> {
+        let pre_from_mni = self.mni_from_pre.inverse();
+        let of = |(n, x): (usize, &[f64; 3])| {
+            let x: [f64; 3] = pre_from_mni.apply(Position::new(x[0], x[1], x[2])).mm.into();
+            let carried = map.carry(x);
+            let place = Found { nodes: [n as u32; 4], weights: [0.25; 4], outside_mm: 0.0 };
+            let moved_mm = [0, 1, 2].map(|a| carried.mm[a] - x[a]);
+            let sd_mm = carried.sd_mm.unwrap_or(0.0);
+            (carried.state == PointState::Tissue).then_some(Seen { place, moved_mm, sd_mm })
+        };
+        self.predicted.mesh.nodes_mm().iter().enumerate().filter_map(of).collect()
+    }
+
+    fn compared(&self, seen: &Seen) -> Compared {
+        Compared { draws: self.predicted.modes.at(&seen.place), seen_mm: seen.moved_mm, seen_sd_mm: seen.sd_mm }
+    }
+
+    fn landmarks(&self, marked: &Marked, row: &mut HeadEvaluation) -> Result<(), WorkflowError> {
+        let mut counted = Vec::new();
+        for (name, x, moved_mm) in &marked.rows {
+            let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
+            let place = Locator(&self.predicted.mesh).find(self.mni_from_pre.apply(p).mm.into());
+            let (lies, counts) = match self.resected.nearest(p) {
+                Some(true) => (TargetPlace::Removed.name(), false),
+                _ if place.outside_mm > BESIDE_MM => ("outside", false),
+                _ if place.outside_mm > 0.0 => (TargetPlace::Fluid.name(), true),
+                _ => (TargetPlace::Tissue.name(), true),
+            };
+            let seen = Seen { place, moved_mm: *moved_mm, sd_mm: 0.0 };
+            row.landmark.push(forecast_of(name, lies, &self.compared(&seen)));
+            if counts {
+                counted.push(seen);
+            }
+        }
+        if counted.is_empty() {
+            return Err(EvaluateError::NoLandmark { file: marked.file.clone() }.into());
+        }
+        row.landmarks = Some(scores(counted.len(), &|n| self.compared(&counted[n])));
+        Ok(())
+    }
+}
+
+fn forecast_of(name: &str, place: &str, compared: &Compared) -> LandmarkForecast {
+    let rounded = |x: f64| (x * 1e3).round() / 1e3 + 0.0;
+    let scatter = Scatter::of(&compared.draws);
+    let (mean, seen) = (Vector3::from(scatter.mean_mm()), Vector3::from(compared.seen_mm));
+    LandmarkForecast {
+        name: name.to_owned(),
+        place: place.to_owned(),
+        seen_mm: rounded(seen.norm()),
+        expected_mm: rounded(mean.norm()),
+        sd_mm: rounded(scatter.sd_mm()),
+        error_mm: rounded((mean - seen).norm()),
+        inside_95: scatter.distance(&compared.seen_mm) <= scatter.radius(0.95),
+    }
+}
+
+/// Displacements in another frame.
+fn turn(modes: &mut Modes, rotation: &UnitQuaternion<f64>) {
+    for u in modes.modes_mm.iter_mut().flatten().chain(&mut modes.mean_mm) {
+        *u = (rotation * Vector3::from(*u)).into();
+    }
+}
