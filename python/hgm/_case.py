@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from dataclasses import dataclass
@@ -79,7 +80,11 @@ class Case:
     @property
     def evaluation(self) -> dict[str, Any]:
         """A prediction against what was seen afterwards, as ``hgm evaluate`` has compared them."""
-        return self._json("evaluation")
+        found = self._json("evaluation")
+        made = hashlib.sha256((self.path / _NAMES["prediction"]).read_bytes()).hexdigest()
+        if found.get("prediction_sha256") != made:
+            raise InputRefused(f"{_NAMES['evaluation']}: of another prediction than the case holds: run `hgm evaluate` again")
+        return found
 
     @property
     def estimate(self) -> dict[str, Any]:

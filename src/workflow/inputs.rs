@@ -61,7 +61,8 @@ pub fn read_mask_of(
         let (path, found, image) = (path.to_path_buf(), mask.grid.dims, grid.dims);
         return Err(InputError::ImageGrid { path, found, image }.into());
     }
-    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    // Warnings are kept in the case, where no folder's name belongs.
+    warnings.extend(odd.into_iter().map(|w| format!("{}: {w}", shown(path))));
     Ok(mask)
 }
 

@@ -7,6 +7,7 @@ use crate::experiment::predict::{PlannedError, ellipsoid_mask};
 use crate::geometry::{Native, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::{Grid, Mask};
+use crate::mesh::{OpenSurface, TriMesh};
 use crate::overlay::Drawing;
 use crate::segment::native::mask_on;
 use std::collections::BTreeSet;
@@ -102,7 +103,7 @@ impl PlannedResection {
                 let surface = Drawing::decode(&read_input(path)?, &file())?.surface(&file())?;
                 let surface = surface.ok_or_else(|| PredictError::NoSurface { file: file() })?;
                 let refused = |source| PredictError::OpenSurface { file: file(), source };
-                (surface.enclosed(grid).map_err(refused)?, surface.enclosed_volume_mm3().abs())
+                (surface.enclosed(grid).map_err(refused)?, volume_mm3(&surface).map_err(refused)?)
             }
             Self::Ellipsoid([x, y, z, rx, ry, rz]) => {
                 let volume_mm3 = 4.0 / 3.0 * std::f64::consts::PI * rx * ry * rz;
@@ -123,6 +124,20 @@ impl PlannedResection {
         }
         Ok(mask)
     }
+}
+
+/// Volume of what a surface encloses, by the same rule as its voxels: parts that overlap count once, whichever way their triangles
+/// are turned.
+fn volume_mm3(surface: &TriMesh) -> Result<f64, OpenSurface> {
+    /// Voxels along the longest side.
+    const ACROSS: f64 = 100.0;
+    let end = |axis: usize, of: fn(f64, f64) -> f64| surface.nodes_mm.iter().map(|x| x[axis]).reduce(of).unwrap_or(0.0);
+    let (low, high) = ([0, 1, 2].map(|a| end(a, f64::min)), [0, 1, 2].map(|a| end(a, f64::max)));
+    let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
+    let spacing_mm = (longest / ACROSS).max(f64::MIN_POSITIVE);
+    let dims = [0, 1, 2].map(|a| ((high[a] - low[a]) / spacing_mm).ceil() as usize + 2);
+    let grid = Grid::<Pre>::axis_aligned(dims, [spacing_mm; 3], low.map(|x| x - 0.5 * spacing_mm));
+    Ok(surface.enclosed(&grid)?.count() as f64 * grid.voxel_volume_mm3())
 }
 
 /// The voxels of a label map that have these numbers, on the scan's grid.

@@ -49,6 +49,8 @@ pub(crate) struct PlannedScan {
     pub pre: Volume<f32, Pre>,
     /// What the reader noticed.
     pub warnings: Vec<String>,
+    /// What is odd about the plan.
+    pub plan_warnings: Vec<String>,
     /// The plan's name for messages.
     pub plan: String,
     /// What is to be taken.
@@ -92,7 +94,8 @@ impl PlannedScan {
             Ok(read_mask_of(path, &grid, options, warnings)?.relabelled())
         };
         let plan = inputs.resection.to_string();
-        let resection = inputs.resection.mask(&pre.grid, inputs.dseg.as_deref(), options, &mut warnings)?;
+        let mut plan_warnings = Vec::new();
+        let resection = inputs.resection.mask(&pre.grid, inputs.dseg.as_deref(), options, &mut plan_warnings)?;
         let mut own = |path: &Option<PathBuf>| -> Result<OwnMask, WorkflowError> {
             let Some(path) = path else { return Ok(None) };
             let mask = mask(path, &mut warnings)?;
@@ -104,7 +107,7 @@ impl PlannedScan {
         let labels = labels.transpose()?;
         let pose = inputs.pose.as_deref().map(given_pose).transpose()?;
         let (sum, shared) = (sha256_hex(&bytes), Rc::default());
-        Ok(Self { sum, pre, warnings, plan, resection, pose, labels, brain, ventricle, shared })
+        Ok(Self { sum, pre, warnings, plan_warnings, plan, resection, pose, labels, brain, ventricle, shared })
     }
 
     /// The same scan with another plan; `inputs` is what it was read from.
@@ -114,9 +117,9 @@ impl PlannedScan {
         inputs: &PlanInputs,
         work: &Work<'_>,
     ) -> Result<Self, WorkflowError> {
-        let mut other = self.clone();
+        let mut other = Self { plan_warnings: Vec::new(), ..self.clone() };
         let dseg = inputs.dseg.as_deref();
-        other.resection = plan.mask(&self.pre.grid, dseg, &work.settings.image, &mut other.warnings)?;
+        other.resection = plan.mask(&self.pre.grid, dseg, &work.settings.image, &mut other.plan_warnings)?;
         other.plan = plan.to_string();
         Ok(other)
     }

@@ -42,6 +42,10 @@ pub fn predict_plans(
         let rest = others.iter().map(|plan| first.with_plan(plan, inputs, &work)).collect::<Result<Vec<_>, _>>()?;
         std::iter::once(first).chain(rest).collect::<Vec<PlannedScan>>()
     };
+    // A comparison of before says nothing of what is made now.
+    for file in [PLANS_JSON, PLANS_PAGE] {
+        std::fs::remove_file(place.folder.join(file)).ok();
+    }
     let mut done: Vec<(String, Case, Prediction)> = Vec::new();
     for (n, scan) in scans.iter().enumerate() {
         let name = PLAN_CASE.of(&(n + 1).to_string());

@@ -46,8 +46,7 @@ pub struct Left {
 }
 
 /// The model's displacement with the most probable remainder and discrepancy added. `model_sd_mm`: of every node, from the
-/// posterior. Where too little was seen, the model stands with its own spread; so does a model at rest, which says that nothing
-/// was seen to move: what is seen there all the same is the registration's noise, and no shift of anybody.
+/// posterior. Where too little was seen, the model stands with its own spread.
 pub fn fused(
     nodes_mm: &[[f64; 3]],
     model_mm: &[[f64; 3]],
@@ -75,6 +74,15 @@ pub fn fused(
     }
 }
 
+impl Fused {
+    /// The state of what was not seen to move, with the model's spread: what is seen there all the same is the registration's
+    /// noise, and no shift of anybody.
+    pub fn at_rest(model_sd_mm: &[f64]) -> Self {
+        let sd_mm = model_sd_mm.to_vec();
+        Self { displacement_mm: vec![[0.0; 3]; sd_mm.len()], model_sd_mm: sd_mm.clone(), sd_mm, left: None }
+    }
+}
+
 /// What is left, conditioned on what was seen.
 struct Rest {
     left: Left,
@@ -90,11 +98,8 @@ struct Rest {
 }
 
 impl Rest {
-    /// `None` where too little was seen, or nothing was seen to move.
+    /// `None` where too little was seen.
     fn of(nodes_mm: &[[f64; 3]], model_mm: &[[f64; 3]], seen: &[MovedNode], errors: &CorrelatedErrors) -> Option<Self> {
-        if model_mm.iter().flatten().all(|u| *u == 0.0) {
-            return None;
-        }
         let positions: Vec<[f64; 3]> = seen.iter().map(|(n, _)| nodes_mm[*n as usize]).collect();
         let chosen = spread_out(&positions, errors.places);
         let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
@@ -220,19 +225,6 @@ mod tests {
         let found = fused(mesh.nodes_mm(), &u, &vec![0.2; u.len()], &every_fourth(&u), &ERRORS);
         assert!(found.displacement_mm == u && found.left.unwrap().unexplained.discrepancy.sd_mm == 0.0);
         assert!(found.sd_mm.iter().all(|sd| (0.2..0.21).contains(sd)));
-    }
-
-    #[test]
-    fn where_nothing_was_seen_to_move_noise_moves_nothing() {
-        let mesh = block(6);
-        let rng = CounterRng::new(5, 0);
-        let count = mesh.nodes_mm().len();
-        let noise: Vec<[f64; 3]> =
-            (0..count as u64).map(|n| [0, 1, 2].map(|a| rng.between(3 * n + a, -0.3, 0.3))).collect();
-        let rest = vec![[0.0; 3]; count];
-        let found = fused(mesh.nodes_mm(), &rest, &vec![0.25; count], &every_fourth(&noise), &ERRORS);
-        assert!(found.displacement_mm == rest && found.left.is_none());
-        assert!(found.sd_mm.iter().all(|sd| *sd == 0.25));
     }
 
     /// What the rigid registration has taken up, the field gives back: beside it, the two carry a point where it went.

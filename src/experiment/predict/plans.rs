@@ -130,7 +130,7 @@ impl PlansOfHead {
         let (head, least) = (&self.head, &self.least);
         if self.not_told_from.is_empty() {
             return format!(
-                "With the head {head}, {least} moves least, in more than 95 of 100 draws less than any other."
+                "With the head {head}, {least} moves least: in more than 95 of 100 draws less than each other plan."
             );
         }
         format!(

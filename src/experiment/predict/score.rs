@@ -181,7 +181,9 @@ pub fn scores(places: usize, place: &(dyn Fn(usize) -> Compared + Sync)) -> Scor
     let seen = mean(&|n| square(&each[n].2));
     let weights: Vec<f64> = place(0).draws.iter().map(|d| d.0).collect();
     let all = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let smaller = |d: &usize| mean(&|n| each[n].1[*d]) < seen;
+    // What was seen has its error in it, and is larger for that.
+    let noise = mean(&|n| each[n].3.powi(2));
+    let smaller = |d: &usize| mean(&|n| each[n].1[*d]) + noise < seen;
     let rank = (0..weights.len()).filter(smaller).map(|d| weights[d] / all).sum::<f64>();
     Scores {
         places,

@@ -80,7 +80,7 @@ impl PredictSettings {
                 (1..=2).contains(&self.tissues),
                 "1 (the whole brain) or 2 (grey and white matter)",
             ),
-            ("draws", &self.draws, (16..=4096).contains(&self.draws), "16 to 4096"),
+            ("draws", &self.draws, (16..=1024).contains(&self.draws), "16 to 1024"),
             ("checks", &self.checks, self.checks <= self.draws, "at most as many as draws"),
             ("threshold_mm", &self.threshold_mm, (0.01..=50.0).contains(&self.threshold_mm), "0.01 to 50 mm"),
             ("density_log_sd", &self.density_log_sd, sd(self.density_log_sd), "0 to 3"),

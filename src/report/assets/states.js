@@ -33,7 +33,7 @@
       const name = (more) => data.samples[where.reduce((n, { below, way }, axis) =>
         n + (below + more(way)) * (axis ? data.stops[0] : 1), 0)];
       const who = exact ? `${name((way) => way)}: ${moduli.join(", ")}, simulated`
-        : `${moduli.join(", ")}, interpolated between ${name(() => 0)} and ${name(() => 1)}`;
+        : `${moduli.join(", ")}, interpolated between ${name(Math.floor)} and ${name(Math.ceil)}`;
       said.textContent = who;
       inputs.forEach((input) => input.setAttribute("aria-valuetext", who));
     }

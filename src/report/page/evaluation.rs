@@ -45,7 +45,7 @@ pub fn in_a_sentence(evaluation: &PredictionEvaluation) -> String {
     };
     format!(
         "Expected with the head {}: {} mm (root mean square); seen: {} mm; off by {} mm. Of {} places {} % moved no further than the 95 % \
-         reach and {} % no further than the 50 % reach. The forecast scores {} mm (energy score), {better}.{judged}",
+         reach and {} % no further than the 50 % reach, the draws taken with the error of what was seen. The forecast scores {} mm (energy score), {better}.{judged}",
         head.head,
         number(scores.expected_rms_mm, 2),
         number(scores.seen_rms_mm, 2),

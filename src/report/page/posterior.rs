@@ -3,7 +3,7 @@
 use super::super::chart::{DensityChart, DensityCurve, JointChart, JointGaussian, Rule, Valley};
 use super::super::html::number;
 use super::results::tissue_name;
-use crate::experiment::estimate::{EstimateOutcome, LogPrior, Scale, Z_95, prior_correlation};
+use crate::experiment::estimate::{EstimateOutcome, Knowledge, LogPrior, Scale, Z_95, prior_correlation};
 use crate::experiment::verdict::{Claim, pa, range, with_interval};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
@@ -46,6 +46,11 @@ struct Known {
     sd: f64,
 }
 
+/// Whether a parameter's posterior is the Gaussian that its interval was read from: an average over models has several humps.
+fn is_gaussian(estimate: &EstimateOutcome, n: usize) -> bool {
+    estimate.posterior.identifiability.verdicts.get(n) != Some(&Knowledge::Averaged)
+}
+
 /// The posterior of a parameter as the Gaussian that its interval was read from.
 fn posterior_of(estimate: &EstimateOutcome, n: usize) -> Known {
     Known { mean: estimate.prior[n].scale.number(estimate.posterior.mode[n]), sd: estimate.posterior.log_sd[n] }
@@ -60,15 +65,21 @@ fn curve(what: &str, name: &str, scale: Scale, known: Known, before: bool) -> De
     let at = |z: f64| scale.value(known.mean + z * known.sd);
     let point = |n: i32| {
         let z = REACH_SD * (2.0 * f64::from(n) / f64::from(steps) - 1.0);
-        [at(z), (-0.5 * z * z).exp()]
+        let value = at(z);
+        // Shares are drawn as shares: a density over their log odds has a slope to count.
+        let slope = if scale == Scale::Share { 1.0 / (value * (1.0 - value)).max(f64::MIN_POSITIVE) } else { 1.0 };
+        [value, slope * (-0.5 * z * z).exp()]
     };
+    let mut points: Vec<[f64; 2]> = (0..=steps).map(point).collect();
+    let highest = points.iter().map(|p| p[1]).fold(f64::MIN_POSITIVE, f64::max);
+    points.iter_mut().for_each(|p| p[1] /= highest);
     let ends = [at(-Z_95), at(Z_95)];
     let said = interval(name, ends);
     let apart = said.contains(" to ");
     DensityCurve {
         // Where rounding leaves no interval its reach is told instead.
         name: if apart { format!("{what}, 95 %: {said}") } else { format!("{what}: {}", with_interval(at(0.0), ends)) },
-        points: (0..=steps).map(point).collect(),
+        points,
         interval: ends,
         before,
     }
@@ -80,13 +91,18 @@ pub fn figures(estimate: &EstimateOutcome, truth: &BTreeMap<String, f64>) -> Mar
     let charts: Vec<DensityChart> =
         (0..estimate.prior.len()).filter_map(|n| of_one(estimate, n, claimed, truth)).collect();
     let joint = if claimed { of_two(estimate, truth) } else { Vec::new() };
+    let bound = estimate.verdict.moduli.iter().any(|(_, claim)| matches!(claim, Claim::Above { .. }));
     html! {
         @if !charts.is_empty() || !joint.is_empty() {
             h3 { "Before and after the scans" }
             p {
                 @if claimed {
                     "Dashed: what was known before the scans. Filled: what is known with them. Every curve is scaled to its own \
-                     peak; the bars below are the 95 % intervals."
+                     peak; the bars below are the 95 % intervals. Where models were averaged, no curve is drawn: the interval stands \
+                     in the table."
+                } @else if bound {
+                    "What was known before the scans. The scans give a bound and no interval (see the verdict), so no posterior is \
+                     drawn."
                 } @else {
                     "What was known before the scans. The scans have added nothing that may be read as an answer (see the \
                      verdict), so no posterior is drawn."
@@ -122,7 +138,8 @@ fn of_one(estimate: &EstimateOutcome, n: usize, claimed: bool, truth: &BTreeMap<
     let mut curves: Vec<DensityCurve> =
         prior_of(prior).map(|known| curve("prior", name, scale, known, true)).into_iter().collect();
     // A direction that nothing holds has a variance that only stands for infinity.
-    let posterior = Some(posterior_of(estimate, n)).filter(|known| claimed && known.sd.is_finite() && known.sd < 100.0);
+    let posterior = Some(posterior_of(estimate, n))
+        .filter(|known| claimed && is_gaussian(estimate, n) && known.sd.is_finite() && known.sd < 100.0);
     curves.extend(posterior.map(|known| curve("posterior", name, scale, known, false)));
     let mut rules: Vec<Rule> = true_value(name, truth)
         .map(|at| Rule { at, name: format!("what went in: {} Pa", pa(at)) })
@@ -148,6 +165,9 @@ fn of_two(estimate: &EstimateOutcome, truth: &BTreeMap<String, f64>) -> Vec<Join
     let moduli: Vec<usize> = (0..posterior.names.len()).filter(|n| tissue_of(&posterior.names[*n]).is_some()).collect();
     let [a, b, ..] = moduli[..] else { return Vec::new() };
     let pair = [a, b];
+    if !pair.iter().all(|&n| is_gaussian(estimate, n)) {
+        return Vec::new();
+    }
     let known = pair.map(|n| posterior_of(estimate, n));
     if known.iter().any(|k| !k.sd.is_finite() || k.sd > 100.0) {
         return Vec::new();

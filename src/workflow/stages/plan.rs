@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -89,7 +89,7 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
         let found = planned(&scan.plan, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
-        let mut produced = Produced::default();
+        let mut produced = Produced { warnings: scan.plan_warnings.clone(), ..Produced::default() };
         if found.outside > NOTED_OUTSIDE {
             produced.warnings.push(format!(
                 "{}: {:.0} % of what is to be taken lies outside the brain and counts for nothing",

@@ -290,7 +290,12 @@ impl<'a> CaseShift<'a> {
     /// The model put right by what was seen.
     fn put_right<'m>(&self, model: &'m Model) -> &'m Fused {
         let Nodes { displacement_mm, sd_mm, .. } = &model.nodes;
+        // An estimate at rest says that nothing was seen to move.
+        let at_rest = model.name == ESTIMATE && displacement_mm.iter().flatten().all(|u| *u == 0.0);
         model.fused.get_or_init(|| {
+            if at_rest {
+                return Fused::at_rest(sd_mm);
+            }
             fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model), &self.believed.errors)
         })
     }
