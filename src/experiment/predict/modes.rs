@@ -131,7 +131,7 @@ mod tests {
                 let x = k as f64 / 40.0;
                 [1.0 + z[0] * x, z[1] * (1.0 - x) + 0.3 * z[0] * z[0], 2.0 * z[2] * x * x]
             };
-            (if n % 2 == 0 { 0.01 } else { 0.03 }, (0..40).map(node).collect())
+            (if n.is_multiple_of(2) { 0.01 } else { 0.03 }, (0..40).map(node).collect())
         };
         (0..64).map(of).collect()
     }

@@ -72,7 +72,9 @@ fn curve(what: &str, name: &str, scale: Scale, known: Known, before: bool) -> De
     };
     let mut points: Vec<[f64; 2]> = (0..=steps).map(point).collect();
     let highest = points.iter().map(|p| p[1]).fold(f64::MIN_POSITIVE, f64::max);
-    points.iter_mut().for_each(|p| p[1] /= highest);
+    for point in &mut points {
+        point[1] /= highest;
+    }
     let ends = [at(-Z_95), at(Z_95)];
     let said = interval(name, ends);
     let apart = said.contains(" to ");
