@@ -26,6 +26,18 @@ pub struct HeatMap {
     pub scale: ColourScale,
 }
 
+/// Black or white, whichever is told better from a colour: never less than 4.58 to 1 (WCAG 2.2, relative luminance and contrast
+/// ratio).
+fn ink_on(rgb: [u8; 3]) -> &'static str {
+    let linear = |channel: u8| {
+        let x = f64::from(channel) / 255.0;
+        if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    };
+    let luminance = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
+    let [on_black, on_white] = [(luminance + 0.05) / 0.05, 1.05 / (luminance + 0.05)];
+    if on_black >= on_white { "#000" } else { "#fff" }
+}
+
 impl HeatMap {
     /// The map as an SVG element; every cell carries its number.
     pub fn to_svg(&self) -> String {
@@ -39,8 +51,7 @@ impl HeatMap {
             for (c, &value) in row.iter().enumerate() {
                 let x = left + cell_w * c as f64;
                 let rgb = self.scale.colour(value);
-                let brightness = 0.299 * f64::from(rgb[0]) + 0.587 * f64::from(rgb[1]) + 0.114 * f64::from(rgb[2]);
-                let ink = if brightness > 120.0 { "#111" } else { "#fff" };
+                let ink = ink_on(rgb);
                 let _ = write!(
                     svg,
                     "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{cell_w}\" height=\"{cell_h}\" fill=\"{}\"/>\
