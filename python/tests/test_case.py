@@ -183,7 +183,9 @@ def test_ctrl_c_ends_a_run_between_two_files_and_another_goes_on(
         "except KeyboardInterrupt:\n"
         "    sys.exit(9)\n"
     )
-    job = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    # Where these tests run behind a shell without job control, interrupts are ignored from birth.
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    job = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, preexec_fn=heard)
     assert job.stdout
     job.stdout.readline()
     os.kill(job.pid, signal.SIGINT)
