@@ -24,13 +24,13 @@ def command() -> str:
 
 @pytest.fixture(scope="session")
 def scans() -> tuple[Path, Path]:
-    """The bundled pair."""
-    return ROOT / "sample-data/pre.nii.gz", ROOT / "sample-data/post.nii.gz"
+    """The tests' own pair, smaller than the bundled one."""
+    return ROOT / "tests/data/pair/pre.nii.gz", ROOT / "tests/data/pair/post.nii.gz"
 
 
 @pytest.fixture(scope="session")
 def made(command: str, scans: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bundled pair after the command's `run`, cheaply."""
+    """The tests' pair after the command's `run`, cheaply."""
     case = tmp_path_factory.mktemp("command") / "case"
     subprocess.run([command, "run", "-q", *map(str, scans), "-o", str(case), "--config", str(CHEAP)], check=True)
     return case

@@ -1,16 +1,19 @@
 //! `hgm demo`: the bundled pair and the phantom, without network.
 
-use super::flags::{AnalysisOptions, Flags, MeshOptions};
+use super::flags::{Flags, MeshOptions};
 use super::{Failure, Session, phantom, run};
 use crate::artefact::write_whole;
 use crate::mesh::engine::Engine;
 use crate::workflow::{Goal, Inputs, run_to};
+use anyhow::Context;
 use std::path::PathBuf;
 
 const PRE: &[u8] = include_bytes!("../../sample-data/pre.nii.gz");
 const POST: &[u8] = include_bytes!("../../sample-data/post.nii.gz");
+/// How that patient lay, how much fluid was lost, and a mesh that takes a minute at most.
+const SETTINGS: &str = include_str!("../../sample-data/settings.toml");
 
-/// Tetrahedra of the demo's meshes.
+/// Tetrahedra of the phantom's mesh.
 const CELLS: usize = 15_000;
 
 /// The bundled T1 pair through the whole job, and the phantom beside it; needs no network
@@ -28,12 +31,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (pre, post) = (input.join("pre.nii.gz"), input.join("post.nii.gz"));
     write_whole(&pre, PRE)?;
     write_whole(&post, POST)?;
+    let own = toml::from_str(SETTINGS).context("the settings of the bundled pair")?;
+    let settings = session.settings_over(&own, Flags::default())?;
+    let place = session.place(&args.output.join("pair"));
+    let pair = run_to(Goal::Estimate, &Inputs::pair(pre, post), &place, &settings, &mut session.listener())?;
     // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
     let mesh = MeshOptions { mesher: Some(Engine::LATTICE), cells: Some(CELLS), ..MeshOptions::default() };
-    let analysis = AnalysisOptions { tissues: Some(1), ..AnalysisOptions::default() };
-    let settings = run::settings(&analysis, &mesh, session)?;
-    let place = session.place(&args.output.join("pair"));
-    let pair = run_to(Goal::Sweep, &Inputs::pair(pre, post), &place, &settings, &mut session.listener())?;
     let mut flags = Flags::default();
     flags.set("phantom.tissues", Some(1));
     mesh.over(&mut flags);

@@ -7,7 +7,7 @@ pub fn bars() -> Vec<Bar> {
     let folder = tempfile::tempdir().unwrap();
     let case = folder.path().join("case").display().to_string();
     let sample =
-        |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("sample-data").join(name).display().to_string();
+        |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/pair").join(name).display().to_string();
     let (pre, plan) = (sample("pre.nii.gz"), sample("truth/resected_pre.nii.gz"));
     let asked = ["predict", &pre, "-o", &case, "--resection", &plan, "--json"];
     let mut bars = Vec::new();

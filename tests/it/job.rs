@@ -15,8 +15,9 @@ fn hgm() -> Command {
     Command::new(program())
 }
 
+/// A file of the tests' own pair, smaller than the bundled one.
 pub fn sample(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("sample-data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/pair").join(name)
 }
 
 pub fn output(arguments: &[&str]) -> Output {
