@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 const PRE: &[u8] = include_bytes!("../../sample-data/pre.nii.gz");
 const POST: &[u8] = include_bytes!("../../sample-data/post.nii.gz");
-/// How that patient lay, how much fluid was lost, and a mesh that takes a minute at most.
+/// How that patient lay, how much fluid was lost, and a coarse mesh.
 const SETTINGS: &str = include_str!("../../sample-data/settings.toml");
 
 /// Tetrahedra of the phantom's mesh.
@@ -35,7 +35,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = session.settings_over(&own, Flags::default())?;
     let place = session.place(&args.output.join("pair"));
     let pair = run_to(Goal::Estimate, &Inputs::pair(pre, post), &place, &settings, &mut session.listener())?;
-    // The embedded engine and a coarse mesh: the same bytes on every machine, whatever is installed, within a minute.
+    // The embedded engine and a coarse mesh, as for the pair: the same bytes on every machine, whatever is installed, and soon.
     let mesh = MeshOptions { mesher: Some(Engine::LATTICE), cells: Some(CELLS), ..MeshOptions::default() };
     let mut flags = Flags::default();
     flags.set("phantom.tissues", Some(1));
