@@ -91,6 +91,7 @@ fn smooth_movement() -> DeformableSettings {
         levels_mm: vec![8.0, 4.0],
         iterations: vec![30, 30],
         update_sigma_voxels: 5.0,
+        margin_mm: 4.0,
         affine: false,
         ..DeformableSettings::default()
     }

@@ -55,6 +55,8 @@ impl Default for PairSettings {
                 affine: false,
                 iterations: vec![40, 40, 30],
                 update_sigma_voxels: 4.0,
+                // What surrounds the brain does not sink with it.
+                margin_mm: 4.0,
                 least_gain: 5e-4,
                 ..DeformableSettings::default()
             },

@@ -1,7 +1,8 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::overhang::{onto_the_brain, share_beyond};
-use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas, segment_with_priors};
+use super::segmentation::{Seen, labelled};
+use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume};
@@ -52,10 +53,14 @@ const DOUBTFUL: f64 = 0.5;
 /// children, lesions, wide ventricles).
 const LEAST: f64 = 0.4;
 /// Share of the layer outside the carried surface that is found to be brain from which on the template came out too small.
-/// Half way between heads that it fits, where fluid and bone fill that layer, and a small child's that it did not.
-const CROWDED: f64 = 0.32;
-/// How often a larger start is tried.
-const LARGER_STARTS: usize = 2;
+/// Half way between heads that it fits, where fluid and bone fill that layer (to .03), and those whose gyral crowns it cut
+/// (from .05).
+const CROWDED: f64 = 0.04;
+/// What is tried then, one after the other while it helps: a wider rim around the brain is compared, which draws the surface
+/// out, and larger starts.
+const LARGER: [Larger; 3] = [Larger::WiderRim, Larger::Start, Larger::Start];
+/// How much wider the rim is, mm.
+const WIDER_RIM_MM: f64 = 2.0;
 /// Loss of local correlation with which a larger template is not believed.
 const MUCH_WORSE: f64 = 0.03;
 /// The brain found over the brain expected; hydrocephalus and atrophy change both.
@@ -80,6 +85,13 @@ pub fn fit_template<F: Frame>(
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<Mni>, DeformableError> {
     Ok(Carried::onto(t1, mni_from_t1, settings)?.fit)
+}
+
+/// A way to a larger template.
+#[derive(Clone, Copy, PartialEq)]
+enum Larger {
+    WiderRim,
+    Start,
 }
 
 /// A fit with what it began from.
@@ -146,7 +158,7 @@ pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<
     AtlasPriors::through(&atlas::template().grid(), template_from_patient, MISFIT_MM)
 }
 
-/// Labels of a head that has been registered rigidly to the template: fits the template, then [`segment_with_priors`].
+/// Labels of a head that has been registered rigidly to the template: fits the template, then [`super::segment_with_priors`].
 ///
 /// # Errors
 /// [`HeadError`].
@@ -162,28 +174,54 @@ pub fn segment_head<F: Frame>(
     if correlation < LEAST {
         return Err(HeadError::PoorFit { correlation, least: LEAST });
     }
-    let segmented = |fit: &AtlasFit<Mni>| -> Result<_, SegmentError> {
-        let priors = carried_priors(|p| fit.atlas_from_subject.apply(p));
-        Ok((segment_with_priors(t1, mni_from_t1, &priors, overrides, settings)?, priors))
+    let seen = Seen::of(t1, mni_from_t1, &atlas::template().grid(), settings)?;
+    let priors_of = |fit: &AtlasFit<Mni>| carried_priors(|p| fit.atlas_from_subject.apply(p));
+    let brain_with = |fit: &AtlasFit<Mni>| -> Result<_, SegmentError> {
+        let priors = priors_of(fit);
+        let found = seen.brain(mni_from_t1, &priors, overrides.brain, settings)?;
+        let beyond = share_beyond(&found.brain, &seen.known, &priors);
+        Ok((found, priors, beyond))
     };
-    let (mut segmentation, mut priors) = segmented(&carried.fit)?;
-    let beyond = |segmentation: &Segmentation<F>, priors: &AtlasPriors| {
-        share_beyond(&segmentation.brain_mni, &segmentation.known_mni, priors)
-    };
-    for _ in 0..LARGER_STARTS {
-        let share = beyond(&segmentation, &priors);
-        if !deformable.affine || overrides.brain.is_some() || share < CROWDED {
+    let (mut found, priors, mut beyond) = brain_with(&carried.fit)?;
+    // Those of two fits at a time would be the peak of memory.
+    let mut kept = Some(priors);
+    let mut settings_of_fit = deformable.clone();
+    for way in LARGER {
+        if !deformable.affine || overrides.brain.is_some() || beyond < CROWDED {
             break;
         }
-        let start = carried.start.then(&onto_the_brain(&segmentation.brain_mni, &priors));
-        let larger = Carried::from(carried.subject.clone(), start, deformable)?;
-        let (found, there) = segmented(&larger.fit)?;
-        if larger.correlation() < carried.correlation() - MUCH_WORSE || beyond(&found, &there) >= share {
-            break;
+        let mut start = carried.start;
+        let mut tried = settings_of_fit.clone();
+        match way {
+            Larger::WiderRim => {
+                tried.margin_mm = (tried.margin_mm + WIDER_RIM_MM).min(DeformableSettings::WIDEST_MARGIN_MM);
+            }
+            Larger::Start => {
+                let priors = kept.take().unwrap_or_else(|| priors_of(&carried.fit));
+                start = start.then(&onto_the_brain(&found.brain, &priors));
+            }
         }
-        (carried, segmentation, priors) = (larger, found, there);
+        kept = None;
+        let larger = Carried::from(carried.subject.clone(), start, &tried)?;
+        let better = if larger.correlation() < carried.correlation() - MUCH_WORSE {
+            None
+        } else {
+            Some(brain_with(&larger.fit)?).filter(|(.., there)| *there < beyond)
+        };
+        match better {
+            Some(with_larger) => {
+                let (its_brain, its_priors, its_beyond) = with_larger;
+                (found, kept, beyond) = (its_brain, Some(its_priors), its_beyond);
+                (carried, settings_of_fit) = (larger, tried);
+            }
+            // The same start again would end the same.
+            None if way == Larger::Start => break,
+            None => {}
+        }
     }
     let fit = carried.fit;
+    let priors = kept.unwrap_or_else(|| priors_of(&fit));
+    let segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
     let known = &segmentation.known_mni.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());

@@ -12,6 +12,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 /// The layer outside the carried surface that is looked at, mm: beyond what a good fit misses, short of where brain is no
 /// longer looked for.
 const LAYER_MM: std::ops::Range<f32> = 2.0..4.5;
+/// Above this height in the template's frame, mm, fluid and the vault lie in that layer; below also bone, nerves and vessels
+/// of the base, which say nothing.
+const VAULT_MM: f64 = 10.0;
 /// One voxel in so many of the surface is enough for twelve unknowns.
 const STRIDE: usize = 7;
 /// Standard deviation of a stretch or shear before anything is seen, and of one distance to the surface, mm; distances of
@@ -20,11 +23,13 @@ const STRETCH: f64 = 0.1;
 const DISTANCE_MM: f64 = 2.0;
 const DISTANCES: f64 = 200.0;
 
-/// How much of the layer outside the carried surface was found to be brain, 0 to 1.
+/// How much of the layer outside the carried surface was found to be brain under the vault, 0 to 1.
 pub(super) fn share_beyond(brain: &Mask<Mni>, known: &Mask<Mni>, priors: &AtlasPriors) -> f64 {
     let (mut layer, mut found) = (0usize, 0usize);
+    let grid = &brain.grid;
     for n in 0..brain.data.len() {
-        if known.data[n] && LAYER_MM.contains(&priors.brain_mm.data[n]) {
+        let in_layer = known.data[n] && LAYER_MM.contains(&priors.brain_mm.data[n]);
+        if in_layer && grid.position(grid.voxel(n).map(|v| v as f64).into()).mm.z > VAULT_MM {
             layer += 1;
             found += usize::from(brain.data[n]);
         }

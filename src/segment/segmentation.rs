@@ -10,7 +10,7 @@ use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall};
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::image::{Grid, LabelMap, Mask, Volume};
 use thiserror::Error;
 
 /// Everything that steers [`segment_t1`].
@@ -208,42 +208,103 @@ pub fn segment_with_priors<F: Frame>(
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    settings.check()?;
-    let grid = priors.brain_mm.grid;
-    let t1_from_mni = mni_from_t1.inverse();
-    // The spline keeps the sharpness that a linear kernel would take from every sulcus.
-    let on_grid = resample(t1, &grid, &t1_from_mni.to_affine(), Interpolation::CubicBSpline, 0.0);
-    let (raw, known) = (on_grid.volume.map(|x| x.max(0.0)), on_grid.inside);
-    let mut warnings = Vec::new();
-    let raw = match without_strong_gain(&raw, &known, priors) {
-        Some((flat, times)) => {
-            warnings.push(SegmentWarning::StrongGain { times });
-            flat
+    let seen = Seen::of(t1, mni_from_t1, &priors.brain_mm.grid, settings)?;
+    let found = seen.brain(mni_from_t1, priors, overrides.brain, settings)?;
+    labelled(t1, mni_from_t1, found, priors, overrides, settings)
+}
+
+/// An image on the working grid, before anything is known of its brain.
+pub(super) struct Seen {
+    raw: Volume<f32, Mni>,
+    /// Where the image's field of view covers the grid.
+    pub known: Mask<Mni>,
+}
+
+/// A brain found or given, and nothing looked at inside it.
+pub(super) struct FoundBrain {
+    /// The image with a strong coil's gain taken out.
+    raw: Volume<f32, Mni>,
+    known: Mask<Mni>,
+    pub brain: Mask<Mni>,
+    warnings: Vec<SegmentWarning>,
+}
+
+impl Seen {
+    /// Reads the image on the grid.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn of<F: Frame>(
+        t1: &Volume<f32, F>,
+        mni_from_t1: &RigidTransform<F, Mni>,
+        grid: &Grid<Mni>,
+        settings: &SegmentSettings,
+    ) -> Result<Self, SegmentError> {
+        settings.check()?;
+        // The spline keeps the sharpness that a linear kernel would take from every sulcus.
+        let on_grid = resample(t1, grid, &mni_from_t1.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        Ok(Self { raw: on_grid.volume.map(|x| x.max(0.0)), known: on_grid.inside })
+    }
+
+    /// The brain where the template expects it, or the one given.
+    ///
+    /// # Errors
+    /// As [`segment_with_priors`].
+    pub fn brain<F: Frame>(
+        &self,
+        mni_from_t1: &RigidTransform<F, Mni>,
+        priors: &AtlasPriors,
+        given: Option<&Mask<F>>,
+        settings: &SegmentSettings,
+    ) -> Result<FoundBrain, SegmentError> {
+        let mut warnings = Vec::new();
+        let known = &self.known;
+        let raw = match without_strong_gain(&self.raw, known, priors) {
+            Some((flat, times)) => {
+                warnings.push(SegmentWarning::StrongGain { times });
+                flat
+            }
+            None => self.raw.clone(),
+        };
+        let expected = priors.brain_mm.map(|d| d < 0.0);
+        let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
+        let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
+        if percent < 50.0 {
+            return Err(SegmentError::LittleBrain { percent });
         }
-        None => raw,
-    };
-
-    let expected = priors.brain_mm.map(|d| d < 0.0);
-    let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
-    let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
-    if percent < 50.0 {
-        return Err(SegmentError::LittleBrain { percent });
+        if percent < 98.0 {
+            warnings.push(SegmentWarning::CroppedBrain { percent: 100.0 - percent });
+        }
+        let brain = match given {
+            Some(mask) => mask_on(mask, &raw.grid, &mni_from_t1.inverse()),
+            None => computed_brain(&raw, known, priors, settings)?,
+        };
+        let found_cc = brain.volume_cc();
+        if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
+            return Err(SegmentError::ImplausibleBrain {
+                found_cc,
+                smallest_cc: settings.smallest_brain_cc,
+                largest_cc: settings.largest_brain_cc,
+            });
+        }
+        Ok(FoundBrain { raw, known: known.clone(), brain, warnings })
     }
-    if percent < 98.0 {
-        warnings.push(SegmentWarning::CroppedBrain { percent: 100.0 - percent });
-    }
+}
 
-    let given = overrides.brain.map(|mask| mask_on(mask, &grid, &t1_from_mni));
-    let brain = if let Some(mask) = given { mask } else { computed_brain(&raw, &known, priors, settings)? };
-    let found_cc = brain.volume_cc();
-    if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
-        return Err(SegmentError::ImplausibleBrain {
-            found_cc,
-            smallest_cc: settings.smallest_brain_cc,
-            largest_cc: settings.largest_brain_cc,
-        });
-    }
-
+/// What is inside the brain.
+///
+/// # Errors
+/// As [`segment_with_priors`].
+pub(super) fn labelled<F: Frame>(
+    t1: &Volume<f32, F>,
+    mni_from_t1: &RigidTransform<F, Mni>,
+    found: FoundBrain,
+    priors: &AtlasPriors,
+    overrides: &SegmentOverrides<'_, F>,
+    settings: &SegmentSettings,
+) -> Result<Segmentation<F>, SegmentError> {
+    let FoundBrain { raw, known, brain, mut warnings } = found;
+    let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
     let inside = at_each(&raw, |n| brain.data[n] && known.data[n]);
     let fitted = |stride: usize, begun: Option<&Mixture>| {
         fit_mixture(&raw, &inside, priors, &mixture_settings(settings, stride), begun)

@@ -1,6 +1,6 @@
 //! What a fit comes down to: its figures against the measurement, the prior and stillness.
 
-use super::evidence::STRONG;
+use super::evidence::{STRONG, Unexplained};
 use super::findings::Fitted;
 use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
@@ -41,8 +41,7 @@ pub(super) fn verdict_of_fit(
         }
         // Noise that had to grow is as unexplained as a discrepancy is.
         let (unexplained_by, noise_mm) = (found.unexplained, found.measured_noise.sd_mm);
-        let left_mm = unexplained_by.noise.sd_mm.hypot(unexplained_by.discrepancy.sd_mm);
-        let discrepancy_mm = (left_mm * left_mm - noise_mm * noise_mm).max(0.0).sqrt();
+        let discrepancy_mm = beyond_noise_mm(unexplained_by, fitted.residual_rms_mm, noise_mm);
         let reason = Reason::Discrepancy { discrepancy_mm, noise_mm };
         // What the model leaves is of the shift's own size: the shift is not three standard deviations of it.
         if CONTRADICTION_SD * 3f64.sqrt() * discrepancy_mm > found.shift.seen_rms_mm {
@@ -108,4 +107,37 @@ pub(super) fn verdict_of_fit(
         reasons.push(Reason::LoadAssumed);
     }
     Verdict::new(finding, share, moduli, reasons)
+}
+
+/// What the model leaves of one component beyond the measured noise, mm: by the processes that were found, and never less
+/// than by the residuals themselves. A process whose values are alike over a length may give residuals larger than its
+/// standard deviation; the fit left them all the same.
+fn beyond_noise_mm(unexplained: Unexplained, residual_rms_mm: f64, noise_mm: f64) -> f64 {
+    let left_mm = unexplained.noise.sd_mm.hypot(unexplained.discrepancy.sd_mm).max(residual_rms_mm);
+    (left_mm * left_mm - noise_mm * noise_mm).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::estimate::process::Process;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_fit_leaves_no_less_than_its_residuals_nor_than_the_processes_found(
+            noise_sd in 0.01..2.0f64, discrepancy_sd in 0.0..2.0f64, residual in 0.0..3.0f64, measured in 0.01..1.0f64,
+        ) {
+            let found = Unexplained {
+                noise: Process { sd_mm: noise_sd, length_mm: 48.0 },
+                discrepancy: Process { sd_mm: discrepancy_sd, length_mm: 60.0 },
+            };
+            let beyond = beyond_noise_mm(found, residual, measured);
+            let total = beyond.hypot(measured);
+            prop_assert!(total >= residual - 1e-12 && total >= noise_sd.hypot(discrepancy_sd) - 1e-12);
+            // What the measured noise makes up for is not the model's.
+            let explained = residual <= measured && noise_sd.hypot(discrepancy_sd) <= measured;
+            prop_assert_eq!(explained, beyond == 0.0);
+        }
+    }
 }

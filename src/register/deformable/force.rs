@@ -55,19 +55,20 @@ pub(in crate::register) fn local_correlation(
     weight: &[f32],
     noise: [f32; 2],
 ) -> f64 {
-    force(grid, fixed, moving, weight, noise).1
+    force(grid, fixed, moving, weight, None, noise).1
 }
 
 /// The update that brings the moving image (already seen through the present map) closer to the fixed one, in voxels, and
-/// the mean local correlation over the known voxels.
+/// the mean local correlation over the known voxels that are `judged`.
 ///
 /// `weight` is 1 where both images are known, else 0; `noise` is the standard deviation below which contrast in a window
-/// means nothing, for the fixed and the moving image.
+/// means nothing, for the fixed and the moving image. Without `judged` every voxel is.
 pub(super) fn force(
     grid: &Grid<Native>,
     fixed: &[f32],
     moving: &[f32],
     weight: &[f32],
+    judged: Option<&[bool]>,
     noise: [f32; 2],
 ) -> (VectorField, f64) {
     let dims = grid.dims;
@@ -102,8 +103,10 @@ pub(super) fn force(
                 let both = sum_fm[n] * c - mean_f * mean_m;
                 let (scale_f, scale_m) = (1.0 / var_f.sqrt(), 1.0 / var_m.sqrt());
                 let r = both * scale_f * scale_m;
-                total.0 += f64::from(r);
-                total.1 += 1.0;
+                if judged.is_none_or(|judged| judged[n]) {
+                    total.0 += f64::from(r);
+                    total.1 += 1.0;
+                }
                 if r <= 0.0 {
                     continue;
                 }

@@ -18,6 +18,9 @@ use velocity::{Cell, VectorField};
 
 /// Beyond this distance from the atlas's brain nothing of the head is looked at.
 const WIDE_MM: f64 = 6.0;
+/// A fit is judged over the atlas's brain widened by this much, however wide the rim that is compared: fits of several rims
+/// can be told apart by it.
+const JUDGED_MM: f64 = 4.0;
 
 /// How the atlas is deformed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,7 +34,9 @@ pub struct DeformableSettings {
     pub update_sigma_voxels: f64,
     /// Smoothing of the velocity after each update, in voxels of the level (an elastic body).
     pub velocity_sigma_voxels: f64,
-    /// The images are compared over the atlas's brain widened by this much.
+    /// The images are compared over the atlas's brain widened by this much. A rim narrower than the coarsest voxels hardly
+    /// shows what lies outside the brain, and the atlas's surface is drawn in; one wider than 6 mm, beyond which the subject
+    /// is blank, draws it out.
     pub margin_mm: f64,
     /// Whether an affine fit comes first; without it the heads are taken to be one head.
     pub affine: bool,
@@ -46,7 +51,7 @@ impl Default for DeformableSettings {
             iterations: vec![40, 40, 20],
             update_sigma_voxels: 1.5,
             velocity_sigma_voxels: 0.5,
-            margin_mm: 4.0,
+            margin_mm: 6.0,
             affine: true,
             least_gain: 2e-3,
         }
@@ -67,7 +72,7 @@ pub struct AtlasFit<F: Frame> {
 /// Figures of a deformable fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeformableQuality {
-    /// Mean local correlation over the brain after the affine fit, and at the end.
+    /// Mean local correlation over the brain and a rim of 4 mm after the affine fit, and at the end.
     pub correlation: [f64; 2],
     /// Smallest Jacobian determinant of the map from atlas to subject over the brain; positive means no fold.
     pub smallest_jacobian: f64,
@@ -131,8 +136,9 @@ pub fn fit_atlas<F: Frame>(
     let brain = atlas.map(|x| x > 0.0);
     let brain_box = brain.bounding_box().ok_or(DeformableError::EmptyAtlas)?;
     // Room for the rim and for the velocity to fade.
-    let around = brain_box.grown(&atlas.grid, 12.0);
+    let around = brain_box.grown(&atlas.grid, settings.margin_mm + 8.0);
     let region: Mask<Native> = morphology::dilate(&brain, settings.margin_mm).cropped(&around).relabelled();
+    let judged: Mask<Native> = morphology::dilate(&brain, JUDGED_MM).cropped(&around).relabelled();
     let wide: Mask<Native> = morphology::dilate(&brain, WIDE_MM).cropped(&around).relabelled();
     let atlas: Volume<f32, Native> = atlas.cropped(&around).relabelled();
     let brain: Mask<Native> = brain.cropped(&around).relabelled();
@@ -160,6 +166,7 @@ pub fn fit_atlas<F: Frame>(
         let near = near_brain(&near_subject, &wide, velocity.as_ref(), &linear, &shift);
         let moving = reduced_to(&near, spacing_mm);
         let inside = on_grid_of(&region, &fixed);
+        let judged = on_grid_of(&judged, &fixed);
         let grid = fixed.grid;
         let mut v = velocity.take().map_or_else(|| VectorField::zeros(&grid), |v| v.on(&grid));
 
@@ -198,7 +205,7 @@ pub fn fit_atlas<F: Frame>(
                     return Err(DeformableError::TooLittleKnown { known });
                 }
             }
-            let (update, correlation) = force::force(&grid, &fixed.data, &warped, &weight, noise);
+            let (update, correlation) = force::force(&grid, &fixed.data, &warped, &weight, Some(&judged.data), noise);
             quality.correlation[1] = correlation;
             if level == 0 && iteration == 0 {
                 quality.correlation[0] = correlation;
@@ -260,6 +267,9 @@ fn near_brain(
 }
 
 impl DeformableSettings {
+    /// Largest [`Self::margin_mm`].
+    pub const WIDEST_MARGIN_MM: f64 = 20.0;
+
     /// Refuses settings out of range, by name.
     ///
     /// # Errors
@@ -281,7 +291,7 @@ impl DeformableSettings {
         if !(0.0..=5.0).contains(&self.velocity_sigma_voxels) {
             return refuse("velocity_sigma_voxels", self.velocity_sigma_voxels, "0 to 5 voxels");
         }
-        if !(0.0..=20.0).contains(&self.margin_mm) {
+        if !(0.0..=Self::WIDEST_MARGIN_MM).contains(&self.margin_mm) {
             return refuse("margin_mm", self.margin_mm, "0 to 20 mm");
         }
         if !(0.0..=1.0).contains(&self.least_gain) {
