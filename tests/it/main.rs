@@ -36,5 +36,6 @@ mod settings;
 mod simulate;
 mod slicer_files;
 mod stale;
+mod template_fit;
 mod transform_files;
 mod verdicts;

@@ -1,0 +1,43 @@
+//! The template laid onto a head: its surface comes to lie on the brain's.
+
+use hgm::geometry::{AffineTransform, Mni, Position, Pre, RigidTransform};
+use hgm::image::Volume;
+use hgm::image::distance::signed_distance_mm;
+use hgm::register::deformable::DeformableSettings;
+use hgm::segment::{AtlasPriors, atlas, carried_priors, fit_template};
+
+/// The template's own brain at a head's size, under a layer of fluid, bone and scalp, mm.
+fn head_around(template_from_head: &AffineTransform<Mni, Mni>, fluid_mm: f64, bone_mm: f64) -> Volume<f32, Pre> {
+    let template = atlas::template();
+    let (grid, t1, away) = (template.grid(), template.t1_f32(), signed_distance_mm(&template.brain()));
+    let brightest = t1.data.iter().copied().fold(0.0, f32::max);
+    let head_per_template = template_from_head.linear.determinant().powf(-1.0 / 3.0);
+    let head: Volume<f32, Mni> = Volume::from_fn(grid, |n| {
+        let place: Position<Mni> = grid.position(grid.voxel(n).map(|v| v as f64).into());
+        let there = template_from_head.apply(place);
+        let outside_mm = head_per_template * f64::from(away.trilinear(there).unwrap_or(60.0));
+        let bright = match outside_mm {
+            d if d < 0.0 => return t1.trilinear(there).unwrap_or(0.0),
+            d if d < fluid_mm => 0.25,
+            d if d < fluid_mm + bone_mm => 0.1,
+            d if d < fluid_mm + bone_mm + 6.0 => 1.1,
+            _ => 0.0,
+        };
+        bright * brightest
+    });
+    head.relabelled()
+}
+
+#[test]
+fn the_carried_surface_is_drawn_neither_in_nor_out_by_what_surrounds_the_brain() {
+    let template_from_head = atlas::head_from_template().inverse().unwrap();
+    let surface_cc = |priors: &AtlasPriors| priors.brain_mm.map(|mm| mm < 0.0).volume_cc();
+    let own_cc = surface_cc(&carried_priors(|p| template_from_head.apply(p)));
+    for (fluid_mm, bone_mm) in [(1.0, 4.0), (2.5, 5.0)] {
+        let head = head_around(&template_from_head, fluid_mm, bone_mm);
+        let fit = fit_template(&head, &RigidTransform::identity(), &DeformableSettings::default()).unwrap();
+        let found_cc = surface_cc(&carried_priors(|p| fit.atlas_from_subject.apply(p)));
+        // Half a millimetre all around is four per cent.
+        assert!((found_cc / own_cc - 1.0).abs() < 0.04, "{found_cc} cc of {own_cc}: {:?}", fit.quality);
+    }
+}
