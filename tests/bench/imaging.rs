@@ -67,7 +67,8 @@ fn prep_bars(folder: &Path) -> Vec<Bar> {
     let cases = tempfile::tempdir().unwrap();
     let prepared = |threads: &str| {
         let scan = |name: &str| folder.join(name).display().to_string();
-        let case = cases.path().join(threads).display().to_string();
+        // The page is titled by the folder's name.
+        let case = cases.path().join(threads).join("case").display().to_string();
         let pair = [scan("pre.nii.gz"), scan("post.nii.gz")];
         run_hgm(&["prep", "-q", "--no-mesh", &pair[0], &pair[1], "-o", &case, "--threads", threads])
     };
