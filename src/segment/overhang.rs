@@ -1,7 +1,7 @@
 //! Brain beyond the carried template's surface: the mark of a template that came out too small, and a larger start.
 //!
-//! The template's size is found from heads with their skull. Where that is thin, as a small child's, brain lies where the
-//! mean head has bone, and the deformable fit settles on the wrong side of the cortex.
+//! Where the start is too small, or brain lies where the mean head has bone (a small child's thin skull), the deformable fit
+//! settles on the wrong side of the cortex.
 
 use super::priors::AtlasPriors;
 use crate::geometry::{AffineTransform, Mni};
