@@ -1,5 +1,6 @@
 //! Volumes on oriented grids: NIfTI, resampling, filtering, morphology, distance.
 
+mod blank_slices;
 mod bounds;
 pub mod components;
 pub mod distance;
@@ -11,6 +12,7 @@ pub mod resample;
 pub mod seg_nrrd;
 mod volume;
 
+pub use blank_slices::{BlankSlices, blank_slices, with_filled};
 pub use bounds::VoxelBox;
 pub use grid::Grid;
 pub use volume::{LabelMap, Mask, Volume};

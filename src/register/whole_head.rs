@@ -36,7 +36,7 @@ const SEARCHED: usize = 2;
 /// Sizes that starts have, over the mean head's: half way to a small child's and to a large man's.
 const SCALES: [f64; 2] = [0.93, 1.08];
 /// Local correlation with the mean head above which no other start is tried.
-const CLEAR: f64 = 0.5;
+pub(super) const CLEAR: f64 = 0.5;
 /// Local correlation below which no head was found: wrong poses of real heads stay well below, right ones above.
 const LEAST: f64 = 0.35;
 

@@ -1,11 +1,11 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::overhang::{onto_the_brain, share_beyond};
-use super::segmentation::{Seen, labelled};
-use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, Segmentation, atlas};
+use super::segmentation::{FoundBrain, Seen, labelled};
+use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, atlas};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
-use crate::image::{Mask, Volume};
+use crate::image::{Mask, Volume, blank_slices, with_filled};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head, without_gain};
 use thiserror::Error;
@@ -56,13 +56,17 @@ const LEAST: f64 = 0.4;
 /// Half way between heads that it fits, where fluid and bone fill that layer (to .03), and those whose gyral crowns it cut
 /// (from .05).
 const CROWDED: f64 = 0.04;
+/// Share from which on the outline is doubtful where nothing has helped.
+const DOUBTFUL_SHARE: f64 = 0.15;
 /// What is tried then, one after the other while it helps: a wider rim around the brain is compared, which draws the surface
 /// out, and larger starts.
 const LARGER: [Larger; 3] = [Larger::WiderRim, Larger::Start, Larger::Start];
 /// How much wider the rim is, mm.
 const WIDER_RIM_MM: f64 = 2.0;
+/// Slices lost over more than this, mm, are more than can be read between their neighbours.
+const WIDEST_GAP_MM: f64 = 10.0;
 /// Loss of local correlation with which a larger template is not believed.
-const MUCH_WORSE: f64 = 0.03;
+const MUCH_WORSE: f64 = 0.02;
 /// The brain found over the brain expected; hydrocephalus and atrophy change both.
 const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 
@@ -121,8 +125,9 @@ impl Carried {
         if other.correlation() > self.correlation() { other } else { self }
     }
 
-    /// The fit from the stretch that was found. Where it is doubtful, also with the coil's gain taken out, which bends what
-    /// is compared at coarse levels, and from the mean head's size.
+    /// The fit from the stretch that was found, with the coil's gain taken out: it bends what is compared at coarse levels,
+    /// and where it leaves the crown dim the surface would be drawn in. Where the fit is doubtful, also with the head as it
+    /// is and from the mean head's size.
     fn onto<F: Frame>(
         t1: &Volume<f32, F>,
         mni_from_t1: &RigidTransform<F, Mni>,
@@ -133,13 +138,13 @@ impl Carried {
         let on_grid = resample(t1, &grid, &affine, Interpolation::Linear, f32::NAN);
         let (subject, known) = (on_grid.volume, on_grid.inside);
         let start = if settings.affine { stretch(&subject, &known) } else { AffineTransform::identity() };
-        let first = Self::from(subject, start, settings)?;
+        let flat = without_gain(&subject.map(|x| if x.is_finite() { x } else { 0.0 }).relabelled());
+        let flat = Volume::from_fn(grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
+        let first = Self::from(flat, start, settings)?;
         if !settings.affine || first.correlation() >= DOUBTFUL {
             return Ok(first);
         }
-        let flat = without_gain(&first.subject.map(|x| if x.is_finite() { x } else { 0.0 }).relabelled());
-        let flat = Volume::from_fn(grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
-        let best = first.or(Self::from(flat, start, settings)?);
+        let best = first.or(Self::from(subject, start, settings)?);
         let plain = Self::from(best.subject.clone(), atlas::head_from_template(), settings)?;
         Ok(best.or(plain))
     }
@@ -158,7 +163,80 @@ pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<
     AtlasPriors::through(&atlas::template().grid(), template_from_patient, MISFIT_MM)
 }
 
+/// A head on the template's grid, and what its brain is looked for with.
+struct Looked<'a, F: Frame> {
+    seen: Seen,
+    mni_from_t1: &'a RigidTransform<F, Mni>,
+    /// The brain's mask where the user brought one.
+    given: Option<&'a Mask<F>>,
+    settings: &'a SegmentSettings,
+}
+
+/// The brain found with a carried template.
+struct WithBrain {
+    carried: Carried,
+    found: FoundBrain,
+    /// The template's maps; let go while another template is tried, since two of them at a time would be the peak of memory.
+    priors: Option<AtlasPriors>,
+    beyond: f64,
+}
+
+impl WithBrain {
+    fn priors(&mut self) -> AtlasPriors {
+        self.priors.take().unwrap_or_else(|| priors_of(&self.carried.fit))
+    }
+}
+
+fn priors_of(fit: &AtlasFit<Mni>) -> AtlasPriors {
+    carried_priors(|p| fit.atlas_from_subject.apply(p))
+}
+
+impl<F: Frame> Looked<'_, F> {
+    fn with(&self, carried: Carried) -> Result<WithBrain, SegmentError> {
+        let priors = priors_of(&carried.fit);
+        let found = self.seen.brain(self.mni_from_t1, &priors, self.given, self.settings)?;
+        let beyond = share_beyond(&found.brain, &self.seen.known, &priors);
+        Ok(WithBrain { carried, found, priors: Some(priors), beyond })
+    }
+
+    /// The template made larger for as long as brain is found beyond it and that helps.
+    fn grown(&self, mut best: WithBrain, deformable: &DeformableSettings) -> Result<WithBrain, HeadError> {
+        let mut settings = deformable.clone();
+        for way in LARGER {
+            if best.beyond < CROWDED {
+                break;
+            }
+            let mut tried = settings.clone();
+            let mut start = best.carried.start;
+            match way {
+                Larger::WiderRim => {
+                    tried.margin_mm = (tried.margin_mm + WIDER_RIM_MM).min(DeformableSettings::WIDEST_MARGIN_MM);
+                }
+                Larger::Start => {
+                    let priors = best.priors();
+                    start = start.then(&onto_the_brain(&best.found.brain, &priors));
+                }
+            }
+            best.priors = None;
+            let larger = Carried::from(best.carried.subject.clone(), start, &tried)?;
+            if larger.correlation() >= best.carried.correlation() - MUCH_WORSE {
+                let larger = self.with(larger)?;
+                if larger.beyond < best.beyond {
+                    (best, settings) = (larger, tried);
+                    continue;
+                }
+            }
+            if way == Larger::Start {
+                // The same start again would end the same.
+                break;
+            }
+        }
+        Ok(best)
+    }
+}
+
 /// Labels of a head that has been registered rigidly to the template: fits the template, then [`super::segment_with_priors`].
+/// Slices that show nothing between others are filled first.
 ///
 /// # Errors
 /// [`HeadError`].
@@ -169,66 +247,37 @@ pub fn segment_head<F: Frame>(
     deformable: &DeformableSettings,
     settings: &SegmentSettings,
 ) -> Result<(Segmentation<F>, AtlasFit<Mni>), HeadError> {
-    let mut carried = Carried::onto(t1, mni_from_t1, deformable)?;
+    let gaps = blank_slices(t1, WIDEST_GAP_MM);
+    let filled = (!gaps.is_empty()).then(|| with_filled(t1, &gaps));
+    let t1 = filled.as_ref().unwrap_or(t1);
+    let carried = Carried::onto(t1, mni_from_t1, deformable)?;
     let correlation = carried.correlation();
     if correlation < LEAST {
         return Err(HeadError::PoorFit { correlation, least: LEAST });
     }
     let seen = Seen::of(t1, mni_from_t1, &atlas::template().grid(), settings)?;
-    let priors_of = |fit: &AtlasFit<Mni>| carried_priors(|p| fit.atlas_from_subject.apply(p));
-    let brain_with = |fit: &AtlasFit<Mni>| -> Result<_, SegmentError> {
-        let priors = priors_of(fit);
-        let found = seen.brain(mni_from_t1, &priors, overrides.brain, settings)?;
-        let beyond = share_beyond(&found.brain, &seen.known, &priors);
-        Ok((found, priors, beyond))
-    };
-    let (mut found, priors, mut beyond) = brain_with(&carried.fit)?;
-    // Those of two fits at a time would be the peak of memory.
-    let mut kept = Some(priors);
-    let mut settings_of_fit = deformable.clone();
-    for way in LARGER {
-        if !deformable.affine || overrides.brain.is_some() || beyond < CROWDED {
-            break;
-        }
-        let mut start = carried.start;
-        let mut tried = settings_of_fit.clone();
-        match way {
-            Larger::WiderRim => {
-                tried.margin_mm = (tried.margin_mm + WIDER_RIM_MM).min(DeformableSettings::WIDEST_MARGIN_MM);
-            }
-            Larger::Start => {
-                let priors = kept.take().unwrap_or_else(|| priors_of(&carried.fit));
-                start = start.then(&onto_the_brain(&found.brain, &priors));
-            }
-        }
-        kept = None;
-        let larger = Carried::from(carried.subject.clone(), start, &tried)?;
-        let better = if larger.correlation() < carried.correlation() - MUCH_WORSE {
-            None
-        } else {
-            Some(brain_with(&larger.fit)?).filter(|(.., there)| *there < beyond)
-        };
-        match better {
-            Some(with_larger) => {
-                let (its_brain, its_priors, its_beyond) = with_larger;
-                (found, kept, beyond) = (its_brain, Some(its_priors), its_beyond);
-                (carried, settings_of_fit) = (larger, tried);
-            }
-            // The same start again would end the same.
-            None if way == Larger::Start => break,
-            None => {}
-        }
+    let looked = Looked { seen, mni_from_t1, given: overrides.brain, settings };
+    let mut best = looked.with(carried)?;
+    if deformable.affine && overrides.brain.is_none() {
+        best = looked.grown(best, deformable)?;
     }
-    let fit = carried.fit;
-    let priors = kept.unwrap_or_else(|| priors_of(&fit));
-    let segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
+    let priors = best.priors();
+    let WithBrain { carried, found, beyond, .. } = best;
+    let mut segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
+    segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &t1.grid)));
+    if overrides.brain.is_some() {
+        return Ok((segmentation, carried.fit));
+    }
+    if beyond > DOUBTFUL_SHARE {
+        segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent: 100.0 * beyond });
+    }
     let known = &segmentation.known_mni.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());
-    if overrides.brain.is_none() && !VOLUME_RATIO.contains(&(found_cc / expected_cc.max(1.0))) {
+    if !VOLUME_RATIO.contains(&(found_cc / expected_cc.max(1.0))) {
         return Err(HeadError::UnlikeTemplate { found_cc, expected_cc });
     }
-    Ok((segmentation, fit))
+    Ok((segmentation, carried.fit))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall};
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
-use crate::image::{Grid, LabelMap, Mask, Volume};
+use crate::image::{BlankSlices, Grid, LabelMap, Mask, Volume};
 use thiserror::Error;
 
 /// Everything that steers [`segment_t1`].
@@ -127,6 +127,30 @@ pub enum SegmentWarning {
     StrongGain {
         /// How many times.
         times: f64,
+    },
+    /// Some slices show nothing, between others that do.
+    #[error(
+        "the scan is blank from slice {first} to {last} of voxel axis {axis} ({thickness_mm:.1} mm): filled from the slices on \
+         either side, so what lies there is a guess"
+    )]
+    BlankSlices {
+        /// Index of the first, from 0.
+        first: usize,
+        /// Index of the last.
+        last: usize,
+        /// The voxel axis across them, 0 to 2.
+        axis: usize,
+        /// How thick they are together.
+        thickness_mm: f64,
+    },
+    /// Much of what lies just outside the fitted template under the vault looks like brain.
+    #[error(
+        "{percent:.0} % of what lies 2 to 4.5 mm outside the fitted template under the vault looks like brain: the outline may cut \
+         the crown, or take in bone or dura there; look at it, and give a brain mask where it is wrong"
+    )]
+    BeyondTemplate {
+        /// Share of that layer, in percent.
+        percent: f64,
     },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
@@ -371,6 +395,14 @@ pub(super) fn labelled<F: Frame>(
         volumes,
         warnings,
     })
+}
+
+impl SegmentWarning {
+    /// The warning of a gap in a scan of this grid.
+    pub(super) fn blank<F: Frame>(gap: &BlankSlices, grid: &Grid<F>) -> Self {
+        let thickness_mm = gap.slices.len() as f64 * grid.spacing_mm()[gap.axis];
+        Self::BlankSlices { first: gap.slices.start, last: gap.slices.end - 1, axis: gap.axis, thickness_mm }
+    }
 }
 
 impl SegmentSettings {

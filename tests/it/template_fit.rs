@@ -3,6 +3,7 @@
 use hgm::geometry::{AffineTransform, Mni, Position, Pre, RigidTransform};
 use hgm::image::Volume;
 use hgm::image::distance::signed_distance_mm;
+use hgm::material::random::CounterRng;
 use hgm::register::deformable::DeformableSettings;
 use hgm::segment::{AtlasPriors, atlas, carried_priors, fit_template};
 
@@ -28,16 +29,27 @@ fn head_around(template_from_head: &AffineTransform<Mni, Mni>, fluid_mm: f64, bo
     head.relabelled()
 }
 
+/// The same head under a coil that sees the crown a fifth as bright as the base, in noise.
+fn dimly(head: &Volume<f32, Pre>) -> Volume<f32, Pre> {
+    let brightest = f64::from(head.data.iter().copied().fold(0.0, f32::max));
+    let rng = CounterRng::new(5, 5);
+    Volume::from_fn(head.grid, |n| {
+        let place = head.grid.position(head.grid.voxel(n).map(|v| v as f64).into()).mm;
+        let noise: f64 = (0..4).map(|c| rng.uniform(4 * n as u64 + c) - 0.5).sum::<f64>() * 3f64.sqrt();
+        (f64::from(head.data[n]) * (-place.z / 90.0).exp() + 0.06 * brightest * noise).max(0.0) as f32
+    })
+}
+
 #[test]
 fn the_carried_surface_is_drawn_neither_in_nor_out_by_what_surrounds_the_brain() {
     let template_from_head = atlas::head_from_template().inverse().unwrap();
     let surface_cc = |priors: &AtlasPriors| priors.brain_mm.map(|mm| mm < 0.0).volume_cc();
     let own_cc = surface_cc(&carried_priors(|p| template_from_head.apply(p)));
-    for (fluid_mm, bone_mm) in [(1.0, 4.0), (2.5, 5.0)] {
-        let head = head_around(&template_from_head, fluid_mm, bone_mm);
+    let narrow = head_around(&template_from_head, 1.0, 4.0);
+    for head in [dimly(&narrow), narrow, head_around(&template_from_head, 2.5, 5.0)] {
         let fit = fit_template(&head, &RigidTransform::identity(), &DeformableSettings::default()).unwrap();
         let found_cc = surface_cc(&carried_priors(|p| fit.atlas_from_subject.apply(p)));
-        // With a rim of 4 mm the first of these heads comes out 7 % too small.
+        // With a rim of 4 mm the second of these heads comes out 7 % too small.
         assert!((found_cc / own_cc - 1.0).abs() < 0.04, "{found_cc} cc of {own_cc}: {:?}", fit.quality);
     }
 }

@@ -34,8 +34,8 @@ pub struct DeformableSettings {
     pub update_sigma_voxels: f64,
     /// Smoothing of the velocity after each update, in voxels of the level (an elastic body).
     pub velocity_sigma_voxels: f64,
-    /// The images are compared over the atlas's brain widened by this much. In a head of the template's own shape the carried
-    /// brain comes out 3 to 7 % too small with 4 mm, and up to 7 % too large with 8 mm: the subject is blank beyond 6 mm.
+    /// The images are compared over the atlas's brain widened by this much. With less, the carried brain comes out too small;
+    /// with more, too large, since the subject is blank beyond 6 mm.
     pub margin_mm: f64,
     /// Whether an affine fit comes first; without it the heads are taken to be one head.
     pub affine: bool,
