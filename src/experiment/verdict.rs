@@ -359,7 +359,7 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
             capitalised(&intervals)
         ),
         Finding::Widened => format!(
-            "The model explains the shift{percent}, but not to within the measurement ({first}): the intervals are as much wider. {}.",
+            "The model explains the shift{percent}, but not to the measurement's precision: the intervals are widened. {}.",
             capitalised(&intervals)
         ),
         Finding::Identified => format!("The model explains the shift{percent}: {intervals}."),
