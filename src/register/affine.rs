@@ -9,7 +9,7 @@ use crate::image::{Mask, Volume};
 use nalgebra::Matrix3;
 
 /// Sizes that the search begins from where the mean head's own leads to nothing like a head: a small child's, and more than a
-/// large man's. From a start an eighth too large or too small the folds line up with others.
+/// large man's. From a start a sixth too small the folds line up with others.
 const OTHER_SIZES: [f64; 2] = [0.88, 1.14];
 
 /// The affine map from the mean head to a head that lies rigidly aligned with it.

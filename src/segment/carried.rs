@@ -53,8 +53,7 @@ const DOUBTFUL: f64 = 0.5;
 /// children, lesions, wide ventricles).
 const LEAST: f64 = 0.4;
 /// Share of the layer outside the carried surface that is found to be brain from which on the template came out too small.
-/// Half way between heads that it fits, where fluid and bone fill that layer (to .03), and those whose gyral crowns it cut
-/// (from .05).
+/// Half way between heads that it fits, where fluid and bone fill that layer, and those whose gyral crowns it cut.
 const CROWDED: f64 = 0.04;
 /// Share from which on the outline is doubtful where nothing has helped.
 const DOUBTFUL_SHARE: f64 = 0.15;
@@ -137,8 +136,9 @@ impl Carried {
         let grid = atlas::template().grid();
         let on_grid = resample(t1, &grid, &affine, Interpolation::Linear, f32::NAN);
         let (subject, known) = (on_grid.volume, on_grid.inside);
-        let start = if settings.affine { stretch(&subject, &known) } else { AffineTransform::identity() };
-        let flat = without_gain(&subject.map(|x| if x.is_finite() { x } else { 0.0 }).relabelled());
+        let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
+        let start = if settings.affine { stretch(&finite, &known) } else { AffineTransform::identity() };
+        let flat = without_gain(&finite.relabelled());
         let flat = Volume::from_fn(grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
         let first = Self::from(flat, start, settings)?;
         if !settings.affine || first.correlation() >= DOUBTFUL {
@@ -153,9 +153,8 @@ impl Carried {
 /// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
 fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
     let head = atlas::mean_head();
-    let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
     let mean = MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare };
-    atlas::head_from_template().then(&subject_from_mean_head(&finite, &mean, Some(known)))
+    atlas::head_from_template().then(&subject_from_mean_head(subject, &mean, Some(known)))
 }
 
 /// The template's maps read through `template_from_patient`, a map that [`fit_template`] made.
@@ -164,7 +163,7 @@ pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<
 }
 
 /// A head on the template's grid, and what its brain is looked for with.
-struct Looked<'a, F: Frame> {
+struct BrainSearch<'a, F: Frame> {
     seen: Seen,
     mni_from_t1: &'a RigidTransform<F, Mni>,
     /// The brain's mask where the user brought one.
@@ -173,7 +172,7 @@ struct Looked<'a, F: Frame> {
 }
 
 /// The brain found with a carried template.
-struct WithBrain {
+struct FittedBrain {
     carried: Carried,
     found: FoundBrain,
     /// The template's maps; let go while another template is tried, since two of them at a time would be the peak of memory.
@@ -181,7 +180,7 @@ struct WithBrain {
     beyond: f64,
 }
 
-impl WithBrain {
+impl FittedBrain {
     fn priors(&mut self) -> AtlasPriors {
         self.priors.take().unwrap_or_else(|| priors_of(&self.carried.fit))
     }
@@ -191,16 +190,16 @@ fn priors_of(fit: &AtlasFit<Mni>) -> AtlasPriors {
     carried_priors(|p| fit.atlas_from_subject.apply(p))
 }
 
-impl<F: Frame> Looked<'_, F> {
-    fn with(&self, carried: Carried) -> Result<WithBrain, SegmentError> {
+impl<F: Frame> BrainSearch<'_, F> {
+    fn with(&self, carried: Carried) -> Result<FittedBrain, SegmentError> {
         let priors = priors_of(&carried.fit);
         let found = self.seen.brain(self.mni_from_t1, &priors, self.given, self.settings)?;
         let beyond = share_beyond(&found.brain, &self.seen.known, &priors);
-        Ok(WithBrain { carried, found, priors: Some(priors), beyond })
+        Ok(FittedBrain { carried, found, priors: Some(priors), beyond })
     }
 
     /// The template made larger for as long as brain is found beyond it and that helps.
-    fn grown(&self, mut best: WithBrain, deformable: &DeformableSettings) -> Result<WithBrain, HeadError> {
+    fn grown(&self, mut best: FittedBrain, deformable: &DeformableSettings) -> Result<FittedBrain, HeadError> {
         let mut settings = deformable.clone();
         for way in LARGER {
             if best.beyond < CROWDED {
@@ -256,13 +255,13 @@ pub fn segment_head<F: Frame>(
         return Err(HeadError::PoorFit { correlation, least: LEAST });
     }
     let seen = Seen::of(t1, mni_from_t1, &atlas::template().grid(), settings)?;
-    let looked = Looked { seen, mni_from_t1, given: overrides.brain, settings };
-    let mut best = looked.with(carried)?;
+    let search = BrainSearch { seen, mni_from_t1, given: overrides.brain, settings };
+    let mut best = search.with(carried)?;
     if deformable.affine && overrides.brain.is_none() {
-        best = looked.grown(best, deformable)?;
+        best = search.grown(best, deformable)?;
     }
     let priors = best.priors();
-    let WithBrain { carried, found, beyond, .. } = best;
+    let FittedBrain { carried, found, beyond, .. } = best;
     let mut segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &t1.grid)));
     if overrides.brain.is_some() {
