@@ -44,8 +44,14 @@ const ARMIJO: f64 = 1e-4;
 /// state, which is thought to be near.
 const FIRST_FORCING: [f64; 2] = [0.1, 0.01];
 
+/// Coarsest accuracy of a linear solution. Coarser ones would do for the last iteration, and for all of them before walls that
+/// only have to be met roughly: there the iterations go round in circles.
+const COARSEST: f64 = 0.1;
+
 /// A load step is given up for a shorter one when the residual has found no new minimum for so many iterations.
 const PATIENCE: usize = 12;
+/// What a new minimum is of the last one: less would be a way that leads nowhere, slowly.
+const NEW_BEST: f64 = 0.98;
 
 /// How many times softer walls are on the way from rest to their own softness.
 const SOFTER: [f64; 3] = [40.0, 13.0, 4.0];
@@ -333,14 +339,14 @@ impl Model {
             if relative <= stage.goal {
                 return Ok(());
             }
-            (best, since_best) = if size < best { (size, 0) } else { (best, since_best + 1) };
+            (best, since_best) = if size < NEW_BEST * best { (size, 0) } else { (best.min(size), since_best + 1) };
             let spent = record.iterations.len() >= BUDGET * settings.newton_iterations;
             if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
-            let needed = 0.5 * stage.goal / relative;
+            let needed = (0.5 * stage.goal / relative).min(COARSEST);
             let forcing = if iteration == 0 {
-                stage.first_forcing.max(needed).min(0.5)
+                stage.first_forcing.max(needed)
             } else {
                 forcing_term(size / last_size, last_forcing, needed)
             };
@@ -474,5 +480,5 @@ fn forcing_term(ratio: f64, last: f64, needed: f64) -> f64 {
     if guard > 0.1 {
         forcing = forcing.max(guard);
     }
-    forcing.clamp(1e-4, 0.1).max(needed).min(0.5)
+    forcing.clamp(1e-4, COARSEST).max(needed)
 }

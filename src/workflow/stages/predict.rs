@@ -31,7 +31,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
