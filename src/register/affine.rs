@@ -3,14 +3,17 @@
 use super::bfgs::Stopping;
 use super::mutual_information::Pose;
 use super::search::{Freedom, Level, TETHER, optimise};
-use super::whole_head::{CLEAR, MeanHead, Subject, level, likelier, likeness, search_level};
+use super::whole_head::{MeanHead, Prepared, Subject, level, likelier_first, likeness, search_level};
 use crate::geometry::{AffineTransform, Frame, Native};
 use crate::image::{Mask, Volume};
 use nalgebra::Matrix3;
 
-/// Sizes that the search begins from where the mean head's own leads to nothing like a head: a small child's, and more than a
-/// large man's. From a start a sixth too small the folds line up with others.
-const OTHER_SIZES: [f64; 2] = [0.88, 1.14];
+/// Sizes that the search begins from, one after the other until it is certain: the mean head's own, a small child's, and more
+/// than a large man's. From a start a sixth too small the folds line up with others.
+const SIZES: [f64; 3] = [1.0, 0.88, 1.14];
+/// Local correlation with the mean head above which nothing else is tried. The bare brain agrees by half with a whole head
+/// that is a fifth too small: scalp lies then where pia is expected.
+const CERTAIN: f64 = 0.6;
 
 /// The affine map from the mean head to a head that lies rigidly aligned with it.
 ///
@@ -27,7 +30,6 @@ pub fn subject_from_mean_head<F: Frame>(
     let subject = Subject::new(&subject.clone().relabelled(), known.map(|k| k.clone().relabelled::<Native>()).as_ref());
     let centre = head.centre_mm();
     let aligned = Pose { linear: Matrix3::identity(), centre, target: centre };
-    let prepared = likelier(head, &subject, &aligned);
     let climbed = |level: &Level<'_>, from: &Pose| {
         let stopping = Stopping {
             longest_step_mm: 0.5 * level.spacing_mm,
@@ -36,18 +38,24 @@ pub fn subject_from_mean_head<F: Frame>(
         };
         optimise(level, from, Freedom::Affine(TETHER), None, stopping).pose
     };
-    let search = search_level(&prepared, &subject, 1, 30_000);
-    let from = |size: f64| climbed(&search, &Pose { linear: Matrix3::from_diagonal_element(size), ..aligned });
-    let likely = |pose: Pose| (likeness(&prepared, &subject, &pose), pose);
-    let mut agreed = likely(from(1.0));
-    for size in OTHER_SIZES {
-        if agreed.0 >= CLEAR {
+    let looks = likelier_first(head, &subject, &aligned);
+    let starts = looks.iter().flat_map(|look| SIZES.map(|size| (look, size)));
+    let mut best: Option<(f64, Pose, &Prepared)> = None;
+    for (look, size) in starts {
+        if best.as_ref().is_some_and(|(likely, ..)| *likely >= CERTAIN) {
             break;
         }
-        let other = likely(from(size));
-        agreed = if other.0 > agreed.0 { other } else { agreed };
+        let search = search_level(look, &subject, 1, 30_000);
+        let pose = climbed(&search, &Pose { linear: Matrix3::from_diagonal_element(size), ..aligned });
+        let likely = likeness(look, &subject, &pose);
+        if best.as_ref().is_none_or(|(other, ..)| likely > *other) {
+            best = Some((likely, pose, look));
+        }
     }
-    let informed = likely(climbed(&level(&prepared, &subject, 2, 60_000), &agreed.1));
-    let (_, pose) = if informed.0 >= agreed.0 { informed } else { agreed };
+    let Some((agreed, mut pose, look)) = best else { return AffineTransform::identity() };
+    let informed = climbed(&level(look, &subject, 2, 60_000), &pose);
+    if likeness(look, &subject, &informed) >= agreed {
+        pose = informed;
+    }
     AffineTransform::from_parts(pose.linear, pose.target - pose.linear * pose.centre)
 }

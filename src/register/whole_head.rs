@@ -36,7 +36,7 @@ const SEARCHED: usize = 2;
 /// Sizes that starts have, over the mean head's: half way to a small child's and to a large man's.
 const SCALES: [f64; 2] = [0.93, 1.08];
 /// Local correlation with the mean head above which no other start is tried.
-pub(super) const CLEAR: f64 = 0.5;
+const CLEAR: f64 = 0.5;
 /// Local correlation below which no head was found: wrong poses of real heads stay well below, right ones above.
 const LEAST: f64 = 0.35;
 
@@ -331,15 +331,11 @@ fn searched(head: &Prepared, subject: &Subject, reach: &Reach, keep: usize) -> F
     best
 }
 
-/// The more likely of the whole and the stripped mean head at a pose.
-pub(super) fn likelier<F: Frame>(head: &MeanHead<'_, F>, subject: &Subject, pose: &Pose) -> Prepared {
-    let whole = head.prepared();
-    let likeness_of_whole = likeness(&whole, subject, pose);
-    if likeness_of_whole >= CLEAR {
-        return whole;
-    }
-    let bare = head.stripped();
-    if likeness(&bare, subject, pose) > likeness_of_whole { bare } else { whole }
+/// The mean head whole and stripped, the one more likely at a pose first.
+pub(super) fn likelier_first<F: Frame>(head: &MeanHead<'_, F>, subject: &Subject, pose: &Pose) -> [Prepared; 2] {
+    let (whole, bare) = (head.prepared(), head.stripped());
+    let [likely, likely_bare] = [&whole, &bare].map(|look| likeness(look, subject, pose));
+    if likely >= CLEAR || likely >= likely_bare { [whole, bare] } else { [bare, whole] }
 }
 
 /// The rotation of a linear map's polar decomposition.

@@ -9,20 +9,23 @@ use super::resection::Resection;
 use super::sag::{gravity, grid};
 use super::settings::{SynthError, SynthSettings};
 use crate::experiment::nodal_field::on_grid;
-use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, simulate};
+use crate::experiment::resection::ResectionSettings;
+use crate::experiment::supports::{SkullSettings, with_sliding_sets};
+use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, Support, simulate};
 use crate::image::LabelMap;
 use crate::material::law::Material;
 use crate::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use crate::segment::label;
 use crate::tag::{BASE, FALX, TagSettings, tag_boundary_sets_with};
 use nalgebra::Point3;
+use std::sync::Arc;
 
 /// Standard gravity.
 const GRAVITY_M_PER_S2: f64 = 9.80665;
 /// Tetrahedra of the truth's mesh: neither the default of `hgm mesh` nor a multiple of it.
 const CELLS: usize = 85_000;
 
-/// The displacement of the brain after the resection, held at the skull base and the falx.
+/// The displacement of the brain after the resection, held at the falx and as the settings say at the skull.
 pub fn by_finite_elements(
     labels: &LabelMap<Patient>,
     anatomy: &Field,
@@ -50,8 +53,9 @@ pub fn by_finite_elements(
     let (tissue, _) = mesh
         .restricted(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
         .ok_or_else(|| failed("no tissue is left".to_owned()))?;
+    let skull = SkullSettings { gap_mm: settings.room_mm, ..SkullSettings::default() };
     let material = |pa| Material::neo_hookean(pa, settings.poisson_ratio);
-    let scenario = Scenario {
+    let mut scenario = Scenario {
         fixed: vec![BASE.to_owned(), FALX.to_owned()],
         materials: [("grey_matter", settings.grey_pa), ("white_matter", settings.white_pa)]
             .map(|(name, pa)| (name.to_owned(), material(pa)))
@@ -64,7 +68,58 @@ pub fn by_finite_elements(
         solver: SolverSettings { element: ElementKind::TET4_NODAL, ..SolverSettings::default() },
         ..Scenario::default()
     };
-    let outcome = simulate(&tissue, &scenario, &|_| ()).map_err(|e| failed(e.to_string()))?;
-    let volume = on_grid(tissue.tets(), tissue.nodes_mm(), &outcome.displacement_mm, &grid());
+    let mut body = tissue;
+    if settings.supports == Support::Sliding {
+        let inside = skull.distance(labels).ok_or_else(|| failed("the labels show no inside of a skull".to_owned()))?;
+        body = with_sliding_sets(&body, &skull);
+        scenario = ResectionSettings { skull, ..ResectionSettings::default() }.sliding(&scenario, &Arc::new(inside));
+    }
+    let outcome = simulate(&body, &scenario, &|_| ()).map_err(|e| failed(e.to_string()))?;
+    let volume = on_grid(body.tets(), body.nodes_mm(), &outcome.displacement_mm, &grid());
     Ok(Field::of(volume))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::experiment::synth::{SagKind, SynthSettings, synthesize};
+    use crate::fem::Support;
+    use crate::geometry::Position;
+    use crate::image::distance::signed_distance_mm;
+    use nalgebra::{Point3, Vector3};
+
+    #[test]
+    fn slow_a_brain_that_slides_moves_where_one_that_is_held_does_not_and_stays_in_its_skull() {
+        let of = |supports| {
+            let settings = SynthSettings {
+                sag: SagKind::Fem,
+                spacing_mm: 3.0,
+                post_slice_mm: 3.0,
+                supports,
+                ..Default::default()
+            };
+            synthesize(&settings).unwrap()
+        };
+        let (held, sliding) = (of(Support::Fixed), of(Support::Sliding));
+        assert_eq!(held.brain_pre.data, sliding.brain_pre.data, "the same head");
+        let (brain, grid) = (&held.brain_pre, held.brain_pre.grid);
+        let outside_mm = signed_distance_mm(brain);
+        let place = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+        let moved = |u: [f32; 3]| f64::from(u[0].hypot(u[1]).hypot(u[2]));
+        // The cortex that is far from where anything was taken out.
+        let taken = signed_distance_mm(&held.resected_pre);
+        let far: Vec<usize> =
+            (0..grid.len()).filter(|&n| brain.data[n] && outside_mm.data[n] > -5.0 && taken.data[n] > 30.0).collect();
+        let still = |patient: &super::super::SyntheticPatient| {
+            let few = far.iter().filter(|&&n| moved(patient.displacement_pre.data[n]) < 0.1).count();
+            few as f64 / far.len() as f64
+        };
+        assert!(still(&held) > 2.0 * still(&sliding), "{} {}", still(&held), still(&sliding));
+        let beyond = |n: usize| {
+            let u = Vector3::from(sliding.displacement_pre.data[n].map(f64::from));
+            outside_mm.trilinear(Position::from_point(place(n).mm + u)).map_or(0.0, f64::from)
+        };
+        let deepest = (0..grid.len()).filter(|&n| brain.data[n]).map(beyond).fold(0.0, f64::max);
+        // The room of a millimetre, and half a voxel's diagonal of what the masks know.
+        assert!(deepest < 1.0 + 2.6, "{deepest} mm");
+    }
 }

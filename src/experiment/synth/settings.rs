@@ -1,6 +1,7 @@
 //! What a synthetic patient is made of.
 
 use super::lobe::Lobe;
+use crate::fem::Support;
 use crate::segment::atlas::Side;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -85,6 +86,11 @@ pub struct SynthSettings {
     pub poisson_ratio: f64,
     /// Density the finite-element sag feels gravity with, in kg/m3: tissue less the fluid that still buoys it.
     pub effective_density_kg_per_m3: f64,
+    /// What the skull does in the finite-element sag: `fixed` holds the brain at its base, `sliding` only pushes back, without
+    /// friction, and the cut brainstem is held; the falx is held in both.
+    pub supports: Support,
+    /// Room between cortex and bone of a skull that the brain slides on, in mm.
+    pub room_mm: f64,
     /// Blood along the cavity's wall and pooled in its lowest part.
     pub blood: bool,
     /// An air pocket in the cavity's highest part.
@@ -114,6 +120,8 @@ impl Default for SynthSettings {
             white_pa: 990.0,
             poisson_ratio: 0.45,
             effective_density_kg_per_m3: 300.0,
+            supports: Support::Fixed,
+            room_mm: 1.0,
             blood: false,
             air: false,
             contrast: Contrast::None,
@@ -203,6 +211,7 @@ impl SynthSettings {
             ("grey_pa", self.grey_pa, 50.0, 50_000.0),
             ("white_pa", self.white_pa, 50.0, 50_000.0),
             ("poisson_ratio", self.poisson_ratio, 0.0, 0.4999),
+            ("room_mm", self.room_mm, 0.0, 10.0),
             ("effective_density_kg_per_m3", self.effective_density_kg_per_m3, 0.0, 1100.0),
         ];
         match ranges.into_iter().find(|&(_, value, low, high)| !(low..=high).contains(&value)) {
