@@ -152,7 +152,7 @@ impl Row {
         let likeliest = comparison.candidates.first()?;
         let posterior = &estimate.posterior;
         let row = Self {
-            truth_pa: *truth_pa,
+            truth_pa: [*grey_pa, *white_pa],
             found_pa: [posterior.mode[0], posterior.mode[1]],
             interval_pa: [posterior.interval_95[0], posterior.interval_95[1]],
             told: likeliest.name.contains(&format!("supports {supports}")),

@@ -6,6 +6,7 @@ use hgm::image::distance::signed_distance_mm;
 use hgm::material::random::CounterRng;
 use hgm::register::deformable::DeformableSettings;
 use hgm::segment::{AtlasPriors, atlas, carried_priors, fit_template};
+use nalgebra::{Matrix3, Vector3};
 
 /// The template's own brain at a head's size, under a layer of fluid, bone and scalp, mm.
 fn head_around(template_from_head: &AffineTransform<Mni, Mni>, fluid_mm: f64, bone_mm: f64) -> Volume<f32, Pre> {
@@ -40,10 +41,24 @@ fn dimly(head: &Volume<f32, Pre>) -> Volume<f32, Pre> {
     })
 }
 
+fn surface_cc(priors: &AtlasPriors) -> f64 {
+    priors.brain_mm.map(|mm| mm < 0.0).volume_cc()
+}
+
+#[test]
+fn a_small_heads_scalp_is_not_taken_for_pia() {
+    // Of this size a bare brain of the usual size agrees better with the head than the whole mean head does.
+    let template_from_head = AffineTransform::from_parts(Matrix3::from_diagonal_element(1.0 / 0.74), Vector3::zeros());
+    let own_cc = surface_cc(&carried_priors(|p| template_from_head.apply(p)));
+    let head = head_around(&template_from_head, 1.0, 4.0);
+    let fit = fit_template(&head, &RigidTransform::identity(), &DeformableSettings::default()).unwrap();
+    let found_cc = surface_cc(&carried_priors(|p| fit.atlas_from_subject.apply(p)));
+    assert!((found_cc / own_cc - 1.0).abs() < 0.08, "{found_cc} cc of {own_cc}: {:?}", fit.quality);
+}
+
 #[test]
 fn the_carried_surface_is_drawn_neither_in_nor_out_by_what_surrounds_the_brain() {
     let template_from_head = atlas::head_from_template().inverse().unwrap();
-    let surface_cc = |priors: &AtlasPriors| priors.brain_mm.map(|mm| mm < 0.0).volume_cc();
     let own_cc = surface_cc(&carried_priors(|p| template_from_head.apply(p)));
     let narrow = head_around(&template_from_head, 1.0, 4.0);
     for head in [dimly(&narrow), narrow, head_around(&template_from_head, 2.5, 5.0)] {
