@@ -93,6 +93,16 @@ impl TetMesh {
         signed_volume(&self.nodes_mm, &self.tets[tet])
     }
 
+    /// The same mesh with its nodes moved, mm.
+    ///
+    /// # Errors
+    /// [`MeshError`] where that turns a tetrahedron inside out.
+    pub fn moved(self, to_mm: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, MeshError> {
+        let nodes_mm = self.nodes_mm.iter().map(|p| to_mm(*p)).collect();
+        let moved = Self::new(nodes_mm, self.tets, self.labels)?;
+        Ok(Self { node_sets: self.node_sets, facet_sets: self.facet_sets, ..moved })
+    }
+
     /// Adds or replaces a node set; the numbers are sorted and made unique.
     ///
     /// # Errors

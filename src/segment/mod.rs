@@ -28,5 +28,5 @@ pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
     segment_with_priors,
 };
-pub use sulci::with_closed_sulci;
+pub use sulci::{SULCUS_MM, with_closed_sulci};
 pub use ventricle::VentricleSettings;

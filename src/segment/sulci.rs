@@ -6,6 +6,9 @@ use crate::image::LabelMap;
 use crate::image::components::fill_holes;
 use crate::image::morphology::close;
 
+/// Sulci and fissures up to twice this width are closed in a brain that is one body, mm.
+pub const SULCUS_MM: f64 = 4.0;
+
 /// Labels for meshing: CSF in sulci and fissures narrower than `2 * closing_mm` becomes grey matter, CSF in wide
 /// cisterns becomes background. A mesh whose every sulcus is open has neither a falx to hold nor a surface to load, and
 /// its thin bridges carry loads that no brain carries; pia and arachnoid hold the banks of a sulcus together.

@@ -6,12 +6,14 @@
 //! with resolution, counts do.
 
 mod landmark;
+mod midline;
 mod section;
 
 use crate::mesh::TetMesh;
 use crate::mesh::engine::MidplaneSplit;
 use crate::segment::label;
 use landmark::{above_falx_edge, above_tentorium_mm, below_base_line};
+pub use midline::Midline;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use section::midsagittal_cut;

@@ -10,12 +10,13 @@ use crate::experiment::synth::{Head, SynthError, synthesize, synthesize_on};
 use crate::geometry::{Mni, Pre};
 use crate::image::nifti::{self, encode_u8};
 use crate::image::{LabelMap, Mask, Volume};
+use crate::resect::{GivenMasks, PairError, take_head_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{SegmentOverrides, atlas, pose_of_head, pose_of_labels, segment_by_labels, segment_head};
+use crate::segment::{atlas, pose_of_head, pose_of_labels};
 use std::path::PathBuf;
 
 /// Raised when the code changes the patient of the same settings.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// The files of a synthetic patient.
 #[derive(Clone, Debug, Default)]
@@ -93,15 +94,17 @@ fn posed_head(
 ) -> Result<(Head, Option<Mask<Mni>>), WorkflowError> {
     let refused =
         |source| WorkflowError::Registration { what: "the head (moving) onto the MNI template (fixed)", source };
-    let anat = &settings.anat;
-    let (pose, segmented) = if let Some(labels) = labels {
-        let pose = pose_of_labels(labels).map_err(refused)?.fixed_from_moving;
-        (pose, segment_by_labels(scan, &pose, labels).0)
-    } else {
-        let pose = pose_of_head(scan).map_err(refused)?.fixed_from_moving;
-        let found = segment_head(scan, &pose, &SegmentOverrides::default(), &anat.deformable, &anat.segment);
-        (pose, found.map_err(SynthError::from)?.0)
+    let pose = match labels {
+        Some(labels) => pose_of_labels(labels),
+        None => pose_of_head(scan),
     };
-    let head = Head::of_scan(scan, &pose, &segmented)?;
+    let pose = pose.map_err(refused)?.fixed_from_moving;
+    let given = GivenMasks { labels: labels.cloned(), ..GivenMasks::default() };
+    let (segmented, template, _) =
+        take_head_apart(scan, &pose, &given, &settings.anat).map_err(|error| match error {
+            PairError::Head { source, .. } => SynthError::from(source).into(),
+            error => WorkflowError::from(error),
+        })?;
+    let head = Head::of_scan(scan, &pose, &segmented, template.atlas_from_subject)?;
     Ok((head, mask.map(|mask| mask_on(mask, &atlas::template().grid(), &pose.inverse()))))
 }

@@ -33,6 +33,9 @@ const fn patient(
     Patient { seed, head, lobe, side, resection_cc, truth_pa, supports, density_kg_per_m3 }
 }
 
+/// Tetrahedra of a patient's truth: finer than the mesh of the estimate.
+const CELLS: usize = 250_000;
+
 /// Five heads, five places, moduli within the literature's range.
 const PATIENTS: [Patient; 16] = [
     patient(1, "", ["temporal", "left"], 30.0, [1370.0, 990.0], "fixed", 300.0),
@@ -116,7 +119,7 @@ impl Row {
         let settings = folder.join("settings.toml");
         let Patient { seed, supports, density_kg_per_m3, resection_cc, truth_pa: [grey_pa, white_pa], .. } = patient;
         let truth = format!(
-            "[synth]\nseed = {seed}\nsag = \"fem\"\ngrey_pa = {grey_pa:?}\nwhite_pa = {white_pa:?}\nsupports = \"{supports}\"\n\
+            "[synth]\nseed = {seed}\nsag = \"fem\"\ncells = {CELLS}\ngrey_pa = {grey_pa:?}\nwhite_pa = {white_pa:?}\nsupports = \"{supports}\"\n\
              effective_density_kg_per_m3 = {density_kg_per_m3:?}\nresection_cc = {resection_cc:?}\nlobe = \"{}\"\nside = \"{}\"\n",
             patient.lobe, patient.side
         );

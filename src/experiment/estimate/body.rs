@@ -146,6 +146,9 @@ struct Last {
 /// first order a body of half the stiffness moves by seven tenths more, in truth by twice as much.
 const FORETOLD: f64 = 0.7;
 
+/// How many times stiffer a body is tried where it has no equilibrium to begin with.
+const STIFFER: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+
 /// Relative residual of the sensitivities' linear systems: a Gauss-Newton step needs no better ones.
 const SENSITIVE: f64 = 1e-6;
 
@@ -294,6 +297,19 @@ impl<'a> Body<'a> {
         let (outcome, state) = self.model.solve(&materials, start.as_ref(), &|_| {})?;
         self.solves += 1;
         Ok((materials, outcome, state))
+    }
+
+    /// Where a descent can begin: these parameters, or the same with stiffer tissue where a body this soft has no equilibrium
+    /// (a brain at the prior's mean may be folded by a load that the patient's own bears). The first ones again where a
+    /// stiffer one has none either.
+    pub(super) fn start(&mut self, log_parameters: &[f64]) -> Vec<f64> {
+        let stiffer = |by: f64| -> Vec<f64> {
+            let moved = self.unknowns.iter().zip(log_parameters);
+            moved.map(|(unknown, p)| if matches!(unknown, Unknown::ShearModulus(_)) { p + by } else { *p }).collect()
+        };
+        let starts: Vec<Vec<f64>> = STIFFER.iter().map(|factor: &f64| stiffer(factor.ln())).collect();
+        let first = starts.into_iter().find(|start| self.solve(start).is_ok());
+        first.unwrap_or_else(|| log_parameters.to_vec())
     }
 
     /// Equilibrium and sensitivities at these parameters (logarithms, or angles).

@@ -178,6 +178,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let tissues: Vec<Option<String>> = unknowns.iter().map(Unknown::tissue).collect();
     let unknown = unknowns.clone();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
+    let start = body.start(&start);
     let fitted = match &problem.errors {
         Errors::Correlated(errors) => correlated::fit(&mut body, errors, &prior, &start, problem.instrument, settings)?,
         Errors::Independent { share } => {
@@ -386,6 +387,19 @@ mod tests {
         assert!((grey / 1370.0 - 1.0).abs() < 1e-4 && (white / 990.0 - 1.0).abs() < 1e-4, "{grey} {white}");
         assert!(found.outcome.tangent_solves <= 24, "{}", found.outcome.tangent_solves);
         assert!(found.outcome.limits.is_empty(), "{:?}", found.outcome.limits);
+    }
+
+    #[test]
+    fn an_estimate_that_begins_where_nothing_is_in_equilibrium_begins_stiffer() {
+        let (mesh, scenario, observed) = phantom(4);
+        let posed = |start| Problem { start, ..problem(&mesh, &scenario, observed.clone()) };
+        let unknowns = posed(Vec::new()).unknowns.into_iter().map(|(unknown, _)| unknown).collect();
+        let mut body = Body::new(&mesh, &scenario, unknowns, 0.45, Observation::Nodes(Vec::new())).unwrap();
+        let softer = (0..20).map(|halved| vec![7.0 - 0.7 * f64::from(halved); 2]);
+        let soft = softer.into_iter().find(|moduli| body.equilibrium(moduli).is_err()).expect("too soft for its load");
+        let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        let found = solve_problem(posed(soft), &precise).unwrap().outcome.posterior.mode;
+        assert!((found[0] / 1370.0 - 1.0).abs() < 1e-3 && (found[1] / 990.0 - 1.0).abs() < 1e-3, "{found:?}");
     }
 
     #[test]

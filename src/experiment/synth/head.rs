@@ -6,7 +6,7 @@
 //! like a head to a registration and to a skull stripping, not to an anatomist.
 
 use crate::experiment::smooth_noise::SmoothNoise;
-use crate::geometry::{AffineTransform, Mni};
+use crate::geometry::{AffineTransform, Mni, Position};
 use crate::image::components::fill_holes;
 use crate::image::distance::{distance_mm, signed_distance_mm};
 use crate::image::gaussian::gaussian;
@@ -14,6 +14,7 @@ use crate::image::morphology::close;
 use crate::image::resample::resample_nearest;
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
+use crate::register::deformable::DisplacementField;
 use crate::segment::atlas::Atlas;
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -40,8 +41,15 @@ pub struct Head {
     pub labels: LabelMap<Mni>,
     /// Signed distance in mm from the inner surface of the skull, negative inside.
     pub skull_mm: Volume<f32, Mni>,
-    /// Where a point of the head lies in the template, roughly.
-    pub template_from_head: AffineTransform<Mni, Mni>,
+    /// Where a point of the head lies in the template; `None` where the head is the template's own.
+    pub template_from_head: Option<DisplacementField<Mni>>,
+}
+
+impl Head {
+    /// Where a point of the head lies in the template.
+    pub fn in_template(&self, p: Position<Mni>) -> Position<Mni> {
+        self.template_from_head.as_ref().map_or(p, |field| field.apply(p))
+    }
 }
 
 /// Room for scalp, nose and neck.
@@ -260,5 +268,5 @@ pub fn head_around(atlas: &Atlas, seed: u64) -> Head {
     let soft = gaussian(&sharp, 0.55);
     let data = sharp.data.iter().zip(&soft.data).zip(&brain.data);
     let t1 = data.map(|((&sharp, &soft), &brain)| if brain { sharp } else { soft }).collect();
-    Head { t1: Volume::from_data(grid, t1), labels, skull_mm, template_from_head: same }
+    Head { t1: Volume::from_data(grid, t1), labels, skull_mm, template_from_head: None }
 }

@@ -315,12 +315,14 @@ fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> R
     let in_head = |p: Point3<f64>| in_template(&warp, p);
     let resection = match taken {
         Some(mask) => resection::resect_mask(&labels, in_head, mask)?,
-        None => resection::resect(&labels, |p| head.template_from_head.apply(in_head(p)), settings)?,
+        None => resection::resect(&labels, |p| head.in_template(in_head(p)), settings)?,
     };
     let sag = match settings.sag {
         SagKind::None => None,
         SagKind::Smooth => Some(sag::smooth(&head, &warp, &resection, settings)),
-        SagKind::Fem => Some(sag_fem::by_finite_elements(&labels, &warp, &resection, settings)?),
+        SagKind::Fem => {
+            Some(sag_fem::by_finite_elements(&labels, |p| head.in_template(in_head(p)), &resection, settings)?)
+        }
     };
     let content = content(&resection, sag.as_ref(), settings);
     let enhancement = (settings.contrast != Contrast::None).then(|| Enhancement::new(&head, settings.seed));

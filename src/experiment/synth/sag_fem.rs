@@ -3,7 +3,7 @@
 //! The mesh has its own size and the element averages the volume change over nodes, so that an estimate made with another
 //! mesh and the plain element does not meet its own discretisation errors in the truth.
 
-use super::field::{Field, in_template};
+use super::field::Field;
 use super::frame::Patient;
 use super::resection::Resection;
 use super::sag::{gravity, grid};
@@ -12,44 +12,42 @@ use crate::experiment::nodal_field::on_grid;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::supports::{SkullSettings, with_sliding_sets};
 use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, Support, simulate};
+use crate::geometry::{Mni, Position};
 use crate::image::LabelMap;
 use crate::material::law::Material;
 use crate::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
-use crate::segment::label;
-use crate::tag::{BASE, FALX, TagSettings, tag_boundary_sets_with};
+use crate::segment::{SULCUS_MM, label, with_closed_sulci};
+use crate::tag::{BASE, FALX, Midline, TagSettings, falx_sheet, tag_boundary_sets_with};
 use nalgebra::Point3;
 use std::sync::Arc;
 
 /// Standard gravity.
 const GRAVITY_M_PER_S2: f64 = 9.80665;
-/// Tetrahedra of the truth's mesh: neither the default of `hgm mesh` nor a multiple of it.
-const CELLS: usize = 85_000;
 
 /// The displacement of the brain after the resection, held at the falx and as the settings say at the skull.
 pub fn by_finite_elements(
     labels: &LabelMap<Patient>,
-    anatomy: &Field,
+    template: impl Fn(Point3<f64>) -> Position<Mni>,
     resection: &Resection,
     settings: &SynthSettings,
 ) -> Result<Field, SynthError> {
     let failed = |what: String| SynthError::Sag(what);
-    // Fluid between gyri moves with them: as grey matter it makes the brain one body. Ventricle and resected tissue
-    // keep labels of their own, so that their walls are meshed smoothly, and are then left out.
-    let mut map = labels.clone();
+    // Ventricle and resected tissue keep labels of their own, so that their walls are meshed smoothly, and are then left out.
+    let mut map = with_closed_sulci(labels, SULCUS_MM);
     for (label, &wall_mm) in map.data.iter_mut().zip(&resection.wall_mm.data) {
-        *label = match *label {
-            label::BACKGROUND => label::BACKGROUND,
-            label::VENTRICLE => label::VENTRICLE,
-            _ if wall_mm < 0.0 => label::RESECTED,
-            label::CSF => label::GREY_MATTER,
-            tissue => tissue,
-        };
+        if wall_mm < 0.0 && *label != label::BACKGROUND && *label != label::VENTRICLE {
+            *label = label::RESECTED;
+        }
     }
-    let mesh_settings = MeshSettings { size: MeshSize::Cells(CELLS), ..MeshSettings::default() };
-    let (mut mesh, _) =
-        mesh_labels(&map, &mesh_settings, &EnginePrograms::default()).map_err(|e| failed(e.to_string()))?;
-    let template = |p: [f64; 3]| <[f64; 3]>::from(in_template(anatomy, Point3::from(p)).mm);
-    tag_boundary_sets_with(&mut mesh, &TagSettings::default(), template).map_err(|e| failed(e.to_string()))?;
+    let mesh_settings =
+        MeshSettings { size: MeshSize::Cells(settings.cells), split: Some(falx_sheet()), ..MeshSettings::default() };
+    let template = |p: [f64; 3]| <[f64; 3]>::from(template(Point3::from(p)).mm);
+    let midline = Midline::of(template);
+    let (mut mesh, _) = mesh_labels(&midline.straightened(&map), &mesh_settings, &EnginePrograms::default())
+        .map_err(|e| failed(e.to_string()))?;
+    tag_boundary_sets_with(&mut mesh, &TagSettings::default(), |p| template(midline.bent(p)))
+        .map_err(|e| failed(e.to_string()))?;
+    let mesh = mesh.moved(|p| midline.bent(p)).map_err(|e| failed(e.to_string()))?;
     let (tissue, _) = mesh
         .restricted(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
         .ok_or_else(|| failed("no tissue is left".to_owned()))?;

@@ -9,7 +9,7 @@ use crate::image::gaussian::gaussian;
 use crate::image::morphology::close;
 use crate::image::resample::{Interpolation, resample, resample_nearest};
 use crate::image::{Mask, Volume};
-use crate::segment::atlas;
+use crate::register::deformable::DisplacementField;
 use crate::segment::{Segmentation, label};
 
 /// Fluid between the brain's hull and the skull of a real head, mm.
@@ -17,7 +17,7 @@ const FLUID_LAYER_MM: f64 = 2.0;
 
 impl Head {
     /// The head that a scan shows, in the template's frame and in the units of a built head: fluid, grey and white matter
-    /// have their intensities, so that cavities and noise are in scale.
+    /// have their intensities, so that cavities and noise are in scale. `template_from_head` is the template's fit to it.
     ///
     /// # Errors
     /// [`SynthError::NotT1`] where fluid, grey and white matter do not grow brighter in this order.
@@ -25,6 +25,7 @@ impl Head {
         t1: &Volume<f32, F>,
         mni_from_t1: &RigidTransform<F, Mni>,
         segmented: &Segmentation<F>,
+        template_from_head: DisplacementField<Mni>,
     ) -> Result<Self, SynthError> {
         let means = segmented.tissue_means;
         let [fluid, grey, white] = means;
@@ -49,8 +50,7 @@ impl Head {
             t1: seen.volume.map(in_units),
             labels,
             skull_mm: gaussian(&signed_distance_mm(&intracranial), 1.0),
-            // The template is larger than people are.
-            template_from_head: atlas::head_from_template().inverse().unwrap_or_else(|_| AffineTransform::identity()),
+            template_from_head: Some(template_from_head),
         })
     }
 }
@@ -59,8 +59,14 @@ impl Head {
 mod tests {
     use super::*;
     use crate::geometry::Pre;
+    use crate::image::Grid;
     use crate::image::LabelMap;
-    use crate::segment::segment_by_labels;
+    use crate::segment::{atlas, segment_by_labels};
+
+    fn own_place() -> DisplacementField<Mni> {
+        let grid = Grid::axis_aligned([2; 3], [200.0; 3], [-100.0; 3]);
+        DisplacementField::from_displacement(&Volume::from_fn(grid, |_| [0.0; 3]))
+    }
 
     #[test]
     fn slow_a_scan_keeps_its_labels_and_takes_the_units_of_a_built_head() {
@@ -69,7 +75,7 @@ mod tests {
         let labels: LabelMap<Pre> = template.labels.clone().relabelled();
         let same = RigidTransform::identity();
         let (segmented, _) = segment_by_labels(&t1, &same, &labels);
-        let head = Head::of_scan(&t1, &same, &segmented).unwrap();
+        let head = Head::of_scan(&t1, &same, &segmented, own_place()).unwrap();
         let mean = |l: u8| {
             let inside = (0..head.labels.data.len()).filter(|&n| head.labels.data[n] == l);
             let (sum, count) = inside.fold((0.0, 0.0), |(s, c), n| (s + f64::from(head.t1.data[n]), c + 1.0));
@@ -80,6 +86,6 @@ mod tests {
         let bright = t1.map(|x| if x > 0.0 { 2000.0 - x } else { 0.0 });
         let mut turned = segmented;
         turned.tissue_means.reverse();
-        assert!(matches!(Head::of_scan(&bright, &same, &turned), Err(SynthError::NotT1 { .. })));
+        assert!(matches!(Head::of_scan(&bright, &same, &turned, own_place()), Err(SynthError::NotT1 { .. })));
     }
 }

@@ -91,6 +91,9 @@ pub struct SynthSettings {
     pub supports: Support,
     /// Room between cortex and bone of a skull that the brain slides on, in mm.
     pub room_mm: f64,
+    /// About how many tetrahedra the finite-element sag has. A truth that an estimate is measured by wants a finer mesh than the
+    /// estimate's: a coarse one is too stiff.
+    pub cells: usize,
     /// Blood along the cavity's wall and pooled in its lowest part.
     pub blood: bool,
     /// An air pocket in the cavity's highest part.
@@ -122,6 +125,7 @@ impl Default for SynthSettings {
             effective_density_kg_per_m3: 300.0,
             supports: Support::Fixed,
             room_mm: 1.0,
+            cells: 85_000,
             blood: false,
             air: false,
             contrast: Contrast::None,
@@ -212,6 +216,7 @@ impl SynthSettings {
             ("white_pa", self.white_pa, 50.0, 50_000.0),
             ("poisson_ratio", self.poisson_ratio, 0.0, 0.4999),
             ("room_mm", self.room_mm, 0.0, 10.0),
+            ("cells", self.cells as f64, 5_000.0, 2_000_000.0),
             ("effective_density_kg_per_m3", self.effective_density_kg_per_m3, 0.0, 1100.0),
         ];
         match ranges.into_iter().find(|&(_, value, low, high)| !(low..=high).contains(&value)) {

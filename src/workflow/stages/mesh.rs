@@ -6,14 +6,14 @@ use crate::experiment::outcome::{MeshOutcome, SetOutcome};
 use crate::geometry::{Frame, Mni, Position};
 use crate::image::LabelMap;
 use crate::layout::{PRE_LABELS, REST_GMSH, REST_MESH, REST_SURFACE};
-use crate::mesh::engine::{MeshSettings, MeshSize, MeshingRecord, mesh_labels};
+use crate::mesh::engine::{EngineError, MeshSettings, MeshSize, MeshingRecord, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
 use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
-use crate::segment::{label, with_closed_sulci};
-use crate::tag::{TagReport, falx_sheet, tag_boundary_sets_with};
+use crate::segment::{SULCUS_MM, label, with_closed_sulci};
+use crate::tag::{Midline, TagReport, falx_sheet, tag_boundary_sets_with};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
 use crate::workflow::stage_name::StageName;
@@ -21,12 +21,10 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NAME: StageName = StageName::Mesh;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
-/// Sulci and fissures up to twice this width are closed in the mesh.
-const SULCUS_MM: f64 = 4.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
@@ -95,16 +93,23 @@ fn tagged(
     settings: &MeshSettings,
     template_from_labels: Option<&DisplacementField<Mni>>,
 ) -> Result<Tagged, WorkflowError> {
-    let source = template_from_labels.map_or("the template's labels", |_| PRE_LABELS);
-    let (mut whole, record) = mesh_labels(body, settings, &work.place.programs.engines())
-        .map_err(|error| WorkflowError::Engine { labels: source.to_owned(), source: error })?;
+    let labels = template_from_labels.map_or("the template's labels", |_| PRE_LABELS);
     let in_template = |p: [f64; 3]| match template_from_labels {
         Some(field) => field.apply(Position::new(p[0], p[1], p[2])).mm.into(),
         None => p,
     };
-    let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, in_template)?;
+    // The falx is a sheet in the plane x = 0 of a brain whose midline has been made straight.
+    let midline = template_from_labels.filter(|_| settings.split.is_some()).map(|_| Midline::of(in_template));
+    let straight = midline.as_ref().map(|midline| midline.straightened(body));
+    let failed = |source| WorkflowError::Engine { labels: labels.to_owned(), source };
+    let meshed = mesh_labels(straight.as_ref().unwrap_or(body), settings, &work.place.programs.engines());
+    let (mut whole, record) = meshed.map_err(failed)?;
+    let bent = |p: [f64; 3]| midline.as_ref().map_or(p, |midline| midline.bent(p));
+    let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, |p| in_template(bent(p)))?;
+    let engine = record.engine.name();
+    let whole = whole.moved(bent).map_err(|source| failed(EngineError::Invalid { engine, source }))?;
     let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
-    let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels: source })?;
+    let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels })?;
     Ok(Tagged { rest, whole, record, tags })
 }
 
