@@ -34,7 +34,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("segment", vec!["anatomy", "geometry", "image", "register"]),
         ("resect", vec!["geometry", "image", "register", "segment"]),
         ("mesh", vec!["geometry", "image", "segment", "artefact"]),
-        ("tag", vec!["geometry", "segment", "mesh"]),
+        ("tag", vec!["geometry", "image", "segment", "mesh"]),
         ("material", vec!["artefact"]),
         ("overlay", vec!["geometry", "mesh"]),
         ("fem", vec!["geometry", "mesh", "material"]),

@@ -50,6 +50,7 @@ pub fn by_finite_elements(
     let mesh = mesh.moved(|p| midline.bent(p)).map_err(|e| failed(e.to_string()))?;
     let (tissue, _) = mesh
         .restricted(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
+        .and_then(|(tissue, _)| tissue.largest_face_connected_part())
         .ok_or_else(|| failed("no tissue is left".to_owned()))?;
     let skull = SkullSettings { gap_mm: settings.room_mm, ..SkullSettings::default() };
     let material = |pa| Material::neo_hookean(pa, settings.poisson_ratio);
