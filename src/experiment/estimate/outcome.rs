@@ -390,6 +390,22 @@ mod tests {
     }
 
     #[test]
+    fn an_estimate_that_begins_where_nothing_is_in_equilibrium_begins_stiffer() {
+        let (mesh, mut scenario, observed) = phantom(4);
+        // Where a load is not cut, a body this soft has no equilibrium that is found.
+        scenario.solver.newton_iterations = 8;
+        scenario.solver.smallest_load_step = 1.0;
+        let posed = |start| Problem { start, ..problem(&mesh, &scenario, observed.clone()) };
+        let unknowns = posed(Vec::new()).unknowns.into_iter().map(|(unknown, _)| unknown).collect();
+        let mut body = Body::new(&mesh, &scenario, unknowns, 0.45, Observation::Nodes(Vec::new())).unwrap();
+        let softer = (0..20).map(|halved| vec![7.0 - 0.7 * f64::from(halved); 2]);
+        let soft = softer.into_iter().find(|moduli| body.equilibrium(moduli).is_err()).expect("too soft for its load");
+        let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        let found = solve_problem(posed(soft), &precise).unwrap().outcome.posterior.mode;
+        assert!((found[0] / 1370.0 - 1.0).abs() < 1e-3 && (found[1] / 990.0 - 1.0).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
     fn a_softer_body_moves_more_and_the_spread_follows_the_interval() {
         let (mesh, scenario, observed) = phantom(3);
         let rough = EstimateSettings { noise_mm: 0.5, ..EstimateSettings::default() };
