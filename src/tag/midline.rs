@@ -3,14 +3,14 @@
 //!
 //! A mesh conforms to the plane x = 0 alone. So labels are straightened, meshed and tagged, and the mesh is bent back:
 //! `x = x' + s(y, z) exp(-(x' / 30 mm)^2)`, where `s` is how far the midline lies from the plane. What is 60 mm to the side
-//! stays where it is.
+//! moves by a fiftieth of that.
 
 use crate::geometry::{Frame, Position};
 use crate::image::LabelMap;
 
 /// How far to the side the bending reaches, mm.
 const REACH_MM: f64 = 30.0;
-/// No midline lies further from the plane after a rigid registration, mm: the map stays one to one, its stretch above .7.
+/// A midline further from the plane than this is taken as this far, mm: the map stays one to one, its stretch above .7.
 const FARTHEST_MM: f64 = 10.0;
 /// The falx is taut: what is finer than this is the fit's noise, mm (one standard deviation).
 const SMOOTH_MM: f64 = 8.0;

@@ -18,7 +18,6 @@ struct Patient {
     density_kg_per_m3: f64,
 }
 
-#[allow(clippy::too_many_arguments, reason = "a row of a table")]
 const fn patient(
     seed: u64,
     head: &'static str,
@@ -61,7 +60,8 @@ pub fn bars() -> Vec<Bar> {
     let there = |patient: &&Patient| patient.head.is_none() || data().is_some();
     let wanted: Vec<&Patient> = PATIENTS.iter().filter(there).collect();
     if wanted.len() < PATIENTS.len() {
-        println!("patients: {} of {} need heads of HGM_BENCH_DATA; skipped", 16 - wanted.len(), PATIENTS.len());
+        let left_out = PATIENTS.len() - wanted.len();
+        println!("patients: {left_out} of {} need heads of HGM_BENCH_DATA; skipped", PATIENTS.len());
     }
     println!(
         "patient  supports  grey, white Pa (true)  found by  grey [95 %]           white [95 %]          explained"

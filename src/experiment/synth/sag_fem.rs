@@ -1,7 +1,7 @@
 //! The sag as mechanics: finite elements under gravity with known materials.
 //!
-//! The mesh has its own size and the element averages the volume change over nodes, so that an estimate made with another
-//! mesh and the plain element does not meet its own discretisation errors in the truth.
+//! The mesh has its own size (`cells`), so that an estimate made with another mesh does not meet its own discretisation errors in
+//! the truth; body, falx and element follow the same rules as a patient's, so that what is told is how well images give them.
 
 use super::field::Field;
 use super::frame::Patient;

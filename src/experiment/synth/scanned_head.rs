@@ -59,8 +59,7 @@ impl Head {
 mod tests {
     use super::*;
     use crate::geometry::Pre;
-    use crate::image::Grid;
-    use crate::image::LabelMap;
+    use crate::image::{Grid, LabelMap};
     use crate::segment::{atlas, segment_by_labels};
 
     fn own_place() -> DisplacementField<Mni> {
