@@ -6,10 +6,13 @@ use super::case_files::{Case, best_sample, displaced};
 use super::case_views::add_results;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
+use super::listing::listing;
 use super::mesh_figure::{PICTURE, cut_views, legend, middle_mm};
 use super::page::{CaptionedPicture, CasePage, PredictionFigure, ShiftFigure, title_of};
+use super::residual_figure::residual_figure;
 use super::shift_figure::{prediction_figure, shift_figure};
 use crate::artefact::{sha256_hex, write_whole};
+use crate::experiment::estimate::{SEEN_AT, SEEN_DISPLACEMENT};
 use crate::experiment::field::BrainShift;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation};
@@ -34,6 +37,20 @@ fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftF
     let seen: Volume<[f32; 3], Mni> = nifti::decode_displacement(&seen, layout::SAG)?.relabelled();
     let displacement = state.point_field("displacement").and_then(Field::vectors);
     Ok(displacement.and_then(|u| shift_figure(&t1, &seen, &state.mesh, &u)))
+}
+
+/// What the estimate leaves of the displacement of the nodes that it was held against; nothing where those were surfaces.
+fn residuals_of(case: &Case<'_>) -> Result<Option<ShiftFigure>, ReportError> {
+    let Some(state) = case.mesh(layout::ESTIMATE_STATE)? else { return Ok(None) };
+    let vectors = |name: &str| state.point_field(name).and_then(Field::vectors);
+    let (Some(model), Some(seen), Some(at)) =
+        (vectors("displacement"), vectors(SEEN_DISPLACEMENT), state.point_field(SEEN_AT))
+    else {
+        return Ok(None);
+    };
+    let held = at.values.iter().enumerate().filter(|(_, held)| **held > 0.5);
+    let left = held.map(|(n, _)| (n, [0, 1, 2].map(|a| seen[n][a] - model[n][a])));
+    Ok(residual_figure(state.mesh.nodes_mm(), &left.collect::<Vec<_>>()))
 }
 
 /// The first head of a prediction on a slice.
@@ -102,6 +119,9 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
     page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
     page.shift_figure = shift_of(&case, page.brain_shift.as_ref())?;
+    if outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some()) {
+        page.residual_figure = residuals_of(&case)?;
+    }
     page.outcome = outcome;
     Ok(page)
 }
@@ -139,8 +159,8 @@ fn refused(png: Vec<u8>) -> CaptionedPicture {
 /// # Errors
 /// [`ReportError`] as [`read_case`].
 pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
-    let page = read_case(folder)?;
-    let mut files = vec![(layout::PAGE.to_owned(), page.to_html().into_bytes())];
+    let mut page = read_case(folder)?;
+    let mut files = Vec::new();
     let case = Case { folder };
     if let Some(images) = case.images()? {
         files.extend(hand_off::segmentations(&images));
@@ -156,6 +176,8 @@ pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
             files.extend(surfaces.map_err(ReportError::HandOff)?);
         }
     }
+    page.files = listing(folder, &files);
+    files.insert(0, (layout::PAGE.to_owned(), page.to_html().into_bytes()));
     Ok(files)
 }
 

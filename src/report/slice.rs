@@ -34,7 +34,7 @@ impl Plane {
     }
 
     /// In-plane axes: (horizontal, vertical).
-    fn in_plane(self) -> (usize, usize) {
+    pub fn in_plane(self) -> (usize, usize) {
         match self {
             Self::Axial => (0, 1),
             Self::Coronal => (0, 2),

@@ -523,7 +523,21 @@ def subjects_are_sorted_and_filtered(page, _):
         require(browser.evaluate(column) == [everyone[0]], "filtered by name")
         said = browser.evaluate("document.getElementById('filter-said').textContent")
         require(said == f"1 of {len(everyone)} subjects", said)
-        return f"{len(everyone)} subjects"
+        strips = browser.evaluate("document.querySelectorAll('.strips svg').length")
+        require(strips > 0, "no distribution of any figure")
+        drawn = "[...document.querySelectorAll('.strips .subject')].filter((p) => p.getClientRects().length).map((p) => p.dataset.of)"
+        require(set(browser.evaluate(drawn)) == {everyone[0]}, "the filter holds for the distributions")
+        browser.evaluate(
+            "(() => { const i = document.getElementById('filter-text'); i.value = '';"
+            " i.dispatchEvent(new Event('input')); })()")
+        require(set(browser.evaluate(drawn)) == set(everyone), "and lets everyone back")
+        marked = "[...document.querySelectorAll('.pointed')].map((p) => p.dataset.of || p.dataset.subject)"
+        pointed = browser.evaluate(
+            f"(() => {{ const p = document.querySelector('.strips .subject'); p.dispatchEvent(new Event('mouseenter'));"
+            f" const all = {marked}; p.dispatchEvent(new Event('mouseleave')); return [p.dataset.of, all, {marked}]; }})()")
+        require(set(pointed[1]) == {pointed[0]} and len(pointed[1]) > strips, "a subject is found in every figure and table")
+        require(pointed[2] == [], "and let go again")
+        return f"{len(everyone)} subjects, {strips} distributions"
 
 
 @check

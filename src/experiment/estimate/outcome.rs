@@ -19,6 +19,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Array of a state: what the images showed of a node, the registration's own error taken out, mm; zero elsewhere.
+pub const SEEN_DISPLACEMENT: &str = "seen_displacement";
+/// Array of a state: the nodes that the estimate was held against.
+pub const SEEN_AT: &str = "seen";
+
 /// What is known of the errors of what was observed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Errors {

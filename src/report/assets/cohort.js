@@ -1,5 +1,5 @@
 "use strict";
-// Sorts and hides the rows of the tables of subjects; both tables hold the same subjects and are filtered together.
+// Sorts and hides the rows of the tables of subjects; tables and figures hold the same subjects and are filtered together.
 (() => {
   const tables = [...document.querySelectorAll("table.sortable")];
   const key = (row, column) => {
@@ -34,6 +34,22 @@
       });
     });
   }
+  // Pointing at a subject in one figure shows it in all, and in the tables; pressing it opens its page.
+  const points = [...document.querySelectorAll(".strips .subject")];
+  const pointAt = (name) => {
+    document.querySelectorAll(".strips").forEach((strips) => strips.classList.toggle("pointing", name !== undefined));
+    points.forEach((point) => point.classList.toggle("pointed", point.dataset.of === name));
+    document.querySelectorAll("tr[data-subject]").forEach((row) => row.classList.toggle("pointed", row.dataset.subject === name));
+  };
+  for (const row of document.querySelectorAll("tr[data-subject]")) {
+    for (const on of ["mouseenter", "focusin"]) row.addEventListener(on, () => pointAt(row.dataset.subject));
+    for (const off of ["mouseleave", "focusout"]) row.addEventListener(off, () => pointAt(undefined));
+  }
+  for (const point of points) {
+    point.addEventListener("mouseenter", () => pointAt(point.dataset.of));
+    point.addEventListener("mouseleave", () => pointAt(undefined));
+    if (point.dataset.page) point.addEventListener("click", () => { location.href = point.dataset.page; });
+  }
   const [text, verdict, apart, said] = ["text", "verdict", "apart", "said"].map((name) => document.getElementById(`filter-${name}`));
   const filter = () => {
     const words = text.value.trim().toLowerCase();
@@ -50,6 +66,7 @@
       row.hidden = !fits;
       if (fits) shown.add(row.dataset.subject);
     }
+    for (const point of points) point.classList.toggle("filtered", !shown.has(point.dataset.of));
     said.textContent = `${shown.size} of ${has.size} subjects`;
   };
   for (const control of [text, verdict, apart]) control.addEventListener("input", filter);

@@ -3,7 +3,7 @@
 use super::axis::{Axis, frame, open};
 use super::series_colour::SERIES_COLOURS;
 use crate::report::colour::{ColourScale, hex};
-use crate::report::html::number;
+use crate::report::html::{count as rounded, number};
 use std::fmt::Write;
 
 /// Counts of the finite values in `bins` equal parts of their range from `low` to `high`; the last part holds `high`.
@@ -39,10 +39,11 @@ pub fn histogram(values: &[f64], x_label: &str, y_label: &str, scale: Option<&Co
         let _ = write!(
             svg,
             "<rect x=\"{:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{colour}\" \
-             stroke=\"currentColor\" stroke-opacity=\".4\" stroke-width=\".6\"><title>{count}</title></rect>",
+             stroke=\"currentColor\" stroke-opacity=\".4\" stroke-width=\".6\"><title>{}</title></rect>",
             edge(n),
             edge(n + 1) - edge(n),
-            y_axis.pixels[0] - y
+            y_axis.pixels[0] - y,
+            rounded(count)
         );
     }
     svg + "</svg>"

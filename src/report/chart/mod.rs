@@ -9,7 +9,7 @@ mod joint;
 mod line;
 mod series_colour;
 #[cfg(test)]
-mod svg_check;
+pub(super) mod svg_check;
 
 pub(super) use axis::{Axis, frame, open};
 pub use colour_bar::colour_bar;

@@ -1,7 +1,7 @@
 //! What the tests of every chart ask of its SVG.
 
 /// Panics unless the text is well-formed XML.
-pub(super) fn well_formed(svg: &str) {
+pub(in crate::report) fn well_formed(svg: &str) {
     let mut reader = quick_xml::Reader::from_str(svg);
     loop {
         match reader.read_event().unwrap() {

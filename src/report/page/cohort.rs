@@ -4,6 +4,7 @@ use super::super::change_chart::{Change, ChangeChart, ChangePanel, Middle};
 use super::super::cohort::{Cohort, Pupil, Row, Status};
 use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
+use super::super::strip_chart::{StripChart, StripPoint};
 use super::results::{figures, set_name};
 use super::{Frame, Section, notice};
 use maud::{Markup, PreEscaped, html};
@@ -24,6 +25,7 @@ impl Cohort {
             ("subjects", "Subjects", Some(self.subjects_section())),
             ("errors", "What deformation explains", self.errors_section()),
             ("samples", "Samples over the subjects", self.samples_section()),
+            ("distributions", "Distribution of every figure", self.distributions_section()),
             ("figures", "Figures", Some(self.figures_section())),
             ("population", "What the cohort says of people", self.population_section()),
         ];
@@ -170,6 +172,32 @@ impl Cohort {
         }
     }
 
+    /// A strip for every figure in which subjects differ.
+    fn distributions_section(&self) -> Option<Markup> {
+        let strip = |column: &String| {
+            let point = |row: &Row| {
+                Some(StripPoint {
+                    name: row.participant_id.clone(),
+                    value: *row.figures.get(column)?,
+                    apart: row.outlying.contains(column),
+                    page: row.status.has_page().then(|| page_of(row)),
+                })
+            };
+            StripChart { name: words(column), points: self.subjects.iter().filter_map(point).collect() }.to_svg()
+        };
+        let strips: Vec<String> = self.columns.iter().filter_map(strip).collect();
+        (!strips.is_empty()).then(|| {
+            html! {
+                p {
+                    "A point for each subject; the box holds the middle half of them, its line is the median (from five subjects \
+                     on), a triangle lies apart. Point at one to find its subject in every figure, press it for the subject's \
+                     page; the filters above hold here, too."
+                } "\n"
+                div class="strips" { @for svg in &strips { (PreEscaped(svg)) "\n" } }
+            }
+        })
+    }
+
     /// All numbers of all subjects.
     fn figures_section(&self) -> Markup {
         let mut head = vec!["subject".to_owned()];
@@ -223,7 +251,11 @@ fn apart(row: &Row) -> &'static str {
 /// The subject's name, and the way to its page where it has one.
 fn linked(row: &Row) -> Markup {
     let name = &row.participant_id;
-    html! { @if row.status.has_page() { a href={ (name) ".html" } { (name) } } @else { (name) } }
+    html! { @if row.status.has_page() { a href=(page_of(row)) { (name) } } @else { (name) } }
+}
+
+fn page_of(row: &Row) -> String {
+    format!("{}.html", row.participant_id)
 }
 
 /// A table whose rows the page's script can sort and hide.

@@ -8,9 +8,14 @@ use crate::experiment::estimate::{EstimateOutcome, Knowledge};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-/// The section's body; with the models that were tried, where there were several, and with the moduli (Pa) that went into a
-/// reference.
-pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>, truth: &BTreeMap<String, f64>) -> Markup {
+/// The section's body; with the models that were tried, where there were several, with the moduli (Pa) that went into a
+/// reference, and with pictures of what is left of what was seen.
+pub fn section(
+    estimate: &EstimateOutcome,
+    models: Option<&Comparison>,
+    truth: &BTreeMap<String, f64>,
+    residuals: Option<Markup>,
+) -> Markup {
     let claimed = estimate.verdict.finding.has_stiffness();
     let posterior = &estimate.posterior;
     let head = ["Parameter", "Most probable", "95 % interval", "Prior 95 %", "What the data say"].map(str::to_owned);
@@ -51,6 +56,17 @@ pub fn section(estimate: &EstimateOutcome, models: Option<&Comparison>, truth: &
             (number(estimate.independent_observations, 3)) " of them independent), each known to "
             (number(estimate.noise_mm, 3)) " mm. " (estimate.solves) " equilibria and " (estimate.tangent_solves)
             " tangent solves."
+        }
+        @if let Some(residuals) = residuals {
+            div class="residuals" {
+                h3 { "Where the model and what was seen differ" }
+                p {
+                    "The body seen through. A square for each node that the estimate was held against, in the colour of what the \
+                     model leaves of its displacement, paler the farther away; lines lead from some of them along it, ten times \
+                     as far. What points one way over a whole region speaks of a load or a support that the model has not."
+                }
+                (residuals)
+            }
         }
         @if let Some(taken_out) = estimate.taken_out_rms_mm {
             p {

@@ -4,6 +4,7 @@ mod brain_shift;
 mod cohort;
 mod estimate;
 mod evaluation;
+mod files;
 mod glance;
 mod methods;
 mod parts;
@@ -22,6 +23,7 @@ use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
 use super::glance_figure::GlanceFigure;
 use super::html::{png_address, without_control_characters};
+use super::listing::Listed;
 use super::viewer::Viewer;
 use crate::experiment::field::BrainShift;
 use crate::experiment::landmarks::Evaluation;
@@ -103,6 +105,8 @@ pub struct CasePage {
     pub glance: Option<GlanceFigure>,
     /// The brain shift on a slice.
     pub shift_figure: Option<ShiftFigure>,
+    /// What an estimate leaves of what it was held against.
+    pub residual_figure: Option<ShiftFigure>,
     /// Landmarks against it.
     pub landmarks: Option<Evaluation>,
     /// Before and after registration.
@@ -123,6 +127,8 @@ pub struct CasePage {
     pub settings_toml: Option<String>,
     /// Where everything came from.
     pub provenance_json: Option<String>,
+    /// The files of the case, to link to.
+    pub files: Vec<Listed>,
 }
 
 /// The policy that makes a browser refuse every request to another place.
@@ -264,7 +270,9 @@ impl CasePage {
             "estimate",
             "Estimate",
             outcome.and_then(|o| {
-                Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref(), &o.reference_shear_modulus_pa))
+                let residuals = self.residual_figure.as_ref().map(shift_pictures);
+                let truth = &o.reference_shear_modulus_pa;
+                Some(estimate::section(o.estimate.as_ref()?, o.comparison.as_ref(), truth, residuals))
             }),
         );
         add("error", "Error per node", self.error_map.as_ref().map(error_section));
@@ -273,7 +281,7 @@ impl CasePage {
         add("view", heading, self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));
         add("methods", "Methods", outcome.map(methods::section));
-        add("provenance", "Settings and provenance", self.provenance_section());
+        add("provenance", "Files and settings", self.provenance_section());
         add("rating", "Your rating", Some(parts::rating()));
         sections
     }
@@ -329,8 +337,9 @@ impl CasePage {
 
     fn provenance_section(&self) -> Option<Markup> {
         let blocks = [("Settings", &self.settings_toml), ("Provenance", &self.provenance_json)];
-        blocks.iter().any(|(_, text)| text.is_some()).then(|| {
+        (!self.files.is_empty() || blocks.iter().any(|(_, text)| text.is_some())).then(|| {
             html! {
+                @if !self.files.is_empty() { (files::section(&self.files)) }
                 @for (name, text) in blocks {
                     @if let Some(text) = text {
                         details { summary { (name) } pre tabindex="0" aria-label=(name) { (text) } } "\n"

@@ -267,11 +267,11 @@ fn boundary_sets(outcome: &ExperimentOutcome) -> Option<Markup> {
 
 fn dihedral_chart(counts: &[usize]) -> String {
     let width = 180.0 / counts.len() as f64;
-    let points = counts.iter().enumerate().map(|(n, &count)| DataPoint {
+    let points = counts.iter().enumerate().map(|(n, &angles)| DataPoint {
         x: (n as f64 + 0.5) * width,
-        y: count as f64,
+        y: angles as f64,
         y_error: None,
-        note: format!("{:.0} to {:.0}°: {count}", n as f64 * width, (n + 1) as f64 * width),
+        note: format!("{:.0} to {:.0}°: {}", n as f64 * width, (n + 1) as f64 * width, count(angles)),
         chosen: false,
     });
     let chart = LineChart {

@@ -4,8 +4,8 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, Turn, Unknown,
-    moved_by, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, SEEN_AT,
+    SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
@@ -30,10 +30,6 @@ const VERSION: u32 = 14;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
-/// Array of a state: what the images showed of a node, the registration's own error taken out, mm; zero elsewhere.
-pub(super) const SEEN_DISPLACEMENT: &str = "seen_displacement";
-/// Array of a state: the nodes that the estimate was held against.
-pub(super) const SEEN_AT: &str = "seen";
 /// Name of the estimate among the samples.
 const ESTIMATE: &str = "estimate";
 

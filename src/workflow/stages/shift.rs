@@ -1,8 +1,7 @@
 //! The brain shift of a case in any of its states, from what its folder holds.
 
-use super::estimate::{SEEN_AT, SEEN_DISPLACEMENT};
 use super::registration::transforms;
-use crate::experiment::estimate::{CorrelatedErrors, MovedNode, moved_by};
+use crate::experiment::estimate::{CorrelatedErrors, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
     BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, depth_mm, explained,
     fused, shift_field,
