@@ -1,6 +1,6 @@
 //! `hgm estimate`: the moduli that explain what was observed, with error bars.
 
-use super::flags::{Flags, PopulationOption};
+use super::flags::{Flags, PopulationOption, PriorModelOption};
 use super::run::in_words;
 use super::{Failure, Session};
 use crate::workflow::{self, Subject};
@@ -17,6 +17,8 @@ pub struct Args {
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
     #[command(flatten)]
+    model: PriorModelOption,
+    #[command(flatten)]
     population: PopulationOption,
 }
 
@@ -25,6 +27,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for room in ["resection", "phantom"] {
         flags.set(&format!("{room}.tissues"), args.tissues);
     }
+    args.model.over(&mut flags);
     args.population.over(&mut flags)?;
     let settings = session.settings_of(&args.case, flags)?;
     let case = workflow::estimate(&session.place(&args.case), &settings, &mut session.listener())?;

@@ -3,6 +3,7 @@
 use super::Failure;
 use crate::experiment::population::PopulationPrior;
 use crate::material::StudyKind;
+use crate::material::generative::GenerativeModel;
 use crate::material::meta_model::MetaModel;
 use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
 use crate::segment::label;
@@ -111,9 +112,27 @@ fn engine(name: &str) -> Result<Engine, String> {
         .ok_or_else(|| format!("no engine `{name}`: say {} (`hgm doctor` tells which are installed)", Engine::names()))
 }
 
+/// The generative model behind a prior.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct PriorModelOption {
+    /// What the prior is made of: the paper's Gaussian process, or what the spread between studies and people leaves to expect of a
+    /// person (study-level) [default: published]
+    #[arg(long, help_heading = MATERIAL, value_name = "published|study-level")]
+    model: Option<GenerativeModel>,
+}
+
+impl PriorModelOption {
+    /// What it sets.
+    pub fn over(&self, flags: &mut Flags) {
+        flags.set("prior.model", self.model);
+    }
+}
+
 /// The prior.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct PriorOptions {
+    #[command(flatten)]
+    model: PriorModelOption,
     /// Whose studies the samples come from: mre, linear or hyperelastic [default: hyperelastic]
     #[arg(long, help_heading = MATERIAL, value_name = "KIND")]
     study: Option<StudyKind>,
@@ -124,6 +143,7 @@ pub struct PriorOptions {
 impl PriorOptions {
     /// What they set.
     pub fn over(&self, flags: &mut Flags) {
+        self.model.over(flags);
         flags.set("prior.study", self.study);
         flags.set("prior.law", self.law);
     }
@@ -163,6 +183,25 @@ impl PopulationOption {
     }
 }
 
+/// Samples of one task or of all.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct TaskOption {
+    /// Nine samples of every task of the generative model (elastography, linear, hyperelastic; grey, white, healthy brain;
+    /// abnormal tissue where there is a lesion) instead of one task's; one tissue only. `--every-task=false`: one task's again
+    #[arg(
+        long, help_heading = MATERIAL, value_name = "true|false", num_args = 0..=1, require_equals = true,
+        default_missing_value = "true", conflicts_with = "study"
+    )]
+    every_task: Option<bool>,
+}
+
+impl TaskOption {
+    /// What it sets.
+    pub fn over(&self, flags: &mut Flags) {
+        flags.set("resection.every_task", self.every_task);
+    }
+}
+
 /// What is asked of a prepared patient.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct AnalysisOptions {
@@ -173,8 +212,10 @@ pub struct AnalysisOptions {
     pub prior: PriorOptions,
     /// Estimate the moduli with their intervals instead of trying the prior's samples; on 160,000 tetrahedra unless
     /// --cells or --edge-mm says otherwise
-    #[arg(long, help_heading = MATERIAL)]
+    #[arg(long, help_heading = MATERIAL, conflicts_with = "every_task")]
     pub estimate: bool,
+    #[command(flatten)]
+    pub tasks: TaskOption,
     #[command(flatten)]
     pub population: PopulationOption,
 }
@@ -183,6 +224,7 @@ impl AnalysisOptions {
     /// What they set.
     pub fn over(&self, flags: &mut Flags) {
         flags.set("resection.tissues", self.tissues);
+        self.tasks.over(flags);
         self.prior.over(flags);
     }
 
@@ -270,7 +312,7 @@ mod tests {
             "[mesh]\nengine = \"gmsh\"\n[mesh.size]\nedge_mm = 3.0\n[prior]\npublished = true\n".parse().unwrap();
         let mut flags = Flags::default();
         MeshOptions { cells: Some(8000), ..MeshOptions::default() }.over(&mut flags);
-        PriorOptions { law: Some(MetaModel::OGDEN), study: None }.over(&mut flags);
+        PriorOptions { law: Some(MetaModel::OGDEN), ..PriorOptions::default() }.over(&mut flags);
         let settings = Settings::resolve([&file, &flags.0]).unwrap();
         assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::GMSH, MeshSize::Cells(8000)));
         assert!(settings.prior.published && settings.prior.law == MetaModel::OGDEN);

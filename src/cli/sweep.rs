@@ -1,6 +1,6 @@
 //! `hgm sweep`: the prior's samples on a prepared case, all of them or a part.
 
-use super::flags::{Flags, PriorOptions};
+use super::flags::{Flags, PriorOptions, TaskOption};
 use super::run::in_words;
 use super::{Failure, Session};
 use crate::workflow::{self, Shard};
@@ -17,6 +17,8 @@ pub struct Args {
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
     #[command(flatten)]
+    tasks: TaskOption,
+    #[command(flatten)]
     prior: PriorOptions,
     /// Only every N-th sample, beginning with the K-th (from 1); any order, any machine, the same bytes
     #[arg(long, value_name = "K/N")]
@@ -26,6 +28,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut flags = Flags::default();
     flags.set("resection.tissues", args.tissues);
+    args.tasks.over(&mut flags);
     args.prior.over(&mut flags);
     let settings = session.settings_of(&args.case, flags)?;
     let case = workflow::sweep(args.shard, &session.place(&args.case), &settings, &mut session.listener())?;

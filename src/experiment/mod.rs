@@ -8,6 +8,7 @@ mod law_outcome;
 pub mod nodal_field;
 pub mod observed;
 pub mod outcome;
+mod person_prior;
 pub mod phantom;
 pub mod population;
 pub mod predict;

@@ -1,15 +1,17 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
 use super::estimate::{LogPrior, Scale, Unknown};
+use super::person_prior::person_prior;
 use super::population::PopulationPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{
-    SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
+    GenerativeModel, SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
 };
 use crate::material::gp::Spread;
 use crate::material::literature::{Curves, LiteratureModel, table};
 use crate::material::meta_model::{FitError, MetaModel, MetaModelSettings};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry};
+use crate::material::study_level::{self, drawn_materials, materials_at_levels};
 use crate::material::{Region, StudyKind, Task};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,6 +23,8 @@ use thiserror::Error;
 pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
     pub published: bool,
+    /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person.
+    pub model: GenerativeModel,
     /// Whose studies: elastography, linear elasticity or hyperelastic tests.
     pub study: StudyKind,
     /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
@@ -34,7 +38,13 @@ pub struct PriorSettings {
 
 impl Default for PriorSettings {
     fn default() -> Self {
-        Self { published: false, study: StudyKind::Hyperelastic, law: MetaModel::NEO_HOOKEAN, population: None }
+        Self {
+            published: false,
+            model: GenerativeModel::Published,
+            study: StudyKind::Hyperelastic,
+            law: MetaModel::NEO_HOOKEAN,
+            population: None,
+        }
     }
 }
 
@@ -76,6 +86,9 @@ pub enum PriorError {
         /// Why.
         source: FitError,
     },
+    /// The study-level model of the embedded studies could not be fitted.
+    #[error("the study-level model gives no prior: {0}")]
+    StudyLevel(#[from] study_level::FitError),
     /// No level.
     #[error(
         "setting `sd_levels` of the table [resection] (of a phantom: [phantom]) is empty: give at least one level, \
@@ -115,8 +128,14 @@ fn materials_of_task(
     }
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: prior.law, ..settings };
-    sample_shear_moduli(task, levels, &settings)
-        .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
+    let materials = match prior.model {
+        GenerativeModel::Published => sample_shear_moduli(task, levels, &settings),
+        GenerativeModel::StudyLevel => {
+            let person = person_prior(task, settings.curves, DRAWN_STRETCHES)?;
+            materials_at_levels(&person, levels, &settings)
+        }
+    };
+    materials.map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
 }
 
 /// The material of a tissue that is not varied: the mean of its prior. A lesion is too small a part of what moves for two
@@ -150,23 +169,33 @@ pub fn samples_of_prior(
 }
 
 /// The whole brain as one material of every task that is not of abnormal tissue, at each level: the curves of the paper's
-/// Fig. 4.
+/// Fig. 4. Where the body has `lesions` (names of labels that are not varied otherwise), also those of every task of abnormal
+/// tissue, at each level alike, in a brain at the mean of the healthy task of the same kind of study.
 ///
 /// # Errors
 /// [`PriorError`].
 pub fn samples_of_every_task(
+    lesions: &[String],
     sd_levels: &[f64],
     poisson_ratio: f64,
     prior: &PriorSettings,
 ) -> Result<Vec<Sample>, PriorError> {
     let brain = Tissue::whole_brain().remove(0);
     let mut samples = Vec::new();
-    for task in Task::all().filter(|task| task.region != Region::Abnormal) {
+    for task in Task::all().filter(|task| task.region != Region::Abnormal || !lesions.is_empty()) {
         let list = materials_of_task(&brain, task, sd_levels, prior)?;
         let levels = list.iter().map(|m| tissue_sample(m, poisson_ratio)).collect();
         for mut sample in every_combination(&[(brain.clone(), levels)]) {
             sample.id = sample.id.replace("sample", &task.to_string());
             sample.task = Some(task);
+            if task.region == Region::Abnormal {
+                let healthy = Task { region: Region::Healthy, ..task };
+                let mean = materials_of_task(&brain, healthy, &[0.0], prior)?.remove(0);
+                let around = tissue_sample(&mean, poisson_ratio);
+                if let Some(lesion) = sample.tissues.insert(brain.name.clone(), around) {
+                    sample.tissues.extend(lesions.iter().map(|name| (name.clone(), lesion.clone())));
+                }
+            }
             samples.push(sample);
         }
     }
@@ -204,7 +233,7 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and the exponent of
 /// Ogden's law or the share of C1 of Mooney and Rivlin's. The modulus' mean and spread, and its correlation with an exponent,
 /// are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
-/// report). Those curves share their shape far more than studies do, so an exponent's mean and spread are those of the
+/// report) or, of the study-level model, of persons nobody has measured. Those curves share their shape far more than studies do, so an exponent's mean and spread are those of the
 /// published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
 /// as another. What a cohort has taught takes the place of mean and spread.
@@ -225,9 +254,16 @@ fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unkn
     let law = if prior.law == MetaModel::OGDEN { MetaModel::OGDEN_HIGH } else { prior.law };
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..settings };
-    let joint = joint_tissue_prior(task_of(tissue, prior.study)?, &table(), &settings);
-    let draws = draw_materials(&joint, DRAWS, 0, Spread::Study, &settings)
-        .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })?;
+    let task = task_of(tissue, prior.study)?;
+    let draws = match prior.model {
+        GenerativeModel::Published => {
+            draw_materials(&joint_tissue_prior(task, &table(), &settings), DRAWS, 0, Spread::Study, &settings)
+        }
+        GenerativeModel::StudyLevel => {
+            drawn_materials(&person_prior(task, settings.curves, DRAWN_STRETCHES)?, DRAWS, 0, &settings)
+        }
+    };
+    let draws = draws.map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })?;
     let moduli: Vec<f64> = draws.iter().map(|d| d.shear_modulus_pa.ln()).collect();
     let (mean, sd) = mean_and_sd(&moduli);
     let shape = Unknown::Shape(tissue.clone(), law);
@@ -287,7 +323,7 @@ mod tests {
     #[test]
     fn every_healthy_task_has_its_nine_samples_under_its_own_name() {
         let levels = crate::material::generative::nine_levels();
-        let samples = samples_of_every_task(&levels, 0.45, &PriorSettings::default()).unwrap();
+        let samples = samples_of_every_task(&[], &levels, 0.45, &PriorSettings::default()).unwrap();
         assert_eq!(samples.len(), 81);
         let ids: std::collections::BTreeSet<_> = samples.iter().map(|s| s.id.as_str()).collect();
         assert_eq!(ids.len(), 81);
@@ -298,6 +334,46 @@ mod tests {
         let healthy = samples_of_prior(&Tissue::whole_brain(), &levels, 0.45, &PriorSettings::default()).unwrap();
         let moduli = |list: Vec<&Sample>| list.iter().map(|s| s.tissues["brain"].shear_modulus_pa).collect::<Vec<_>>();
         assert_eq!(moduli(of("hyperelastic-healthy-")), moduli(healthy.iter().collect()));
+    }
+
+    #[test]
+    fn tasks_of_abnormal_tissue_vary_the_lesions_alike_and_hold_the_brain_at_its_own_mean() {
+        let (prior, lesions) = (PriorSettings::default(), ["oedema", "tumour"].map(str::to_owned));
+        let levels = [-1.0, 0.0, 1.0];
+        let samples = samples_of_every_task(&lesions, &levels, 0.45, &prior).unwrap();
+        assert_eq!(samples.len(), 36);
+        for kind in StudyKind::ALL {
+            let of = |region: Region| {
+                let task = Task { kind, region };
+                samples.iter().filter(|s| s.task == Some(task)).collect::<Vec<_>>()
+            };
+            let (abnormal, healthy) = (of(Region::Abnormal), of(Region::Healthy));
+            let task = Task { kind, region: Region::Abnormal };
+            let known = sample_shear_moduli(task, &levels, &SampleSettings::default()).unwrap();
+            for (sample, known) in abnormal.iter().zip(&known) {
+                let modulus = |tissue: &str| sample.tissues[tissue].shear_modulus_pa;
+                assert_eq!([modulus("oedema"), modulus("tumour")], [known.shear_modulus_pa; 2], "{}", sample.id);
+                assert_eq!(modulus("brain"), healthy[1].tissues["brain"].shear_modulus_pa, "{}", sample.id);
+            }
+            assert!(healthy.iter().all(|s| s.tissues.len() == 1));
+        }
+    }
+
+    #[test]
+    fn the_study_level_prior_is_that_of_a_person_and_wider_than_the_papers() {
+        let tissue = Tissue::whole_brain().remove(0);
+        let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
+        let [papers, own] = [&PriorSettings::default(), &person].map(|prior| log_prior(&tissue, prior).unwrap());
+        assert!(own.sd.unwrap() > 1.5 * papers.sd.unwrap(), "{own:?} beside {papers:?}");
+        // The law fitted to ln g at the mean has about the modulus that ln g has at rest.
+        let task = task_of(&tissue, StudyKind::Hyperelastic).unwrap();
+        let known = person_prior(task, Curves::Corrected, DRAWN_STRETCHES).unwrap();
+        let at_rest = (0..DRAWN_STRETCHES)
+            .min_by(|a, b| (known.stretches[*a] - 1.0).abs().total_cmp(&(known.stretches[*b] - 1.0).abs()));
+        let (mean, sd) = (known.mean[at_rest.unwrap()], known.sd[at_rest.unwrap()]);
+        assert!((own.mean - mean).abs() < 0.5 * sd, "{} beside {mean} +- {sd}", own.mean);
+        let two = law_priors(&tissue, &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
+        assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));
     }
 
     #[test]

@@ -114,6 +114,9 @@ pub struct ResectionSettings {
     pub poisson_ratio: f64,
     /// Levels of the prior that are tried, in standard deviations.
     pub sd_levels: Vec<f64>,
+    /// Samples of every task of the generative model (elastography, linear, hyperelastic; grey, white, healthy brain; abnormal
+    /// tissue where there is a lesion) instead of one task's; with one tissue only.
+    pub every_task: bool,
     /// Node sets held still.
     pub fixed: Vec<String>,
     /// How the skull holds the brain.
@@ -142,6 +145,7 @@ impl Default for ResectionSettings {
             pressure: Vec::new(),
             poisson_ratio: 0.45,
             sd_levels: vec![-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0],
+            every_task: false,
             fixed: vec!["base".to_owned(), "falx".to_owned()],
             supports: Supports::Evidence,
             falx: Support::Fixed,

@@ -87,7 +87,8 @@ impl Reference {
     }
 }
 
-/// The scenario `template` with the sample's materials; tissues that are not varied keep those of the template.
+/// The scenario `template` with the sample's materials; tissues that are not varied keep those of the template, unless the
+/// sample has one of that name (a lesion's).
 ///
 /// # Errors
 /// [`SweepError::Law`] when a tissue has no material or a label no name.
@@ -101,6 +102,13 @@ pub fn scenario_of(template: &Scenario, tissues: &[Tissue], sample: &Sample) -> 
             let name = template.label_name(label).ok_or_else(|| refuse(format!("label {label} has no name")))?;
             scenario.materials.insert(name.to_owned(), material.clone());
         }
+    }
+    for (name, own) in sample.tissues.iter().filter(|(name, _)| tissues.iter().all(|tissue| tissue.name != **name)) {
+        let Some(material) = scenario.materials.get_mut(name) else {
+            let reason = "the body has no such tissue".to_owned();
+            return Err(SweepError::Law { id: sample.id.clone(), tissue: name.clone(), reason });
+        };
+        material.clone_from(&own.material);
     }
     Ok(scenario)
 }

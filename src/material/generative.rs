@@ -15,7 +15,8 @@ use super::meta_model::{Fit, FitError, MetaModel, MetaModelSettings, Search, fit
 use super::task::{Task, stretches};
 use super::training::TrainingData;
 use rayon::prelude::*;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// How samples are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +51,28 @@ impl SampleSettings {
     pub fn published() -> Self {
         let meta_model = MetaModelSettings { search: Search::Published, ..MetaModelSettings::default() };
         Self { curves: Curves::Published, meta_model, ..Self::default() }
+    }
+}
+
+/// Which generative model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GenerativeModel {
+    /// The Gaussian process of the paper: studies are noise about one function a task.
+    #[default]
+    Published,
+    /// Studies differ from one another, and curves within them: what is expected of a person nobody has measured.
+    StudyLevel,
+}
+
+impl std::str::FromStr for GenerativeModel {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "published" => Ok(Self::Published),
+            "study-level" => Ok(Self::StudyLevel),
+            _ => Err("say published or study-level".to_owned()),
+        }
     }
 }
 

@@ -9,6 +9,7 @@ pub mod literature;
 pub mod meta_model;
 pub mod published;
 pub mod random;
+pub mod rank_test;
 pub mod rheometry;
 pub mod statistics;
 pub mod study_level;

@@ -2,6 +2,7 @@
 
 pub use super::cohort_population::{CohortPopulation, Pupil};
 
+use super::cohort_tasks::{TaskRanks, compare_tasks};
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
@@ -84,6 +85,9 @@ pub struct Cohort {
     pub mad: BTreeMap<String, f64>,
     /// Every sample over the subjects, where all were run with the same ones.
     pub median_samples: Vec<MedianSample>,
+    /// Tasks of the generative model against each other, where enough subjects were run with every one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<TaskRanks>,
     /// What a reader must know before comparing the subjects.
     pub warnings: Vec<String>,
     /// What the subjects say of people, where they were estimated.
@@ -133,9 +137,19 @@ impl Cohort {
             ));
         }
         let outcomes: Vec<&ExperimentOutcome> = members.iter().filter_map(|m| m.outcome.as_ref()).collect();
-        let median_samples = median_samples(&outcomes);
+        let (median_samples, tasks) = (median_samples(&outcomes), compare_tasks(&outcomes));
         let program = concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned();
-        Self { program, columns, subjects, median: median_of, mad: mad_of, median_samples, warnings, population: None }
+        Self {
+            program,
+            columns,
+            subjects,
+            median: median_of,
+            mad: mad_of,
+            median_samples,
+            tasks,
+            warnings,
+            population: None,
+        }
     }
 
     /// The table as BIDS writes one: tabs, `n/a` where there is no value, a line for each subject and no other.

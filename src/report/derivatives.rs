@@ -156,6 +156,7 @@ sub-X/ses-*/anat          images, labels and masks; dseg.tsv names the labels
 sub-X/hgm                 the subject's case folder: meshes, simulations, transforms, settings, checksums
 logs/sub-X.json           why a subject could not be done (absent when it could)
 group.json, group.tsv     a line of figures per subject, with median and median absolute deviation
+group.tasks.tsv           tasks of the generative model by ranks (absent with fewer than five subjects of every task)
 
 space-MNI152NLin2009aSym is reached by a rigid motion: sizes stay the patient's. Lengths are mm, RAS+; moduli Pa.
 Research software, not a medical device.

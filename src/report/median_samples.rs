@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 pub struct MedianSample {
     /// Name of the sample: `sample-05`.
     pub id: String,
+    /// Its task, where several are compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
     /// How many standard deviations of the prior each tissue lies from its mean.
     pub sd_levels: BTreeMap<String, f64>,
     /// Shear modulus at rest per tissue, Pa.
@@ -41,6 +44,7 @@ fn median_sample(of_subjects: &[&SampleOutcome]) -> MedianSample {
     let first = of_subjects[0];
     let mut sample = MedianSample {
         id: first.id.clone(),
+        task: first.task.clone(),
         sd_levels: first.sd_levels.clone(),
         shear_modulus_pa: first.shear_modulus_pa.clone(),
         subjects: of_subjects.iter().filter(|s| s.converged).count(),
@@ -64,6 +68,7 @@ fn median_sample(of_subjects: &[&SampleOutcome]) -> MedianSample {
 pub fn as_outcome(samples: &[MedianSample], tissues: &[String]) -> ExperimentOutcome {
     let one = |s: &MedianSample| SampleOutcome {
         id: s.id.clone(),
+        task: s.task.clone(),
         sd_levels: s.sd_levels.clone(),
         shear_modulus_pa: s.shear_modulus_pa.clone(),
         rmse_mm: s.median_rmse_mm.clone(),

@@ -7,6 +7,7 @@ pub mod change_chart;
 pub mod chart;
 pub mod cohort;
 pub mod cohort_population;
+pub mod cohort_tasks;
 pub mod colour;
 pub mod decimation;
 pub mod derivatives;

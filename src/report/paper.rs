@@ -3,7 +3,7 @@
 use super::chart::{Axis, SERIES_COLOURS, frame};
 use super::html::{escape, fixed};
 use super::material_figure::{SMALL, document, path, title};
-use crate::material::statistics::RankTest;
+use crate::material::rank_test::RankTest;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 

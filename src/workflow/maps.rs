@@ -2,9 +2,10 @@
 
 use super::case::Case;
 use super::error::{CaseError, WorkflowError};
+use super::facts::MeshFacts;
 use super::settings::Settings;
-use super::stage_name::Subject;
-use super::stages::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, transforms};
+use super::stage_name::{StageName, Subject};
+use super::stages::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, lesions, transforms};
 use crate::experiment::field::{ShiftField, carried, inverse};
 use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
 use crate::image::nifti::{self, ReadOptions, decode_displacement};
@@ -206,7 +207,8 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     let settings = Settings::resolve([&case.settings()?])?;
     let own = !matches!(state, FUSED | OBSERVED);
     let model = if own { Some(state.to_owned()) } else { brain_shift(case)?.and_then(|shift| shift.model) };
-    let samples = super::plan::samples(&settings, Subject::Patient)?;
+    let (_, meshed): (_, MeshFacts) = case.stage(&StageName::Mesh)?;
+    let samples = super::plan::samples(&settings, Subject::Patient, &lesions(&meshed.mesh))?;
     let samples =
         samples.into_iter().map(|s| s.id).filter(|id| case.path(&crate::layout::SAMPLE_STATE.of(id)).exists());
     let believed = Believed::of(&settings);

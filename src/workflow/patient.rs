@@ -221,7 +221,7 @@ impl<'w, 'a> Patient<'w, 'a> {
 
     /// Simulates the samples of one part, or all of them, and nothing else.
     pub fn samples(&self, part: Option<Shard>, mode: SampleMode) -> Result<(), WorkflowError> {
-        let mut list = plan::samples(self.work.settings, self.work.subject)?;
+        let mut list = plan::samples(self.work.settings, self.work.subject, &self.lesions())?;
         if let Some(Shard { number, of }) = part {
             list = shard(&list, number, of);
         } else {
@@ -229,6 +229,11 @@ impl<'w, 'a> Patient<'w, 'a> {
         }
         let tissues = plan::tissues(self.work.settings, self.work.subject);
         stages::samples(self.work, &self.prepared.made, &self.posed(&tissues), &list, mode).map(|_| ())
+    }
+
+    /// Tissues that are not varied, by name.
+    fn lesions(&self) -> Vec<String> {
+        self.held.keys().cloned().collect()
     }
 
     fn posed<'s>(&'s self, tissues: &'s [Tissue]) -> Sweep<'s> {
@@ -297,8 +302,11 @@ impl<'w, 'a> Patient<'w, 'a> {
     pub fn gather(&self) -> Result<(), WorkflowError> {
         let Self { work, prepared, .. } = self;
         let tissues = plan::tissues(work.settings, work.subject);
-        let list = plan::samples(work.settings, work.subject)?;
-        let solved = stages::present_samples(work, &prepared.made, &self.posed(&tissues), &list)?;
+        let solved = match plan::samples(work.settings, work.subject, &self.lesions()) {
+            // Two tissues have been estimated where one was swept.
+            Err(WorkflowError::EveryTaskOfTwo) => None,
+            list => stages::present_samples(work, &prepared.made, &self.posed(&tissues), &list?)?,
+        };
         let mut outcome = self.posed_outcome();
         let mut manifests: Vec<Manifest> = Vec::new();
         if let Some(solved) = solved {

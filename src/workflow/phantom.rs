@@ -80,7 +80,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
 
     /// Simulates the samples.
     pub fn samples(&self) -> Result<(), WorkflowError> {
-        let list = plan::samples(self.work.settings, self.work.subject)?;
+        let list = plan::samples(self.work.settings, self.work.subject, &[])?;
         self.work.case.drop_samples_but(&list.iter().map(|sample| sample.id.as_str()).collect());
         stages::samples(self.work, &self.made, &self.posed(), &list, SampleMode::Run).map(|_| ())
     }
@@ -108,7 +108,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
     /// Outcome and page of what is there for the settings of this job.
     pub fn gather(&self) -> Result<(), WorkflowError> {
         let Self { work, made, .. } = self;
-        let list = plan::samples(work.settings, work.subject)?;
+        let list = plan::samples(work.settings, work.subject, &[])?;
         let solved = stages::present_samples(work, made, &self.posed(), &list)?.unwrap_or_default();
         let (samples, of_samples): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
         let mut outcome = self.outcome(samples, &of_samples, &list);

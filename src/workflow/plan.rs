@@ -32,11 +32,22 @@ pub struct Step {
     pub after: &'static [StageName],
 }
 
-/// The stages of a job, each after those it is made from.
+/// The stages of a job, each after those it is made from. Samples of lesions, which only a body that is there has, are not
+/// among them.
 ///
 /// # Errors
 /// A prior that does not exist.
 pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Step>, WorkflowError> {
+    plan_with(settings, subject, goal, &[])
+}
+
+/// The same of a body with lesions, by the names of their labels: they have samples of their own where every task is tried.
+pub(crate) fn plan_with(
+    settings: &Settings,
+    subject: Subject,
+    goal: Goal,
+    lesions: &[String],
+) -> Result<Vec<Step>, WorkflowError> {
     let mut stages = match subject {
         Subject::Patient => vec![StageName::Registration, StageName::Anat],
         Subject::Plan => vec![StageName::Pose, StageName::Plan],
@@ -56,7 +67,7 @@ pub fn plan(settings: &Settings, subject: Subject, goal: Goal) -> Result<Vec<Ste
     }
     match goal {
         Goal::Sweep => {
-            stages.extend(samples(settings, subject)?.into_iter().map(|sample| StageName::Sample(sample.id)));
+            stages.extend(samples(settings, subject, lesions)?.into_iter().map(|sample| StageName::Sample(sample.id)));
         }
         Goal::Estimate => stages.push(StageName::Estimate),
         Goal::Images | Goal::Mesh | Goal::Predict => {}
@@ -79,22 +90,26 @@ pub fn tissues(settings: &Settings, subject: Subject) -> Vec<Tissue> {
     }
 }
 
-/// The samples of a sweep, in order.
+/// The samples of a sweep, in order; `lesions` are the labels of the body, by name, that are not varied otherwise.
 ///
 /// # Errors
 /// A prior that does not exist, or samples of every task for two tissues.
-pub fn samples(settings: &Settings, subject: Subject) -> Result<Vec<Sample>, WorkflowError> {
+pub fn samples(settings: &Settings, subject: Subject, lesions: &[String]) -> Result<Vec<Sample>, WorkflowError> {
     let tissues = tissues(settings, subject);
-    let (levels, poisson_ratio) = match subject {
-        Subject::Patient | Subject::Plan => (&settings.resection.sd_levels, settings.resection.poisson_ratio),
-        Subject::Phantom { .. } => (&settings.phantom.sd_levels, settings.phantom.poisson_ratio),
-    };
-    let mut list = match subject {
-        Subject::Phantom { every_task: true } if settings.phantom.tissues != 1 => {
-            return Err(WorkflowError::EveryTaskOfTwo);
+    let (levels, poisson_ratio, every_task) = match subject {
+        Subject::Patient | Subject::Plan => {
+            let own = &settings.resection;
+            (&own.sd_levels, own.poisson_ratio, own.every_task && subject == Subject::Patient)
         }
-        Subject::Phantom { every_task: true } => samples_of_every_task(levels, poisson_ratio, &settings.prior)?,
-        _ => samples_of_prior(&tissues, levels, poisson_ratio, &settings.prior)?,
+        Subject::Phantom { every_task } => (&settings.phantom.sd_levels, settings.phantom.poisson_ratio, every_task),
+    };
+    if every_task && tissues.len() != 1 {
+        return Err(WorkflowError::EveryTaskOfTwo);
+    }
+    let mut list = if every_task {
+        samples_of_every_task(lesions, levels, poisson_ratio, &settings.prior)?
+    } else {
+        samples_of_prior(&tissues, levels, poisson_ratio, &settings.prior)?
     };
     if matches!(subject, Subject::Phantom { .. }) && settings.phantom.include_reference {
         list.push(settings.phantom.reference_sample());

@@ -4,7 +4,7 @@ use super::case::Case;
 use super::error::WorkflowError;
 use super::facts::MeshFacts;
 use super::inputs::ScanSums;
-use super::plan::{self, Goal, plan};
+use super::plan::{self, Goal, plan_with};
 use super::progress::Silent;
 use super::stage_name::{StageName, Subject};
 use super::stages;
@@ -69,7 +69,9 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
         return Ok(Vec::new());
     }
     let mut made = Made::default();
-    let steps = plan(work.settings, work.subject, asked.goal)?;
+    let meshed = work.case.stage::<MeshFacts>(&StageName::Mesh).ok();
+    let lesions = meshed.as_ref().map_or_else(Vec::new, |(_, meshed)| stages::lesions(&meshed.mesh));
+    let steps = plan_with(work.settings, work.subject, asked.goal, &lesions)?;
     for step in &steps {
         if let Some(manifest) = of_stage(&step.stage) {
             made.add(step.stage.clone(), manifest);
@@ -87,11 +89,12 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     if resection.needs_labels() {
         scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.labels)?;
     }
-    if let Ok((_, mesh)) = work.case.stage::<MeshFacts>(&StageName::Mesh) {
+    if let Some((_, mesh)) = &meshed {
         (scenario, _) = stages::with_held_tissues(work, &mesh.mesh, scenario)?;
     }
     let tissues = plan::tissues(work.settings, work.subject);
-    let samples = if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject)? } else { Vec::new() };
+    let samples =
+        if asked.goal == Goal::Sweep { plan::samples(work.settings, work.subject, &lesions)? } else { Vec::new() };
     let pose = |step: &plan::Step| -> Option<Stage> {
         match &step.stage {
             StageName::Registration => {

@@ -36,6 +36,7 @@ mod settings;
 mod simulate;
 mod slicer_files;
 mod stale;
+mod tasks;
 mod template_fit;
 mod transform_files;
 mod verdicts;

@@ -4,6 +4,7 @@ use super::options::Args;
 use crate::artefact::write_whole;
 use crate::cli::{Failure, Session};
 use crate::report::cohort::{Cohort, Member};
+use crate::report::cohort_tasks;
 use crate::workflow::cohort::{Dataset, POPULATION, learn, member};
 use anyhow::anyhow;
 
@@ -36,6 +37,12 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
     let page = args.out.join("group.html");
     for (file, text) in [("group.json", json), ("group.tsv", cohort.to_tsv()), ("group.html", cohort.to_html())] {
         write_whole(&args.out.join(file), text.as_bytes())?;
+    }
+    let tasks = args.out.join("group.tasks.tsv");
+    if cohort.tasks.is_empty() {
+        std::fs::remove_file(&tasks).ok();
+    } else {
+        write_whole(&tasks, cohort_tasks::to_tsv(&cohort.tasks).as_bytes())?;
     }
     session.emit(&cohort, &format!("{}\n{said}{}", cohort.to_tsv(), page.display()))
 }

@@ -1,8 +1,9 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
-use super::options::{Model, ModelOption, StudyOptions, only_with};
+use super::options::{ModelOption, StudyOptions, only_with};
 use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
+use crate::material::generative::GenerativeModel;
 use crate::workflow::{fit_gp, fit_study_level};
 use serde_json::json;
 use std::path::PathBuf;
@@ -31,7 +32,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.model.get() == Model::StudyLevel {
+    if args.model.get() == GenerativeModel::StudyLevel {
         return study_level(args, session);
     }
     let mut flags = Flags::default();

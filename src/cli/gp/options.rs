@@ -1,6 +1,7 @@
 //! Options of every command on the generative model.
 
 use crate::cli::Failure;
+use crate::material::generative::GenerativeModel;
 use crate::material::gp::Hyperparameters;
 use crate::material::literature::Curves;
 use crate::material::study_level::StudyLevelFile;
@@ -19,38 +20,17 @@ pub struct StudyOptions {
     pub published: bool,
 }
 
-/// Which generative model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Model {
-    /// The Gaussian process of the paper: studies are noise about one function a task.
-    #[default]
-    Published,
-    /// Studies differ from one another, and curves within them.
-    StudyLevel,
-}
-
-impl std::str::FromStr for Model {
-    type Err = String;
-    fn from_str(word: &str) -> Result<Self, String> {
-        match word {
-            "published" => Ok(Self::Published),
-            "study-level" => Ok(Self::StudyLevel),
-            _ => Err("say published or study-level".to_owned()),
-        }
-    }
-}
-
 /// The generative model that is asked.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ModelOption {
     /// The paper's Gaussian process, or the model of how studies and people differ [default: published]
     #[arg(long, value_name = "published|study-level")]
-    model: Option<Model>,
+    model: Option<GenerativeModel>,
 }
 
 impl ModelOption {
     /// Which one.
-    pub fn get(&self) -> Model {
+    pub fn get(&self) -> GenerativeModel {
         self.model.unwrap_or_default()
     }
 }

@@ -1,9 +1,10 @@
 //! `hgm gp sample`: materials from the generative model.
 
-use super::options::{HyperparameterOptions, Model, ModelOption, StudyOptions, only_with};
+use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
 use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
 use crate::material::Task;
+use crate::material::generative::GenerativeModel;
 use crate::material::generative::{SampleSettings, nine_levels};
 use crate::material::gp::Spread;
 use crate::material::meta_model::MetaModel;
@@ -76,7 +77,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
-    if args.model.get() == Model::StudyLevel {
+    if args.model.get() == GenerativeModel::StudyLevel {
         only_with(args.spread.is_some(), "--spread", "published")?;
         let own = args.hyperparameters.study_level()?;
         let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };

@@ -1,7 +1,8 @@
 //! `hgm gp show`: the paper's figures, table and tests.
 
-use super::options::{HyperparameterOptions, Model, ModelOption, StudyOptions, only_with};
+use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
 use crate::cli::{Failure, Session};
+use crate::material::generative::GenerativeModel;
 use crate::material::generative::SampleSettings;
 use crate::workflow::{GenerativeFiles, show_gp, show_study_level};
 use serde_json::json;
@@ -36,7 +37,7 @@ const MODELS: [u32; 4] = [44, 52, 60, 62];
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
-    if args.model.get() == Model::StudyLevel {
+    if args.model.get() == GenerativeModel::StudyLevel {
         only_with(!args.models.is_empty(), "--models", "published")?;
         let own = args.hyperparameters.study_level()?;
         let made = show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?;

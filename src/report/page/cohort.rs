@@ -6,7 +6,7 @@ use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
 use super::super::strip_chart::{StripChart, StripPoint};
 use super::results::{figures, set_name};
-use super::{Frame, Section, notice};
+use super::{Frame, Section, notice, tasks};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 
@@ -25,6 +25,7 @@ impl Cohort {
             ("subjects", "Subjects", Some(self.subjects_section())),
             ("errors", "What deformation explains", self.errors_section()),
             ("samples", "Samples over the subjects", self.samples_section()),
+            ("tasks", "Tasks of the generative model", tasks::of_cohort(&self.tasks)),
             ("distributions", "Distribution of every figure", self.distributions_section()),
             ("figures", "Figures", Some(self.figures_section())),
             ("population", "What the cohort says of people", self.population_section()),

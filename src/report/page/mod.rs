@@ -12,6 +12,7 @@ pub mod plans;
 mod posterior;
 mod prediction;
 mod results;
+mod tasks;
 
 pub use evaluation::in_a_sentence as evaluation_in_a_sentence;
 pub use methods::{Reference, references};

@@ -289,7 +289,8 @@ fn dihedral_chart(counts: &[usize]) -> String {
 pub fn samples(outcome: &ExperimentOutcome) -> Markup {
     let (table, all) = (sample_table(outcome), outcome.samples.len());
     html! {
-        div class="charts" { (figures(outcome)) } "\n"
+        (super::tasks::of_case(outcome))
+        @if !super::tasks::compared(outcome) { div class="charts" { (figures(outcome)) } "\n" }
         @if all > 20 { details { summary { "All " (all) " samples" } (table) } } @else { (table) }
     }
 }

@@ -42,5 +42,5 @@ pub(crate) use reference::{
 pub(crate) use registration::{
     mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
 };
-pub(crate) use samples::{SampleMode, Sweep, present_samples, sample_stage, samples, with_held_tissues};
+pub(crate) use samples::{SampleMode, Sweep, lesions, present_samples, sample_stage, samples, with_held_tissues};
 pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, mask_of};

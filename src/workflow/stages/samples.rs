@@ -49,13 +49,18 @@ pub(crate) fn with_held_tissues(
     mut scenario: Scenario,
 ) -> Result<(Scenario, BTreeMap<String, f64>), WorkflowError> {
     let mut moduli = BTreeMap::new();
-    let lesions = [label::TUMOUR, label::OEDEMA].into_iter().filter_map(label::name);
-    for name in lesions.filter(|name| mesh.volume_cc.contains_key(*name)) {
-        let held = held_material(name, work.settings.resection.poisson_ratio, &work.settings.prior)?;
-        moduli.insert(name.to_owned(), held.shear_modulus_pa);
-        scenario.materials.insert(name.to_owned(), held.material);
+    for name in lesions(mesh) {
+        let held = held_material(&name, work.settings.resection.poisson_ratio, &work.settings.prior)?;
+        moduli.insert(name.clone(), held.shear_modulus_pa);
+        scenario.materials.insert(name, held.material);
     }
     Ok((scenario, moduli))
+}
+
+/// The lesions in a mesh, by the names of their labels.
+pub(crate) fn lesions(mesh: &MeshOutcome) -> Vec<String> {
+    let names = [label::OEDEMA, label::TUMOUR].into_iter().filter_map(label::name);
+    names.filter(|name| mesh.volume_cc.contains_key(*name)).map(str::to_owned).collect()
 }
 
 /// The stage of one sample.
