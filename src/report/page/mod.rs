@@ -266,7 +266,7 @@ impl CasePage {
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());
-        add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(results::samples));
+        add("samples", "Samples", outcome.filter(|o| !o.samples.is_empty()).map(samples_section));
         add(
             "estimate",
             "Estimate",
@@ -397,6 +397,11 @@ fn pictures(pictures: &[CaptionedPicture]) -> Markup {
             } "\n"
         }
     }
+}
+
+/// The samples: those of several tasks in panels of their own.
+fn samples_section(outcome: &ExperimentOutcome) -> Markup {
+    html! { (tasks::of_case(outcome)) (results::samples(outcome, !tasks::compared(outcome))) }
 }
 
 fn error_section(map: &ErrorMap) -> Markup {

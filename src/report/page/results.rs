@@ -285,12 +285,11 @@ fn dihedral_chart(counts: &[usize]) -> String {
     chart.to_svg()
 }
 
-/// Table and curves of the samples.
-pub fn samples(outcome: &ExperimentOutcome) -> Markup {
+/// Table of the samples, and their curves where these are not drawn elsewhere.
+pub fn samples(outcome: &ExperimentOutcome, curves: bool) -> Markup {
     let (table, all) = (sample_table(outcome), outcome.samples.len());
     html! {
-        (super::tasks::of_case(outcome))
-        @if !super::tasks::compared(outcome) { div class="charts" { (figures(outcome)) } "\n" }
+        @if curves { div class="charts" { (figures(outcome)) } "\n" }
         @if all > 20 { details { summary { "All " (all) " samples" } (table) } } @else { (table) }
     }
 }
