@@ -118,7 +118,7 @@ mod tests {
     fn a_scan_is_cut_to_the_points_and_runs_from_black_to_white() {
         let grid = Grid::axis_aligned([20, 20, 20], [2.0; 3], [-10.0; 3]);
         // Brighter along x.
-        let t1 = Volume::from_fn(grid.clone(), |n| grid.voxel(n)[0] as f32);
+        let t1 = Volume::from_fn(grid, |n| grid.voxel(n)[0] as f32);
         let scan = Scan::around(&t1, &[[0.0, 1.0, 2.0], [9.0, 5.0, 4.0]]);
         assert_eq!((scan.dims, scan.origin_mm), ([10, 5, 3], [0.0, 1.0, 2.0]));
         assert_eq!(scan.values.len(), 150);
