@@ -32,7 +32,11 @@ socket.onmessage = (event) => {
   fresh = true;
 };
 function heard(message) {
-  if (message.refused) return say(message.refused);
+  if (message.refused) {
+    // A box that was ticked for what did not happen.
+    $("resection").checked = !!(mesh && mesh.removed);
+    return say(message.refused);
+  }
   if (message.file) return save(message.file, new Blob([message.text]));
   hello = message;
   first = first || message;
