@@ -4,7 +4,7 @@ use super::flags::Flags;
 use super::session::at_signal;
 use super::{Failure, Reject, Session};
 use crate::artefact::{check_writable, write_whole};
-use crate::live::{Export, LiveBody, Recording, ServeError, serve};
+use crate::live::{Colours, Export, LiveBody, Recording, Series, ServeError, serve};
 use crate::workflow::{Settings, posed_case, posed_mesh, read_text};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
@@ -33,26 +33,32 @@ pub struct Args {
     /// Keep what is done, with the step it was done at
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     record: Option<PathBuf>,
-    /// Do again what a file of --record holds, without a page, and write the state at its end
+    /// Do again what a file of --record holds, without a page, and write the state at its end (OUT.vtu) or on its way (OUT.pvd)
     #[arg(long, value_name = "FILE", requires = "output")]
     replay: Option<PathBuf>,
-    /// Where --replay writes the state
-    #[arg(short, long, value_name = "OUT.vtu", requires = "replay")]
+    /// Where --replay writes: the state at the end (.vtu), or a series for ParaView (.pvd, its files beside it)
+    #[arg(short, long, value_name = "OUT", requires = "replay")]
     output: Option<PathBuf>,
+    /// Steps from one file of a series to the next [default: 30]
+    #[arg(long, value_name = "N", requires = "replay", value_parser = clap::value_parser!(u64).range(1..))]
+    every: Option<u64>,
 }
+
+/// Steps between files of a series: two or three a second of a body of five thousand nodes.
+const EVERY: u64 = 30;
 
 /// What `--json` prints.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Printed {
     Open { address: String },
-    Replayed { output: String, steps: u64, commands: usize, displacement_max_mm: f64, at_rest: bool },
+    Replayed { output: String, files: usize, steps: u64, commands: usize, displacement_max_mm: f64, at_rest: bool },
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let body = body(args, session)?;
     match (&args.replay, &args.output) {
-        (Some(file), Some(output)) => replay(&body, file, output, session),
+        (Some(file), Some(output)) => replay(&body, file, (output, args.every), session),
         _ => open(&body, args, session),
     }
 }
@@ -97,15 +103,48 @@ fn open(body: &LiveBody, args: &Args, session: &Session) -> Result<(), Failure> 
     Ok(())
 }
 
-fn replay(body: &LiveBody, file: &Path, output: &Path, session: &Session) -> Result<(), Failure> {
+fn replay(
+    body: &LiveBody,
+    file: &Path,
+    (output, every): (&Path, Option<u64>),
+    session: &Session,
+) -> Result<(), Failure> {
     check_writable(output)?;
+    let in_series = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"));
+    if every.is_some() && !in_series {
+        return Err(anyhow!("{}: --every is for a series; name a .pvd file", output.display())).reject();
+    }
     let name = || file.display().to_string();
     let recording = Recording::from_text(&read_text(file)?).with_context(name).reject()?;
     let bar = session.progress(recording.steps, "steps");
-    let replayed = recording.replay(body, &mut |step| bar.set_position(step)).with_context(name).reject()?;
+    let stem = output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let mut series = Series::new(&stem, every.unwrap_or(EVERY));
+    let mut colours = None;
+    let write = |(name, bytes): (String, Vec<u8>)| write_whole(&output.with_file_name(name), &bytes);
+    // The first that cannot be made or written.
+    let mut failed: Option<anyhow::Error> = None;
+    let replayed = recording.replay(body, &mut |seen| {
+        bar.set_position(seen.steps());
+        let colours = &*colours.get_or_insert_with(|| Colours::of(body, seen.mesh()));
+        if in_series && failed.is_none() {
+            let due = series.due(seen, colours).map_err(|reason| anyhow!(reason));
+            failed = due.and_then(|due| Ok(due.map_or(Ok(()), write)?)).err();
+        }
+    });
+    let replayed = replayed.with_context(name).reject()?;
     bar.finish_and_clear();
-    let bytes = Export::of(&replayed).and_then(|state| state.vtu()).map_err(|reason| anyhow!(reason))?;
-    write_whole(output, &bytes)?;
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    let colours = colours.unwrap_or_else(|| Colours::of(body, replayed.mesh()));
+    if in_series {
+        write(series.last(&replayed, &colours).map_err(|reason| anyhow!(reason))?)?;
+        write_whole(output, &series.list())?;
+    } else {
+        let state = Export::of(&replayed).map(|state| state.coloured(&replayed, &colours));
+        write_whole(output, &state.and_then(|state| state.vtu()).map_err(|reason| anyhow!(reason))?)?;
+    }
+    let files = if in_series { series.len() } else { 1 };
     let largest = replayed.displacement_mm().iter().map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
     let displacement_max_mm = largest.sqrt();
     let (steps, commands, at_rest) = (replayed.steps(), recording.commands.len(), replayed.is_at_rest());
@@ -114,5 +153,5 @@ fn replay(body: &LiveBody, file: &Path, output: &Path, session: &Session) -> Res
         output.display()
     );
     let output = output.display().to_string();
-    session.emit(&Printed::Replayed { output, steps, commands, displacement_max_mm, at_rest }, &text)
+    session.emit(&Printed::Replayed { output, files, steps, commands, displacement_max_mm, at_rest }, &text)
 }

@@ -2,6 +2,7 @@
 
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
+use crate::workflow::Sights;
 use serde::Serialize;
 
 /// A shear modulus as a Gaussian over its logarithm knows it.
@@ -35,6 +36,8 @@ pub struct LiveBody {
     pub scenario: Scenario,
     /// The scenario's materials by name.
     pub tissues: Vec<LiveTissue>,
+    /// What is seen beside it.
+    pub sights: Sights,
     /// What the page should say beside it.
     pub notes: Vec<String>,
     /// SHA-256 of the mesh's nodes, tetrahedra and labels: a recording belongs to one mesh.

@@ -74,6 +74,11 @@ pub enum Command {
         /// Held or not.
         held: bool,
     },
+    /// The tissue with the label `resected` taken out, or put back.
+    Resection {
+        /// Out or in place.
+        removed: bool,
+    },
     /// Steps in time, or without time towards equilibrium.
     Manner {
         /// Without time.
@@ -99,6 +104,12 @@ pub enum Colour {
     Displacement,
     /// Stored energy per volume, Pa, averaged around every node.
     Energy,
+    /// How far nodes are from where a later scan, or a phantom's known state, has them, mm.
+    Error,
+    /// Standard deviation of the displacement by the priors of the shear moduli, mm.
+    PriorSd,
+    /// The same by the case's estimate, mm.
+    EstimateSd,
 }
 
 /// What changes only what is shown, and when steps are taken.
@@ -116,7 +127,7 @@ pub enum View {
     Step {},
     /// What the surface is coloured by.
     Colour {
-        /// Displacement or energy.
+        /// One of those that this body has.
         by: Colour,
     },
     /// The state as a scenario that `hgm simulate` repeats.
@@ -184,6 +195,7 @@ impl Command {
             | Self::Lift {}
             | Self::Law { .. }
             | Self::Support { .. }
+            | Self::Resection { .. }
             | Self::Manner { .. }
             | Self::Undo {}
             | Self::Reset {} => Ok(()),

@@ -6,6 +6,7 @@
 //! only. Nothing that comes in over it reaches a file. The clock is asked for the pace alone, never for a result.
 
 mod body;
+mod colours;
 mod command;
 mod desk;
 mod export;
@@ -15,15 +16,19 @@ mod http;
 mod open;
 mod pace;
 mod page;
+mod parts;
 mod recording;
+mod series;
 mod server;
 mod session;
 
 pub use body::{LiveBody, LiveTissue, Spread};
+pub use colours::Colours;
 pub use command::{Colour, Command, View};
 pub use export::Export;
 pub use frame::{Pace, frame_bytes};
 pub use pace::{Driven, Measured};
 pub use recording::{Recording, RecordingError, Timed};
+pub use series::Series;
 pub use server::{ServeError, Server, serve};
 pub use session::Session;

@@ -11,7 +11,7 @@ use crate::workflow::{EstimateFacts, Posed};
 impl LiveBody {
     /// A session's body, with the prior of these settings and the case's posterior for every tissue that has one.
     pub fn of(posed: Posed, prior: &PriorSettings) -> Self {
-        let Posed { name, mesh, scenario, estimate } = posed;
+        let Posed { name, mesh, scenario, estimate, sights } = posed;
         let tissue = |name: &String| LiveTissue {
             name: name.clone(),
             prior: spread(log_prior(&Tissue { name: name.clone(), labels: Vec::new() }, prior).ok().as_ref()),
@@ -21,7 +21,7 @@ impl LiveBody {
         let mut notes = vec![format!("{} nodes, {} tetrahedra", mesh.nodes_mm().len(), mesh.tets().len())];
         notes.push("loads act on the undeformed shape, as in scenarios".to_owned());
         let mesh_sha256 = sum(&mesh);
-        Self { name, mesh, scenario, tissues, notes, mesh_sha256 }
+        Self { name, mesh, scenario, tissues, sights, notes, mesh_sha256 }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The solver's thread: takes up what the page says, steps as fast as the clock wants it, and leaves the latest frame.
 
 use super::body::LiveBody;
+use super::colours::Colours;
 use super::command::{Colour, Command, Message, View};
 use super::desk::{Desk, Order};
 use super::export::Export;
@@ -52,6 +53,7 @@ pub(super) struct Driver<'a> {
     recording: Recording,
     /// Commands are kept only where they are asked for: a long session stays small.
     recorded: bool,
+    colours: Colours,
     colour: Colour,
     paused: bool,
     single: bool,
@@ -71,6 +73,7 @@ impl<'a> Driver<'a> {
     pub fn new(body: &'a LiveBody, session: Session, desk: &'a Desk, recorded: bool) -> Self {
         Self {
             body,
+            colours: Colours::of(body, session.mesh()),
             session,
             desk,
             recording: Recording::new(body),
@@ -160,7 +163,7 @@ impl<'a> Driver<'a> {
         self.dirty = true;
         // The page knows what it has asked for, but not what is taken back.
         if matches!(command, Command::Undo {} | Command::Reset {}) {
-            self.desk.answer(hello(self.body, &self.session));
+            self.desk.answer(hello(self.body, &self.session, &self.colours));
         }
         if self.recorded {
             self.keep(command);
@@ -194,7 +197,7 @@ impl<'a> Driver<'a> {
             }
             Order::Joined => {
                 (self.dirty, self.taken) = (true, 0);
-                self.desk.answer(hello(self.body, &self.session));
+                self.desk.answer(hello(self.body, &self.session, &self.colours));
                 Ok(())
             }
             Order::Left => {
@@ -213,13 +216,16 @@ impl<'a> Driver<'a> {
             View::Ack {} => {}
             View::Pause { paused } => self.paused = *paused,
             View::Step {} => self.single = true,
-            View::Colour { by } => self.colour = *by,
+            View::Colour { by } => {
+                self.colours.choose(*by, self.body)?;
+                self.colour = *by;
+            }
             View::ExportScenario {} => {
                 let text = Export::of(&self.session)?.scenario_toml()?;
                 self.desk.answer(serde_json::json!({ "file": "scenario.toml", "text": text }).to_string());
             }
             View::ExportVtu {} => {
-                let bytes = Export::of(&self.session)?.vtu()?;
+                let bytes = Export::of(&self.session)?.coloured(&self.session, &self.colours).vtu()?;
                 let text = String::from_utf8(bytes).map_err(|e| e.to_string())?;
                 self.desk.answer(serde_json::json!({ "file": "state.vtu", "text": text }).to_string());
             }
@@ -238,7 +244,8 @@ impl<'a> Driver<'a> {
         }
         let hz = if still { 0.0 } else { self.hz };
         let pace = Pace { hz: hz as f32, taken: self.taken, paused: self.paused };
-        self.desk.put_frame(frame_bytes(&self.session, &self.readout.0, &pace, self.colour));
+        let numbers = self.colours.numbers(&self.session, self.colour);
+        self.desk.put_frame(frame_bytes(&self.session, &self.readout.0, &pace, &numbers));
         self.dirty = false;
     }
 }

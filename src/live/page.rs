@@ -3,7 +3,13 @@
 
 const MARKUP: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
-const SCRIPT: &str = include_str!("page/page.js");
+/// One script: wire, picture, what is seen beside the body, panel.
+const SCRIPT: &str = concat!(
+    include_str!("page/wire.js"),
+    include_str!("page/picture.js"),
+    include_str!("page/sights.js"),
+    include_str!("page/panel.js")
+);
 
 /// The page's text; the nonce lets its own style and script in, and no other.
 pub(super) fn page(nonce: &str) -> String {

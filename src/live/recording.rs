@@ -110,11 +110,11 @@ impl Recording {
         Ok(Self { mesh_sha256: head.mesh_sha256, scenario: head.scenario, commands, steps: head.steps })
     }
 
-    /// Repeats the session; `progress` hears of every step.
+    /// Repeats the session; `seen` sees it at its beginning and after every step.
     ///
     /// # Errors
     /// [`RecordingError`] for another body than the recording's, and for a command that is refused.
-    pub fn replay(&self, body: &LiveBody, progress: &mut dyn FnMut(u64)) -> Result<Session, RecordingError> {
+    pub fn replay(&self, body: &LiveBody, seen: &mut dyn FnMut(&Session)) -> Result<Session, RecordingError> {
         if body.mesh_sha256 != self.mesh_sha256 {
             return Err(RecordingError::OtherMesh);
         }
@@ -122,10 +122,11 @@ impl Recording {
             return Err(RecordingError::OtherScenario);
         }
         let mut session = Session::open(body)?;
+        seen(&session);
         let mut go_to = |session: &mut Session, step: u64| {
             while session.steps() < step {
                 session.step();
-                progress(session.steps());
+                seen(session);
             }
         };
         for Timed { step, command } in &self.commands {

@@ -2,7 +2,7 @@
 
 use super::body::LiveBody;
 use super::desk::{Desk, Order};
-use super::frame::mesh_bytes;
+use super::frame::{mesh_bytes, scan_bytes, target_bytes};
 use super::http::{Request, Verdict, answer, read_head, switch};
 use super::pace::{Driven, Driver};
 use super::page::page;
@@ -55,7 +55,8 @@ struct Shared {
     desk: Arc<Desk>,
     port: u16,
     token: String,
-    mesh: Vec<u8>,
+    /// What a page gets before its first frame, last first.
+    scene: Vec<Vec<u8>>,
     taken: AtomicBool,
     connections: AtomicUsize,
 }
@@ -75,11 +76,15 @@ pub fn serve(body: &LiveBody, port: u16, recorded: bool) -> Result<Server, Serve
     let token = random_word().map_err(ServeError::Random)?;
     // The session is opened here: what is wrong with it is said before there is an address.
     let session = Session::open(body)?;
+    let sights = &body.sights;
+    let mut scene: Vec<Vec<u8>> = sights.scan.iter().map(scan_bytes).collect();
+    scene.extend(sights.targets.iter().rev().map(|(name, surface)| target_bytes(name, surface)));
+    scene.push(mesh_bytes(&session));
     let shared = Arc::new(Shared {
         desk: Arc::clone(&desk),
         port: address.port(),
         token: token.clone(),
-        mesh: mesh_bytes(session.mesh()),
+        scene,
         taken: AtomicBool::new(false),
         connections: AtomicUsize::new(0),
     });
@@ -208,7 +213,7 @@ fn client(stream: TcpStream, shared: &Shared) {
     let limits =
         WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
-    let mut to_go = vec![Message::binary(shared.mesh.clone())];
+    let mut to_go: Vec<Message> = shared.scene.iter().cloned().map(Message::binary).collect();
     // A part of what was written has not gone out yet.
     let mut stuck = false;
     let mut under_way = 0;

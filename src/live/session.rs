@@ -2,6 +2,7 @@
 
 use super::body::LiveBody;
 use super::command::Command;
+use super::parts::Parts;
 use crate::fem::live::{Ball, Grip, Manner, StepReport, Stepper};
 use crate::fem::{CsfLevel, FemError, PressureLoad, Scenario, Support};
 use crate::material::law::{Material, Parameter};
@@ -27,6 +28,10 @@ const REST_RESIDUAL: f64 = 1e-5;
 /// The first length of a step in time, s.
 const FIRST_TIME_STEP_S: f64 = 1.0 / 60.0;
 
+/// The name of the tissue that a resection takes out.
+const RESECTED: &str = "resected";
+const NO_RESECTED: &str = "the mesh has no tissue with the label `resected` that could be taken out or put back";
+
 /// What a hand holds.
 #[derive(Clone, Debug)]
 struct Hold {
@@ -39,13 +44,21 @@ struct Hold {
     to_mm: [f64; 3],
 }
 
-/// A body, its scenario now and at the beginning, and hands.
+/// What can be taken back: the scenario, and whether the resected tissue is out.
+#[derive(Clone, Debug)]
+struct Standing {
+    scenario: Scenario,
+    removed: bool,
+}
+
+/// A body, its scenario now and at the beginning, and hands. Nodes are numbered as in the whole mesh, resected tissue and all.
 pub struct Session {
     stepper: Stepper,
+    parts: Parts,
     surface: Vec<u32>,
-    first: Scenario,
-    now: Scenario,
-    undo: Vec<Scenario>,
+    first: Standing,
+    now: Standing,
+    undo: Vec<Standing>,
     /// What the last change was of: a slider's many values are one change.
     last_change: String,
     hold: Option<Hold>,
@@ -57,6 +70,14 @@ pub struct Session {
     /// Of the last step, if nothing has changed since.
     report: Option<StepReport>,
     recovered: u64,
+}
+
+/// Nodes of the boundary, ascending.
+fn surface(mesh: &TetMesh) -> Vec<u32> {
+    let mut nodes: Vec<u32> = mesh.boundary_facets(|_| true).into_iter().flatten().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
 }
 
 fn square(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -79,11 +100,12 @@ impl Session {
         }
         let mut stepper = Stepper::new(&body.mesh, &first)?;
         stepper.set_time_step(FIRST_TIME_STEP_S);
-        let mut surface: Vec<u32> = stepper.mesh().boundary_facets(|_| true).into_iter().flatten().collect();
-        surface.sort_unstable();
-        surface.dedup();
+        let surface = surface(stepper.mesh());
+        let parts = Parts::new(stepper.mesh().clone(), first.label_number(RESECTED));
+        let first = Standing { scenario: first, removed: false };
         Ok(Self {
             stepper,
+            parts,
             surface,
             now: first.clone(),
             first,
@@ -100,14 +122,35 @@ impl Session {
         })
     }
 
-    /// The mesh as it is stepped.
+    /// The whole mesh, cut open where sheets slide, resected tissue and all; the stepper's own is what is stepped.
     pub fn mesh(&self) -> &TetMesh {
-        self.stepper.mesh()
+        self.parts.whole()
+    }
+
+    /// Whether the mesh has resected tissue, and whether that is out.
+    pub fn resection(&self) -> Option<bool> {
+        self.parts.label().map(|_| self.now.removed)
+    }
+
+    /// The mesh with and without the resected tissue.
+    pub(super) fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Numbers of the stepped mesh's nodes at those of the whole one; 0 where tissue is out.
+    pub(super) fn on_whole(&self, of_nodes: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+        self.parts.on_whole(self.now.removed, of_nodes)
+    }
+
+    /// Of numbers at the nodes of the whole mesh those of the nodes that are stepped.
+    pub(super) fn of_stepped(&self, of_whole: &[f64]) -> Vec<f64> {
+        let nodes = 0..self.stepper.mesh().nodes_mm().len() as u32;
+        nodes.map(|n| of_whole[self.parts.whole_of(self.now.removed, n) as usize]).collect()
     }
 
     /// The scenario as it is now, without hands.
     pub fn scenario(&self) -> &Scenario {
-        &self.now
+        &self.now.scenario
     }
 
     /// The body itself.
@@ -115,9 +158,15 @@ impl Session {
         &self.stepper
     }
 
-    /// Displacement of every node, mm.
+    /// Displacement of every node, mm; of nodes that are out none.
     pub fn displacement_mm(&self) -> Vec<[f64; 3]> {
-        self.stepper.displacement_mm()
+        self.on_whole(self.stepper.displacement_mm())
+    }
+
+    /// Displacement of one node, mm.
+    fn moved_mm(&self, node: u32) -> [f64; 3] {
+        let stepped = self.parts.stepped_of(self.now.removed, node);
+        stepped.map_or([0.0; 3], |n| self.stepper.displacement_of_mm(n))
     }
 
     /// Steps taken.
@@ -152,8 +201,8 @@ impl Session {
 
     /// Nothing moves any more: further steps would change nothing that counts.
     pub fn is_at_rest(&self) -> bool {
-        let goal = self.now.solver.relative_residual.max(REST_RESIDUAL);
-        let speed = self.now.dynamics.rest_speed_mm_per_s;
+        let goal = self.now.scenario.solver.relative_residual.max(REST_RESIDUAL);
+        let speed = self.now.scenario.dynamics.rest_speed_mm_per_s;
         self.report.is_some_and(|r| r.relative_residual <= goal && r.fastest_mm_per_s <= speed && !r.recovered)
     }
 
@@ -198,7 +247,10 @@ impl Session {
             }
             Command::Reset {} => self.reset()?,
             change => {
-                let (next, what) = self.changed(change)?;
+                let (next, what) = match change {
+                    Command::Resection { removed } => self.resected(*removed)?,
+                    _ => self.changed(change)?,
+                };
                 let before = self.now.clone();
                 self.put(next)?;
                 if what != self.last_change {
@@ -228,26 +280,51 @@ impl Session {
     }
 
     /// Another scenario in the place of this one; only what must is made again.
-    fn put(&mut self, next: Scenario) -> Result<(), String> {
-        if next.fixed != self.now.fixed || next.supports != self.now.supports {
-            self.stepper.set_scenario(&next).map_err(|e| in_words(&e))?;
+    fn put(&mut self, next: Standing) -> Result<(), String> {
+        let (scenario, now) = (&next.scenario, &self.now.scenario);
+        if next.removed != self.now.removed {
+            self.put_mesh(&next)?;
+        } else if scenario.fixed != now.fixed || scenario.supports != now.supports {
+            self.stepper.set_scenario(scenario).map_err(|e| in_words(&e))?;
         } else {
-            if next.materials != self.now.materials {
-                self.stepper.set_materials(&next.materials).map_err(|e| in_words(&e))?;
+            if scenario.materials != now.materials {
+                self.stepper.set_materials(&scenario.materials).map_err(|e| in_words(&e))?;
             }
-            if next.loads != self.now.loads {
-                self.stepper.set_loads(&next.loads).map_err(|e| in_words(&e))?;
+            if scenario.loads != now.loads {
+                self.stepper.set_loads(&scenario.loads).map_err(|e| in_words(&e))?;
             }
         }
         self.now = next;
         Ok(())
     }
 
+    /// A body with more tissue or less, which goes on from where this one is; a hand lets go, what it held may be gone.
+    fn put_mesh(&mut self, next: &Standing) -> Result<(), String> {
+        let mesh = self.parts.mesh(next.removed).ok_or(NO_RESECTED)?;
+        let mut fresh = Stepper::new(mesh, &next.scenario).map_err(|e| in_words(&e))?;
+        let whole_mm = self.displacement_mm();
+        let carried = self.parts.carried(self.now.removed, next.removed, whole_mm);
+        fresh.start_from(&carried).map_err(|e| in_words(&e))?;
+        fresh.set_manner(self.manner);
+        fresh.set_time_step(self.time_step_s);
+        self.surface = surface(mesh).into_iter().map(|n| self.parts.whole_of(next.removed, n)).collect();
+        self.stepper = fresh;
+        self.hold = None;
+        Ok(())
+    }
+
+    /// The resected tissue out, or back.
+    fn resected(&self, removed: bool) -> Result<(Standing, String), String> {
+        self.parts.label().ok_or(NO_RESECTED)?;
+        Ok((Standing { removed, ..self.now.clone() }, format!("resection {removed}")))
+    }
+
     /// The scenario with a change, and what the change is of.
-    fn changed(&self, command: &Command) -> Result<(Scenario, String), String> {
-        let mut next = self.now.clone();
+    fn changed(&self, command: &Command) -> Result<(Standing, String), String> {
+        let now = &self.now.scenario;
+        let mut next = now.clone();
         let known = |tissue: &String| {
-            let names: Vec<&str> = self.now.materials.keys().map(String::as_str).collect();
+            let names: Vec<&str> = now.materials.keys().map(String::as_str).collect();
             format!("there is no tissue `{tissue}`; there is {}", names.join(", "))
         };
         let what = match command {
@@ -260,7 +337,7 @@ impl Session {
                 "density".to_owned()
             }
             Command::Csf { level_mm } => {
-                let density_kg_per_m3 = self.now.loads.csf.map_or(CSF_KG_PER_M3, |csf| csf.density_kg_per_m3);
+                let density_kg_per_m3 = now.loads.csf.map_or(CSF_KG_PER_M3, |csf| csf.density_kg_per_m3);
                 next.loads.csf = level_mm.map(|level_mm| CsfLevel { density_kg_per_m3, level_mm });
                 "csf".to_owned()
             }
@@ -303,7 +380,7 @@ impl Session {
             }
             _ => return Err("this command changes no scenario".to_owned()),
         };
-        Ok((next, what))
+        Ok((Standing { scenario: next, removed: self.now.removed }, what))
     }
 
     fn drag(&mut self, node: u32, to_mm: [f64; 3]) -> Result<(), String> {
@@ -319,9 +396,8 @@ impl Session {
             Some(hold) if hold.node == node => hold.to_mm = to_mm,
             _ => {
                 let shares = self.gripped(at);
-                let nodes = shares.into_iter().map(|(n, share)| (n, share, self.stepper.displacement_of_mm(n)));
-                let nodes = nodes.collect();
-                let moved = self.stepper.displacement_of_mm(node);
+                let nodes = shares.into_iter().map(|(n, share)| (n, share, self.moved_mm(n))).collect();
+                let moved = self.moved_mm(node);
                 let from_mm = [0, 1, 2].map(|i| at[i] + moved[i]);
                 self.hold = Some(Hold { node, nodes, from_mm, to_mm });
             }
@@ -350,10 +426,12 @@ impl Session {
             .hold
             .iter()
             .flat_map(|hold| {
-                hold.nodes.iter().map(|&(node, share, was)| Grip {
-                    node,
-                    to_mm: [0, 1, 2].map(|i| was[i] + hold.to_mm[i] - hold.from_mm[i]),
-                    stiffness_n_per_mm: share * HAND_N_PER_MM,
+                hold.nodes.iter().filter_map(|&(node, share, was)| {
+                    Some(Grip {
+                        node: self.parts.stepped_of(self.now.removed, node)?,
+                        to_mm: [0, 1, 2].map(|i| was[i] + hold.to_mm[i] - hold.from_mm[i]),
+                        stiffness_n_per_mm: share * HAND_N_PER_MM,
+                    })
                 })
             })
             .collect();

@@ -4,6 +4,7 @@ use super::case::Case;
 use super::error::{CaseError, SimulationError, WorkflowError};
 use super::facts::EstimateFacts;
 use super::settings::{Settings, in_words};
+use super::sights::Sights;
 use super::simulation::mesh_in;
 use super::stage_name::Subject;
 use super::stages;
@@ -35,6 +36,8 @@ pub struct Posed {
     pub scenario: Scenario,
     /// Modes and intervals of the moduli.
     pub estimate: Option<EstimateFacts>,
+    /// What is to be seen beside it.
+    pub sights: Sights,
 }
 
 /// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are the estimate's, or the
@@ -77,7 +80,8 @@ pub fn posed_case(folder: &Path, settings: &Settings) -> Result<Posed, WorkflowE
             }
         }
     }
-    Ok(Posed { name: shown(folder), mesh, scenario, estimate })
+    let sights = Sights::of(&case, &mesh)?;
+    Ok(Posed { name: shown(folder), mesh, scenario, estimate, sights })
 }
 
 /// The body of a mesh in a file, by the scenario in another; without one every tissue is the mean of its prior under the
@@ -100,7 +104,7 @@ pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> 
         add_materials(&mesh, &mut scenario, own.poisson_ratio, &settings.prior)?;
         scenario
     };
-    Ok(Posed { name: shown(file), mesh, scenario, estimate: None })
+    Ok(Posed { name: shown(file), mesh, scenario, estimate: None, sights: Sights::default() })
 }
 
 /// The mean of the prior for every tissue of the mesh that the scenario has no material for.
@@ -113,9 +117,11 @@ fn add_materials(
     let mut labels = mesh.labels().to_vec();
     labels.sort_unstable();
     labels.dedup();
-    for name in labels.into_iter().filter_map(label::name) {
+    for (label, name) in labels.into_iter().filter_map(|l| Some((l, label::name(l)?))) {
         if !scenario.materials.contains_key(name) {
-            scenario.materials.insert(name.to_owned(), held_material(name, poisson_ratio, prior)?.material);
+            // What tissue the resected part was, its label does not say.
+            let of = if label == label::RESECTED { "brain" } else { name };
+            scenario.materials.insert(name.to_owned(), held_material(of, poisson_ratio, prior)?.material);
         }
     }
     Ok(())

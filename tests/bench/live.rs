@@ -3,10 +3,11 @@
 
 use crate::bar::{Bar, data};
 use hgm::fem::Scenario;
-use hgm::live::{Colour, Command, LiveBody, Pace, Session, frame_bytes};
+use hgm::live::{Colour, Colours, Command, LiveBody, Pace, Session, frame_bytes};
 use hgm::material::random::CounterRng;
 use hgm::mesh::TetMesh;
 use hgm::mesh::format::vtu;
+use hgm::workflow::Sights;
 use std::time::Instant;
 
 /// Steps that are timed.
@@ -32,6 +33,7 @@ fn body(mesh: &TetMesh, tissues: usize) -> LiveBody {
         mesh: mesh.clone(),
         scenario: scenario(tissues),
         tissues: Vec::new(),
+        sights: Sights::default(),
         notes: Vec::new(),
         mesh_sha256: String::new(),
     }
@@ -49,6 +51,7 @@ fn top(mesh: &TetMesh) -> (u32, [f64; 3]) {
 fn rate(mesh: &TetMesh, tissues: usize) -> f64 {
     let mut session = Session::open(&body(mesh, tissues)).expect("the mesh carries the scenario");
     let (node, at) = top(mesh);
+    let colours = Colours::of(&body(mesh, tissues), session.mesh());
     for _ in 0..20 {
         session.step();
     }
@@ -59,7 +62,8 @@ fn rate(mesh: &TetMesh, tissues: usize) -> f64 {
         session.apply(&Command::Drag { node, to_mm }).expect("the node is on the surface");
         rayon::scope(|_| session.step());
         if step % 2 == 0 {
-            shown += frame_bytes(&session, &session.stepper().readout(), &Pace::default(), Colour::Displacement).len();
+            let numbers = colours.numbers(&session, Colour::Displacement);
+            shown += frame_bytes(&session, &session.stepper().readout(), &Pace::default(), &numbers).len();
         }
     }
     assert!(shown > 0 && session.recovered() == 0);

@@ -2,10 +2,14 @@
 
 use crate::job::program;
 use hgm::fem::{Scenario, simulate};
-use hgm::live::{Command, Export, LiveBody, Recording, Server, Session, Timed, serve};
+use hgm::live::{
+    Colour, Colours, Command, Export, LiveBody, LiveTissue, Recording, Server, Session, Spread, Timed, serve,
+};
+use hgm::material::law::Parameter;
 use hgm::material::random::CounterRng;
-use hgm::mesh::TetMesh;
 use hgm::mesh::format::vtu;
+use hgm::mesh::{TetMesh, TriMesh};
+use hgm::workflow::{Scan, Sights};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -56,6 +60,7 @@ fn body() -> LiveBody {
         mesh: block(),
         scenario: Scenario::from_toml(SCENARIO).unwrap(),
         tissues: Vec::new(),
+        sights: Sights::default(),
         notes: Vec::new(),
         mesh_sha256: "of the block".to_owned(),
     }
@@ -151,6 +156,166 @@ fn a_hand_pulls_a_ball_pushes_and_the_exported_scenario_gives_that_state() {
     session.apply(&Command::Lift {}).unwrap();
     settle(&mut session);
     assert!(apart_mm(&[session.stepper().displacement_of_mm(TOP)], &[before]) < 1e-3);
+}
+
+/// The block with an upper corner of it labelled `resected`.
+fn resectable() -> LiveBody {
+    let whole = block();
+    let nodes = whole.nodes_mm();
+    let corner = |tet: &[u32; 4]| tet.iter().all(|&n| nodes[n as usize][0] >= 20.0 && nodes[n as usize][2] >= 40.0);
+    let labels = whole.tets().iter().zip(whole.labels()).map(|(tet, &l)| if corner(tet) { 5 } else { l }).collect();
+    let mut mesh = TetMesh::new(nodes.to_vec(), whole.tets().to_vec(), labels).unwrap();
+    for (name, set) in &whole.node_sets {
+        mesh.set_nodes(name, set.clone()).unwrap();
+    }
+    let more = "[materials.resected]\nlaw = 'neo-hookean'\nshear_modulus_pa = 3000.0\npoisson_ratio = 0.45\n[loads]";
+    let scenario = Scenario::from_toml(&SCENARIO.replace("[loads]", more)).unwrap();
+    LiveBody { mesh, scenario, ..body() }
+}
+
+#[test]
+fn resected_tissue_is_taken_out_and_put_back_to_the_equilibrium_of_what_is_left() {
+    let body = resectable();
+    let mut recording = Recording::new(&body);
+    let mut session = Session::open(&body).unwrap();
+    let mut go = |session: &mut Session, command: Command| -> Result<(), String> {
+        session.apply(&command)?;
+        recording.commands.push(Timed { step: session.steps(), command });
+        settle(session);
+        recording.steps = session.steps();
+        Ok(())
+    };
+    assert_eq!(session.resection(), Some(false));
+    settle(&mut session);
+    let before = session.displacement_mm();
+    assert!(apart_mm(&before, &equilibrium(&body.scenario, &body.mesh)) < 1e-3);
+    // A node that only the corner has.
+    let out = 5 * 5 * 5 + 4;
+    assert!(before[out][2] < -0.1);
+
+    go(&mut session, Command::Resection { removed: true }).unwrap();
+    assert_eq!((session.resection(), session.displacement_mm()[out]), (Some(true), [0.0; 3]));
+    let left = session.stepper().mesh();
+    assert!(
+        !left.labels().contains(&5)
+            && left.tets().len() + body.mesh.labels().iter().filter(|&&l| l == 5).count() == 480
+    );
+    let truth = equilibrium(session.scenario(), left);
+    assert!(apart_mm(&session.stepper().displacement_mm(), &truth) < 1e-3);
+    let of_left = body.mesh.restricted(|l| l != 5).unwrap().1;
+    let shown: Vec<[f64; 3]> = of_left.iter().map(|&n| session.displacement_mm()[n as usize]).collect();
+    assert!(apart_mm(&shown, &truth) < 1e-3, "in the numbers of the whole mesh, too");
+    assert!(apart_mm(&shown, &of_left.iter().map(|&n| before[n as usize]).collect::<Vec<_>>()) > 0.02);
+    // The exported state is of what is left.
+    let state = Export::of(&session).unwrap();
+    let (toml, written) = (state.scenario_toml().unwrap(), vtu::decode(&state.vtu().unwrap(), "state.vtu").unwrap());
+    assert!(toml.contains("resected tissue is out"), "{toml}");
+    assert!(apart_mm(&equilibrium(&Scenario::from_toml(&toml).unwrap(), &written.mesh), &truth) < 1e-3);
+    // A hand cannot take what is not there, but what came to light.
+    assert!(session.apply(&Command::Drag { node: out as u32, to_mm: [40.0, 0.0, 60.0] }).is_err());
+    let floor = 4 * 25 + 13;
+    assert!(Session::open(&body).unwrap().apply(&Command::Drag { node: floor, to_mm: [30.0, 20.0, 60.0] }).is_err());
+    go(&mut session, Command::Drag { node: floor, to_mm: [30.0, 20.0, 60.0] }).unwrap();
+    go(&mut session, Command::Release {}).unwrap();
+
+    go(&mut session, Command::Undo {}).unwrap();
+    assert_eq!(session.resection(), Some(false));
+    assert!(apart_mm(&session.displacement_mm(), &before) < 1e-3);
+    assert!(session.apply(&Command::Undo {}).is_err());
+    go(&mut session, Command::Resection { removed: true }).unwrap();
+    go(&mut session, Command::Resection { removed: false }).unwrap();
+    assert!(apart_mm(&session.displacement_mm(), &before) < 1e-3);
+    go(&mut session, Command::Resection { removed: true }).unwrap();
+    let read = Recording::from_text(&recording.to_text()).unwrap();
+    assert_eq!(read.replay(&body, &mut |_| ()).unwrap().displacement_mm(), session.displacement_mm());
+    session.apply(&Command::Reset {}).unwrap();
+    settle(&mut session);
+    assert_eq!((session.resection(), session.displacement_mm()), (Some(false), before));
+}
+
+#[test]
+fn a_mesh_without_resected_tissue_has_none_to_take_out() {
+    let mut session = Session::open(&body()).unwrap();
+    let said = session.apply(&Command::Resection { removed: true }).unwrap_err();
+    assert!(said.contains("resected") && session.resection().is_none(), "{said}");
+    assert!(session.apply(&Command::Undo {}).is_err(), "nothing has happened");
+}
+
+/// A square at this x, mm.
+fn wall(x: f64) -> TriMesh {
+    let nodes_mm = vec![[x, -50.0, -50.0], [x, 150.0, -50.0], [x, -50.0, 150.0], [x, 150.0, 150.0]];
+    TriMesh { nodes_mm, triangles: vec![[0, 1, 2], [1, 3, 2]] }
+}
+
+#[test]
+fn a_body_is_coloured_by_its_distance_to_the_target_and_grey_where_none_is_known() {
+    let mut body = body();
+    let mut colours = Colours::of(&body, &body.mesh);
+    assert_eq!(colours.known(), [Colour::Displacement, Colour::Energy]);
+    assert!(colours.choose(Colour::Error, &body).is_err() && colours.choose(Colour::PriorSd, &body).is_err());
+
+    body.sights.targets = vec![("side".to_owned(), wall(-3.0)), ("nowhere".to_owned(), wall(7.0))];
+    let colours = Colours::of(&body, &body.mesh);
+    assert!(colours.known().contains(&Colour::Error));
+    let mut session = Session::open(&body).unwrap();
+    let side = &body.mesh.node_sets["side"];
+    for (n, x) in colours.numbers(&session, Colour::Error).into_iter().enumerate() {
+        let expected = if side.contains(&(n as u32)) { 3.0 } else { -1.0 };
+        assert!((x - expected).abs() < 1e-12, "{n}: {x}");
+    }
+    settle(&mut session);
+    let moved = session.displacement_mm();
+    let numbers = colours.numbers(&session, Colour::Error);
+    for &n in side {
+        assert!((numbers[n as usize] - (3.0 + moved[n as usize][0])).abs() < 1e-9);
+    }
+
+    let state =
+        vtu::decode(&Export::of(&session).unwrap().coloured(&session, &colours).vtu().unwrap(), "s.vtu").unwrap();
+    assert_eq!(state.point_field("target_distance_mm").unwrap().values, numbers);
+    assert!(state.point_field("displacement_sd_prior_mm").is_none());
+
+    // A phantom's state is known everywhere.
+    body.sights.truth_mm = Some(equilibrium(&body.scenario, &body.mesh));
+    let colours = Colours::of(&body, &body.mesh);
+    assert!(colours.numbers(&session, Colour::Error).into_iter().all(|x| (0.0..1e-3).contains(&x)));
+    let start = colours.numbers(&Session::open(&body).unwrap(), Colour::Error);
+    let truth: Vec<f64> = moved.iter().map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
+    assert!(start.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 2e-3));
+}
+
+#[test]
+fn the_sd_of_the_prior_is_that_of_equilibria_of_other_moduli() {
+    let mut body = body();
+    let spreads = [("grey_matter", 0.5), ("white_matter", 0.3)];
+    let tissue = |(name, log_sd): (&str, f64)| LiveTissue {
+        name: name.to_owned(),
+        prior: Some(Spread { log_mean: 7.0, log_sd }),
+        posterior: None,
+    };
+    body.tissues = spreads.into_iter().map(tissue).collect();
+    body.sights.estimate_sd_mm = Some(vec![0.25; body.mesh.nodes_mm().len()]);
+    let mut colours = Colours::of(&body, &body.mesh);
+    let session = Session::open(&body).unwrap();
+    colours.choose(Colour::PriorSd, &body).unwrap();
+    let found = colours.numbers(&session, Colour::PriorSd);
+    let mut variance = vec![0.0; found.len()];
+    for (name, log_sd) in spreads {
+        let at = |log_step: f64| {
+            let mut scenario = body.scenario.clone();
+            let material = scenario.materials.get_mut(name).unwrap();
+            *material = material.scaled(Parameter::Stiffness, log_step.exp()).unwrap();
+            equilibrium(&scenario, &body.mesh)
+        };
+        for (sum, (a, b)) in variance.iter_mut().zip(at(0.01).iter().zip(&at(-0.01))) {
+            *sum += (0..3).map(|i| (log_sd * (a[i] - b[i]) / 0.02).powi(2)).sum::<f64>();
+        }
+    }
+    assert!(found.iter().any(|&sd| sd > 0.1));
+    for (sd, variance) in found.iter().zip(variance) {
+        assert!((sd - variance.sqrt()).abs() < 1e-3 * (0.1 + sd), "{sd} {}", variance.sqrt());
+    }
+    assert!(colours.numbers(&session, Colour::EstimateSd).iter().all(|&sd| sd == 0.25));
 }
 
 /// Random numbers one after the other.
@@ -256,6 +421,24 @@ fn a_replay_gives_the_same_bytes_with_one_and_two_threads() {
     let state = vtu::decode(&one, "one.vtu").unwrap();
     assert_eq!(state.point_field("displacement").unwrap().vectors().unwrap(), session.displacement_mm());
 
+    // The same as a series: its last file is that state, one in between the one a shorter recording ends in.
+    let words = ["live", "block.vtu", "s.toml", "--replay", "session.jsonl", "-o", "way.pvd", "--every", "25"];
+    assert!(Process::new(program()).current_dir(folder.path()).args(words).status().unwrap().success());
+    let list = std::fs::read_to_string(at("way.pvd")).unwrap();
+    for (n, step) in [0, 25, 50, 75, 80].into_iter().enumerate() {
+        assert!(list.contains(&format!("timestep=\"{step}\" part=\"0\" file=\"way-{n:04}.vtu\"")), "{list}");
+    }
+    assert_eq!(list.matches("DataSet").count(), 5);
+    assert_eq!(std::fs::read(at("way-0004.vtu")).unwrap(), one);
+    let mut shorter = Recording { steps: 50, ..recording.clone() };
+    shorter.commands.retain(|timed| timed.step < 50);
+    let halfway = shorter.replay(&body, &mut |_| ()).unwrap().displacement_mm();
+    let written = vtu::decode(&std::fs::read(at("way-0002.vtu")).unwrap(), "way-0002.vtu").unwrap();
+    assert_eq!(written.point_field("displacement").unwrap().vectors().unwrap(), halfway);
+    let words = ["live", "block.vtu", "s.toml", "--replay", "session.jsonl", "-o", "never.vtu", "--every", "25"];
+    let ended = Process::new(program()).current_dir(folder.path()).args(words).output().unwrap();
+    assert_eq!((ended.status.code(), at("never.vtu").exists()), (Some(3), false));
+
     // What is no recording, or of something else, is refused and writes nothing.
     let text = recording.to_text();
     for (name, wrong, word) in [
@@ -342,6 +525,43 @@ fn next_frame(socket: &mut WebSocket<TcpStream>) -> Vec<u32> {
             }
         }
     }
+}
+
+#[test]
+fn a_page_gets_mesh_targets_and_scan_before_its_first_frame() {
+    let mut body = resectable();
+    body.sights.targets = vec![("side".to_owned(), wall(-3.0))];
+    let values = (0..24).collect();
+    body.sights.scan = Some(Scan { dims: [2, 3, 4], origin_mm: [-1.0, 2.0, 0.5], voxel_mm: 1.5, values });
+    let server = serve(&body, 0, false).unwrap();
+    let mut socket = enter(&server.address());
+    let mut got = Vec::new();
+    while got.len() < 4 {
+        if let Message::Binary(bytes) = socket.read().unwrap() {
+            got.push(bytes.to_vec());
+        }
+    }
+    let word = |bytes: &[u8], n: usize| u32::from_le_bytes(bytes[4 * n..4 * n + 4].try_into().unwrap());
+    let real = |bytes: &[u8], n: usize| f32::from_bits(word(bytes, n));
+    assert_eq!(got.iter().map(|bytes| word(bytes, 1)).collect::<Vec<_>>(), [1, 3, 4, 2]);
+    let left = body.mesh.restricted(|l| l != 5).unwrap().0.boundary_facets(|_| true).len() as u32;
+    let facets = body.mesh.boundary_facets(|_| true).len() as u32;
+    let head: Vec<u32> = (2..7).map(|n| word(&got[0], n)).collect();
+    assert_eq!(head, [150, 480, facets, left, 5]);
+    assert_eq!(got[0].len() as u32, 28 + 12 * 150 + 12 * (facets + left) + 16 * 480 + 480);
+    assert_eq!((word(&got[1], 2), word(&got[1], 3), real(&got[1], 5)), (4, 2, -3.0));
+    assert!(got[1].ends_with(b"side"));
+    assert_eq!([2, 3, 4].map(|n| word(&got[2], n)), [2, 3, 4]);
+    assert_eq!([5, 6, 7, 8].map(|n| real(&got[2], n)), [-1.0, 2.0, 0.5, 1.5]);
+    assert_eq!(got[2][36..], (0..24).collect::<Vec<u8>>());
+    assert_eq!(word(&got[3], 5) & 8, 0, "the tissue is in place");
+    socket.send(Message::text(r#"{"do":"resection","removed":true}"#)).unwrap();
+    let begin = Instant::now();
+    while next_frame(&mut socket)[5] & 8 == 0 {
+        assert!(begin.elapsed() < Duration::from_secs(20));
+    }
+    server.stopper()();
+    server.wait().unwrap();
 }
 
 fn served() -> (Server, String) {

@@ -12,9 +12,11 @@ import pathlib
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import block  # noqa: E402
 from browser import Browser  # noqa: E402
 
 CHECKS = []
@@ -33,11 +35,11 @@ def require(truth, message):
 class Live:
     """A server of its own."""
 
-    def __init__(self, options):
-        self.options = options
+    def __init__(self, options, body=None):
+        self.options, self.body = options, body or options.body
 
     def __enter__(self):
-        words = [self.options.hgm, "live", *self.options.body, "--no-browser"]
+        words = [self.options.hgm, "live", *self.body, "--no-browser"]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
         self.address = self.process.stdout.readline().strip()
         require(self.address.startswith("http://127.0.0.1:"), f"no address: {self.address}")
@@ -67,7 +69,9 @@ def number(browser, name):
 
 
 def settle(browser, seconds=60):
-    browser.wait_for("document.getElementById('hz').textContent === 'at rest'", seconds)
+    # Of all that was sent: what is on the page may still be the rest before.
+    browser.wait_for(
+        "frame && frame.taken >= sent && frame.still && !fresh && document.getElementById('hz').textContent === 'at rest'", seconds)
 
 
 def mouse(browser, kind, x, y, buttons=1):
@@ -151,6 +155,82 @@ def what_is_saved_is_a_picture_a_vtu_and_a_scenario(options):
         for start in ["PNG", "VTKFile", "hgm simulate"]:
             require(any(start in head for _, head in heads), f"nothing begins with {start}: {heads}")
         return ", ".join(f"{size} bytes" for size, _ in heads)
+
+
+def choose(browser, name, value):
+    browser.evaluate(
+        f"(() => {{ const s = document.getElementById({json.dumps(name)}); s.value = {json.dumps(value)};"
+        " s.dispatchEvent(new Event('change')); })()")
+
+
+@check
+def resected_tissue_is_taken_out_put_back_and_the_margin_stands_alone(options):
+    with tempfile.TemporaryDirectory() as folder:
+        body = block.write(pathlib.Path(folder))
+        with Live(options, body) as live, Browser(served=True) as browser:
+            enter(browser, live)
+            settle(browser)
+            rest, whole = number(browser, "maximum"), browser.evaluate("[mesh.facets.length, mesh.tets.length]")
+            require(browser.evaluate("!document.getElementById('resection-row').hidden"), "no box to take the tissue out")
+            browser.evaluate("document.getElementById('resection').click()")
+            browser.wait_for("mesh.removed", 20)
+            settle(browser)
+            left = browser.evaluate("[mesh.facets.length, mesh.tets.length]")
+            require(left[1] == whole[1] - 4 * 8 * 6, f"{whole} before, {left} after")
+            require(browser.evaluate("mesh.inside") == 3 * 16, f"{browser.evaluate('mesh.inside')} indices of the margin")
+            choose(browser, "show", "walls")
+            if options.pictures:
+                browser.picture(options.pictures / "margin.png")
+            require(abs(number(browser, "maximum") - rest) > 0.005, f"{rest} mm whole, {number(browser, 'maximum')} mm without")
+            browser.evaluate("document.getElementById('undo').click()")
+            browser.wait_for("!mesh.removed && !document.getElementById('resection').checked", 20)
+            settle(browser)
+            require(browser.evaluate("[mesh.facets.length, mesh.tets.length]") == whole, "what is put back is not what was there")
+            require(abs(number(browser, "maximum") - rest) < 0.011, f"{rest} mm before, {number(browser, 'maximum')} mm after")
+            require(not browser.complaints(), f"complaints: {browser.complaints()}")
+            return f"{whole[1] // 4} cells whole, {left[1] // 4} without"
+
+
+@check
+def what_a_case_knows_is_seen_and_nothing_else_is_offered(options):
+    with Live(options) as live, Browser(served=True) as browser:
+        enter(browser, live)
+        settle(browser)
+        known = browser.evaluate("hello.colours")
+        offered = browser.evaluate("[...document.getElementById('colour').options].filter((o) => !o.disabled).map((o) => o.value)")
+        require(known == offered and "prior_sd" in known, f"known {known}, offered {offered}")
+        ranges = []
+        for colour in known:
+            shown = browser.evaluate("shown")
+            choose(browser, "colour", colour)
+            browser.wait_for(f"shown > {shown}", 120)
+            browser.listen(0.3)
+            low, high = browser.evaluate("[frame.scalar.reduce((a, b) => Math.min(a, b)), frame.scalar.reduce((a, b) => Math.max(a, b))]")
+            require(high > 0 and low >= -1, f"{colour}: {low} to {high}")
+            ranges.append(f"{colour} to {high:.3g}")
+            if options.pictures:
+                browser.picture(options.pictures / f"colour-{colour}.png")
+        boxes = browser.evaluate("document.querySelectorAll('#ghosts input').length")
+        require(boxes == browser.evaluate("ghosts.length"), f"{boxes} boxes")
+        browser.evaluate("document.querySelectorAll('#ghosts input').forEach((box) => box.click())")
+        require(browser.evaluate("ghosts.every((ghost) => ghost.shown && ghost.count > 0)"), "a ghost is not shown")
+        choose(browser, "cut", "2")
+        if browser.evaluate("scan.known"):
+            # The scan is grey, whatever the colours of the numbers: every point of the cut that is not ground.
+            browser.evaluate("document.getElementById('scan').click()")
+            browser.evaluate("Object.assign(camera, { pitch: 1.5 })")
+            browser.wait_for("!turned && sections > 10", 20)
+            middle = browser.evaluate("""(() => { draw(); const w = gl.drawingBufferWidth >> 1, h = gl.drawingBufferHeight >> 1, out = new Uint8Array(4 * 1600);
+              gl.readPixels(w - 20, h - 20, 40, 40, gl.RGBA, gl.UNSIGNED_BYTE, out);
+              let grey = 0, values = new Set();
+              for (let k = 0; k < 1600; k += 1) { const [r, g, b] = out.slice(4 * k, 4 * k + 3); grey += r === g && g === b; values.add(r); }
+              return [grey, values.size]; })()""")
+            require(middle[1] > 10, f"the scan is one grey: {middle}")
+            require(boxes or middle[0] > 1500, f"of 1600 points {middle[0]} are grey")
+        if options.pictures:
+            browser.picture(options.pictures / "ghosts-and-scan.png")
+        require(not browser.complaints(), f"complaints: {browser.complaints()}")
+        return f"{', '.join(ranges)}; {boxes} targets; scan {browser.evaluate('scan.known')}"
 
 
 @check

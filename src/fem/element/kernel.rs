@@ -11,8 +11,16 @@ use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
 pub(in super::super) enum Kernel {
     /// The paper's law without wrappers.
     NeoHookean { mu: f64, lambda: f64 },
+    /// The same above a volume ratio, below which its energy is continued.
+    Continued { mu: f64, lambda: f64, floor: f64, law: Box<dyn Hyperelastic> },
     /// Any other law through its 9 x 9 tangent.
     General(Box<dyn Hyperelastic>),
+}
+
+/// A kernel at a point: mu and lambda (Pa) of the closed form, or the law itself.
+enum Quick<'a> {
+    NeoHookean(f64, f64),
+    General(&'a dyn Hyperelastic),
 }
 
 /// Row-major 3 x 3, as small as the hot loop likes it.
@@ -22,18 +30,29 @@ impl Kernel {
     /// A material with this lambda (Pa): its own, or 0 where its volume term is evaluated elsewhere.
     pub(in super::super) fn new(material: &Material, lambda: f64) -> Self {
         let law = material.law_with_lambda(lambda);
-        match law.neo_hookean_moduli_pa() {
-            Some([mu, lambda]) => Self::NeoHookean { mu, lambda },
+        match law.neo_hookean() {
+            Some([mu, lambda, 0.0]) => Self::NeoHookean { mu, lambda },
+            Some([mu, lambda, floor]) => Self::Continued { mu, lambda, floor, law },
             None => Self::General(law),
+        }
+    }
+
+    /// How it is evaluated at this volume change: a cell that is nowhere near inside out needs no 9 x 9 tangent.
+    #[inline(always)]
+    fn quick(&self, j_minus_1: f64) -> Quick<'_> {
+        match self {
+            Self::NeoHookean { mu, lambda } => Quick::NeoHookean(*mu, *lambda),
+            Self::Continued { mu, lambda, floor, .. } if 1.0 + j_minus_1 > *floor => Quick::NeoHookean(*mu, *lambda),
+            Self::Continued { law, .. } | Self::General(law) => Quick::General(law.as_ref()),
         }
     }
 
     /// Energy density, Pa.
     #[inline(always)]
     pub(super) fn energy(&self, h: &M3) -> f64 {
-        match self {
-            Self::NeoHookean { mu, lambda } => {
-                let (_, j_minus_1) = cofactors(h);
+        let (_, j_minus_1) = cofactors(h);
+        match self.quick(j_minus_1) {
+            Quick::NeoHookean(mu, lambda) => {
                 if j_minus_1 <= -1.0 {
                     return f64::INFINITY;
                 }
@@ -42,19 +61,19 @@ impl Kernel {
                 let square: f64 = h.iter().flatten().map(|v| v * v).sum();
                 0.5 * mu * (2.0 * trace + square) - mu * ln_j + 0.5 * lambda * ln_j * ln_j
             }
-            Self::General(law) => law.energy_density_pa(&matrix(h)),
+            Quick::General(law) => law.energy_density_pa(&matrix(h)),
         }
     }
 
     /// First Piola-Kirchhoff stress, Pa.
     #[inline(always)]
     pub(super) fn stress(&self, h: &M3) -> M3 {
-        match self {
-            Self::NeoHookean { mu, lambda } => {
-                let (cof, j_minus_1) = cofactors(h);
-                neo_hookean_stress(*mu, lambda * j_minus_1.ln_1p(), h, &cof, 1.0 + j_minus_1)
+        let (cof, j_minus_1) = cofactors(h);
+        match self.quick(j_minus_1) {
+            Quick::NeoHookean(mu, lambda) => {
+                neo_hookean_stress(mu, lambda * j_minus_1.ln_1p(), h, &cof, 1.0 + j_minus_1)
             }
-            Self::General(law) => rows(&law.first_piola_kirchhoff_pa(&matrix(h))),
+            Quick::General(law) => rows(&law.first_piola_kirchhoff_pa(&matrix(h))),
         }
     }
 
@@ -69,14 +88,14 @@ impl Kernel {
         project: bool,
         mut put: impl FnMut(usize, usize, &[f64; 9]),
     ) -> M3 {
-        match self {
-            Self::NeoHookean { mu, lambda } => {
-                let (cof, j_minus_1) = cofactors(h);
+        let (cof, j_minus_1) = cofactors(h);
+        match self.quick(j_minus_1) {
+            Quick::NeoHookean(mu, lambda) => {
                 let (j, volume_stress) = (1.0 + j_minus_1, lambda * j_minus_1.ln_1p());
-                let stress = neo_hookean_stress(*mu, volume_stress, h, &cof, j);
+                let stress = neo_hookean_stress(mu, volume_stress, h, &cof, j);
                 let mut exchange = mu - volume_stress;
                 if project {
-                    exchange = projected_exchange(exchange, *mu, h);
+                    exchange = projected_exchange(exchange, mu, h);
                 }
                 let inverse_j = 1.0 / j;
                 let spatial: [[f64; 3]; K] = std::array::from_fn(|a| {
@@ -104,7 +123,7 @@ impl Kernel {
                 }
                 stress
             }
-            Self::General(law) => {
+            Quick::General(law) => {
                 let h = matrix(h);
                 let mut tangent = law.tangent_pa(&h);
                 if project {
@@ -237,6 +256,25 @@ mod tests {
         }
         assert_eq!(fast.stress(&H), f.0);
         assert!((fast.energy(&H) - general.energy(&H)).abs() < 1e-10);
+    }
+
+    #[test]
+    fn a_continued_law_is_the_fast_path_above_its_floor_and_the_law_below() {
+        let law = || NeoHookean { inversion_threshold: 0.6, ..NeoHookean::new(1000.0, 0.45) };
+        let continued = Kernel::Continued { mu: 1000.0, lambda: 9000.0, floor: 0.6, law: Box::new(law()) };
+        let fast = Kernel::NeoHookean { mu: 1000.0, lambda: 9000.0 };
+        let general = Kernel::General(Box::new(law()));
+        let squeezed: M3 = std::array::from_fn(|r| std::array::from_fn(|c| H[r][c] - if r == c { 0.7 } else { 0.0 }));
+        for (h, same) in [(&H, &fast), (&squeezed, &general)] {
+            assert_eq!(blocks(&continued, h, false), blocks(same, h, false));
+            assert_eq!(blocks(&continued, h, true), blocks(same, h, true));
+            assert_eq!((continued.stress(h), continued.energy(h)), (same.stress(h), same.energy(h)));
+        }
+        // Where the two meet they are one.
+        for size in [-0.2, 0.2] {
+            let h: M3 = std::array::from_fn(|r| std::array::from_fn(|c| size * H[r][c]));
+            assert!((continued.energy(&h) - general.energy(&h)).abs() < 1e-10);
+        }
     }
 
     #[test]

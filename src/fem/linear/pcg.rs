@@ -208,6 +208,20 @@ impl LinearSolver for Pcg {
         self.double = None;
     }
 
+    fn take_up(&mut self, tangent: &Tangent, anew: bool) {
+        match &mut self.single {
+            // Walls push or do not: what was made before one pushed is no preconditioner.
+            Some(single) if !anew && self.rows.as_ref().is_none_or(|rows| !rows.change) => {
+                single.operator.take_up(tangent);
+                self.double = None;
+            }
+            _ => {
+                self.coarse = self.coarse.take().and_then(|coarse| coarse.renewed(tangent));
+                self.prepare(tangent);
+            }
+        }
+    }
+
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
         let (blocks, most) = (self.blocks, self.most_iterations);
         let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));

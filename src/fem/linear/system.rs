@@ -26,6 +26,13 @@ pub(in super::super) trait LinearSolver: Send {
     /// Takes up a new tangent; to be called before the first solve with it.
     fn prepare(&mut self, tangent: &Tangent);
 
+    /// The same for one of many tangents that change little from one to the next: a preconditioner is that of the last one that
+    /// was taken up `anew`.
+    fn take_up(&mut self, tangent: &Tangent, anew: bool) {
+        let _ = anew;
+        self.prepare(tangent);
+    }
+
     /// `x` comes back as the best solution found, also when the report says that it was not reached; on negative
     /// curvature it is a descent direction.
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport;

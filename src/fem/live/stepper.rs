@@ -56,6 +56,10 @@ pub struct Readout {
 /// Steps of the line search, each half the last.
 const HALVINGS: usize = 12;
 
+/// How far the linear system of a step in time is solved, as a part of its right side: the next step begins where this one
+/// ends and takes up what it left, so that rest is the equilibrium to the residual that rest is asked for.
+const STEP_TOLERANCE: f64 = 1e-2;
+
 /// A body under way.
 pub struct Stepper {
     /// As [`Scenario::body`] leaves it.
@@ -76,6 +80,8 @@ pub struct Stepper {
     spare: Option<Tangent>,
     /// Stored energy of body, walls and springs at `u`, where it is known.
     stored: Option<f64>,
+    /// The tangent has changed by far more than by a step: the preconditioner is made anew.
+    changed: bool,
 }
 
 /// The scenario as a live body reads it: held as in statics, so that its rest is the equilibrium `simulate` finds.
@@ -118,6 +124,7 @@ impl Stepper {
             v,
             spare: None,
             stored: None,
+            changed: true,
         })
     }
 
@@ -132,7 +139,7 @@ impl Stepper {
     /// [`FemError::Material`] and [`FemError::NoMaterial`]; nothing is changed then.
     pub fn set_materials(&mut self, materials: &Materials) -> Result<(), FemError> {
         self.laws = self.model.laws(materials)?;
-        self.stored = None;
+        (self.stored, self.changed) = (None, true);
         let ratio = largest_ratio(&self.model.scenario.materials);
         self.model.scenario.materials.clone_from(materials);
         // The solver is chosen by Poisson's ratio.
@@ -150,6 +157,7 @@ impl Stepper {
         let denser = loads.density_kg_per_m3 != self.model.scenario.loads.density_kg_per_m3;
         self.model.set_loads(&self.mesh, loads)?;
         if denser {
+            self.changed = true;
             self.mass = Mass::new(&self.model);
         }
         Ok(())
@@ -188,7 +196,7 @@ impl Stepper {
         self.u.fill([0.0; 3]);
         self.model.move_prescribed(&mut self.u, 1.0);
         self.v.fill([0.0; 3]);
-        (self.spare, self.stored) = (None, None);
+        (self.spare, self.stored, self.changed) = (None, None, true);
         self.solver = solver::for_model(&self.model, largest_ratio(&self.model.scenario.materials));
     }
 
@@ -213,13 +221,13 @@ impl Stepper {
 
     /// Through time or without it; the body stops where it is.
     pub fn set_manner(&mut self, manner: Manner) {
-        self.manner = manner;
+        (self.manner, self.changed) = (manner, true);
         self.v.fill([0.0; 3]);
     }
 
     /// Length of the steps in time, s.
     pub fn set_time_step(&mut self, time_step_s: f64) {
-        self.time_step_s = time_step_s;
+        (self.time_step_s, self.changed) = (time_step_s, true);
     }
 
     /// What hands hold and where the ball is; springs on held nodes do nothing.
@@ -318,7 +326,6 @@ impl Stepper {
         let h = self.time_step_s;
         let (mass_damping, stiffness_damping) = (settings.mass_damping_per_s, settings.stiffness_damping_s);
         let mass_factor = 1.0 / (h * h) + mass_damping / h;
-        let linear = self.model.scenario.solver.relative_residual.sqrt().clamp(1e-6, 1e-3);
         let scaled: Vec<[f64; 3]> = self.v.iter().map(|v| v.map(|x| x / h)).collect();
         let mut momentum = self.mass.product(&scaled);
         self.model.clear_held(&mut momentum);
@@ -349,10 +356,10 @@ impl Stepper {
                 }
                 let mut system = self.mass.plus(mass_factor, tangent, 1.0 + stiffness_damping / h);
                 self.add_supports_and_hands(&now, project, &mut system);
-                self.solver.prepare(&system);
+                self.solver.take_up(&system, std::mem::take(&mut self.changed));
                 let mut change = vec![[0.0; 3]; rhs.len()];
                 let along: &[[f64; 3]] = if iteration == 0 { &self.v } else { &[] };
-                let solved = solve_along(along, self.solver.as_mut(), &system, &rhs, &mut change, linear);
+                let solved = solve_along(along, self.solver.as_mut(), &system, &rhs, &mut change, STEP_TOLERANCE);
                 report.linear_iterations += solved.iterations;
                 self.spare = Some(system);
                 found = Some(change);

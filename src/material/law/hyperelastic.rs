@@ -17,8 +17,9 @@ pub trait Hyperelastic: Send + Sync {
     fn tangent_pa(&self, displacement_gradient: &Matrix3<f64>) -> Tangent;
     /// Shear modulus at rest, Pa.
     fn small_strain_shear_modulus_pa(&self) -> f64;
-    /// mu and lambda (Pa) where this is the neo-Hookean law and nothing else: elements have a fast path for it.
-    fn neo_hookean_moduli_pa(&self) -> Option<[f64; 2]> {
+    /// mu and lambda (Pa) where this is the neo-Hookean law and nothing else, and the volume ratio down to which it is (0: all):
+    /// elements have a fast path for it.
+    fn neo_hookean(&self) -> Option<[f64; 3]> {
         None
     }
 }
@@ -40,7 +41,7 @@ impl Hyperelastic for Box<dyn Hyperelastic> {
         self.as_ref().small_strain_shear_modulus_pa()
     }
 
-    fn neo_hookean_moduli_pa(&self) -> Option<[f64; 2]> {
-        self.as_ref().neo_hookean_moduli_pa()
+    fn neo_hookean(&self) -> Option<[f64; 3]> {
+        self.as_ref().neo_hookean()
     }
 }

@@ -154,8 +154,8 @@ impl Hyperelastic for NeoHookean {
         self.shear_modulus_pa
     }
 
-    fn neo_hookean_moduli_pa(&self) -> Option<[f64; 2]> {
-        (self.inversion_threshold == 0.0).then_some([self.shear_modulus_pa, self.lame_lambda_pa])
+    fn neo_hookean(&self) -> Option<[f64; 3]> {
+        Some([self.shear_modulus_pa, self.lame_lambda_pa, self.inversion_threshold])
     }
 }
 
