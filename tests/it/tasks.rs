@@ -43,7 +43,7 @@ fn tasks(outcome: &Value) -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn a_patient_is_swept_over_every_task_in_parts_or_whole_and_over_one_again() {
+fn slow_a_patient_is_swept_over_every_task_in_parts_or_whole_and_over_one_again() {
     let folder = tempfile::tempdir().unwrap();
     let settings = two_levels(folder.path());
     let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name).join("case"));
