@@ -5,7 +5,7 @@ use super::session::at_signal;
 use super::{Failure, Reject, Session};
 use crate::artefact::{check_writable, write_whole};
 use crate::live::{Colours, Export, LiveBody, Recording, Series, ServeError, serve};
-use crate::workflow::{Settings, posed_case, posed_mesh, read_text};
+use crate::workflow::{Resection, Settings, posed_case, posed_mesh, read_text};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,9 @@ pub struct Args {
     body: PathBuf,
     /// Materials, loads, held sets of a mesh (TOML) [default: the prior's means, held at base and falx]
     scenario: Option<PathBuf>,
+    /// Open a case with the resected tissue still in it, so that it can be taken out and put back; it is meshed for that first
+    #[arg(long, conflicts_with = "scenario")]
+    before_resection: bool,
     /// Port of the loopback address [default: any that is free]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     port: u16,
@@ -68,10 +71,18 @@ fn body(args: &Args, session: &Session) -> Result<LiveBody, Failure> {
     if folder && args.scenario.is_some() {
         return Err(anyhow!("{}: a case brings its own scenario; leave SCENARIO out", args.body.display())).reject();
     }
+    if args.before_resection && !folder {
+        return Err(anyhow!(
+            "{}: --before-resection is for the folder of a case; a mesh has its resected tissue where it has label 5",
+            args.body.display()
+        ))
+        .reject();
+    }
     let settings: Settings =
         if folder { session.settings_of(&args.body, Flags::default())? } else { session.settings(Flags::default())? };
     let posed = if folder {
-        posed_case(&args.body, &settings)?
+        let resection = if args.before_resection { Resection::Undone } else { Resection::Done };
+        posed_case(&session.place(&args.body), &settings, resection, &mut session.listener())?
     } else {
         posed_mesh(&args.body, args.scenario.as_deref(), &settings)?
     };

@@ -165,6 +165,7 @@ fn of_case(error: &CaseError) -> Option<String> {
             folder.display()
         ),
         CaseError::Held { .. } => "wait until it has ended".to_owned(),
+        CaseError::NothingResected { .. } => "leave --before-resection out".to_owned(),
         CaseError::NoField { .. } | CaseError::Unreadable { .. } => return None,
     })
 }

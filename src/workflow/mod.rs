@@ -80,7 +80,7 @@ pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
 pub use planned_resection::PlannedResection;
 pub use planned_scan::PlanInputs;
-pub use posed::{Posed, posed_case, posed_mesh};
+pub use posed::{Posed, Resection, posed_case, posed_mesh};
 pub use prediction::predict;
 pub use programs::{Known, Programs, known};
 pub use progress::{Progress, Silent, StageEnded};

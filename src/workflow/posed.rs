@@ -3,12 +3,14 @@
 use super::case::Case;
 use super::error::{CaseError, SimulationError, WorkflowError};
 use super::facts::EstimateFacts;
+use super::progress::Progress;
 use super::settings::{Settings, in_words};
 use super::sights::Sights;
 use super::simulation::mesh_in;
 use super::stage_name::Subject;
 use super::stages;
 use super::user_file::{read_input, read_text, shown};
+use super::work::{Place, Work};
 use crate::anatomy::label;
 use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
@@ -40,14 +42,40 @@ pub struct Posed {
     pub sights: Sights,
 }
 
+/// Whether a case's body has the tissue that was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resection {
+    /// It is out: the case's own mesh.
+    Done,
+    /// It is still in, under a label of its own: a mesh made for the purpose, with other nodes than the case's.
+    Undone,
+}
+
 /// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are the estimate's, or the
 /// means of the prior.
 ///
 /// # Errors
-/// A folder that is no case, and files that are missing or damaged.
-pub fn posed_case(folder: &Path, settings: &Settings) -> Result<Posed, WorkflowError> {
+/// A folder that is no case, and files that are missing or damaged; a resection to be undone where there was none, and what the
+/// mesh engine refuses.
+pub fn posed_case(
+    place: &Place,
+    settings: &Settings,
+    resection: Resection,
+    progress: &mut dyn Progress,
+) -> Result<Posed, WorkflowError> {
+    let folder = place.folder.as_path();
     let case = Case::open(folder)?;
-    let mesh = case.mesh()?;
+    let mesh = match resection {
+        Resection::Done => case.mesh()?,
+        Resection::Undone if case.subject() == Some(Subject::Patient) => {
+            let work = Work::new(place, Subject::Patient, settings, progress);
+            stages::mesh_before_resection(&work, &stages::Anatomy::read(&case)?)?
+        }
+        Resection::Undone => return Err(CaseError::NothingResected { folder: folder.to_path_buf() }.into()),
+    };
+    if resection == Resection::Undone && !mesh.labels().contains(&label::RESECTED) {
+        return Err(CaseError::NothingResected { folder: folder.to_path_buf() }.into());
+    }
     // Only where the estimate has been made: without it the prior's means stand.
     let estimate = if case.path(layout::ESTIMATE_JSON).exists() { Some(case.estimate()?) } else { None };
     let subject = case.subject();

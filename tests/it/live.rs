@@ -1,6 +1,7 @@
 //! `hgm live`: rest, hands, replay, and what may reach the server.
 
-use crate::job::program;
+use crate::job::{contents, program};
+use crate::made::{finished_phantom, prepared_pair};
 use hgm::fem::{Scenario, simulate};
 use hgm::live::{
     Colour, Colours, Command, Export, LiveBody, LiveTissue, Recording, Server, Session, Spread, Timed, serve,
@@ -9,7 +10,7 @@ use hgm::material::law::Parameter;
 use hgm::material::random::CounterRng;
 use hgm::mesh::format::vtu;
 use hgm::mesh::{TetMesh, TriMesh};
-use hgm::workflow::{Scan, Sights};
+use hgm::workflow::{Case, Place, Resection, Scan, Settings, Sights, Silent, posed_case};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -241,6 +242,33 @@ fn a_mesh_without_resected_tissue_has_none_to_take_out() {
     assert!(session.apply(&Command::Undo {}).is_err(), "nothing has happened");
 }
 
+#[test]
+fn a_patient_is_opened_with_the_resected_tissue_in_and_loses_it_to_the_cases_own_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    prepared_pair(&case);
+    let before = contents(&case);
+    let own = Case::open(&case).unwrap();
+    let settings = Settings::resolve([&own.settings().unwrap()]).unwrap();
+    let rest = own.mesh().unwrap();
+    let posed = posed_case(&Place::from(case.as_path()), &settings, Resection::Undone, &mut Silent).unwrap();
+    let left = posed.mesh.restricted(|l| l != 5).and_then(|(mesh, _)| mesh.largest_face_connected_part()).unwrap().0;
+    assert_eq!((left.nodes_mm(), left.tets()), (rest.nodes_mm(), rest.tets()));
+    let mut session = Session::open(&LiveBody::of(posed, &settings.prior)).unwrap();
+    assert_eq!(session.resection(), Some(false));
+    session.apply(&Command::Resection { removed: true }).unwrap();
+    assert_eq!(session.resection(), Some(true));
+    for _ in 0..5 {
+        session.step();
+    }
+    assert!(session.displacement_mm().as_flattened().iter().all(|x| x.is_finite()));
+    assert!(contents(&case) == before, "the case is left as it is");
+
+    let phantom = finished_phantom()[0].clone();
+    let refused = posed_case(&Place::from(phantom), &settings, Resection::Undone, &mut Silent).unwrap_err();
+    assert!(refused.to_string().contains("no tissue was resected"), "{refused}");
+}
+
 /// A square at this x, mm.
 fn wall(x: f64) -> TriMesh {
     let nodes_mm = vec![[x, -50.0, -50.0], [x, 150.0, -50.0], [x, -50.0, 150.0], [x, 150.0, 150.0]];
@@ -395,7 +423,7 @@ fn a_replay_gives_the_same_bytes_with_one_and_two_threads() {
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("block.vtu"), vtu::encode(&block(), &[], &[]).unwrap()).unwrap();
     std::fs::write(at("s.toml"), SCENARIO).unwrap();
-    let posed = hgm::workflow::posed_mesh(&at("block.vtu"), Some(&at("s.toml")), &hgm::workflow::Settings::default());
+    let posed = hgm::workflow::posed_mesh(&at("block.vtu"), Some(&at("s.toml")), &Settings::default());
     let body = LiveBody::of(posed.unwrap(), &hgm::experiment::prior::PriorSettings::default());
     assert!(body.tissues.iter().all(|tissue| tissue.prior.is_some() && tissue.posterior.is_none()));
     let mut rng = Dice::new(5);

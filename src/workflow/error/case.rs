@@ -40,6 +40,8 @@ pub enum CaseError {
     Held { folder: PathBuf, holder: String },
     #[error("the phantom in this folder has {made} and {asked} were asked for", made = tissues(*made), asked = tissues(*asked))]
     OtherTissues { made: usize, asked: usize },
+    #[error("{}: no tissue was resected here that could be put back", folder.display())]
+    NothingResected { folder: PathBuf },
     #[error("{}: no result holds an array `{name}`", folder.display())]
     NoField { folder: PathBuf, name: String },
 }

@@ -125,6 +125,16 @@ pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> R
     Ok(tagged(work, &body, &settings, Some(&anatomy.template_from_patient))?.rest)
 }
 
+/// The same body with the resected tissue still in it, under a label of its own: what an operation can be undone on.
+pub(crate) fn mesh_before_resection(work: &Work<'_>, anatomy: &Anatomy) -> Result<TetMesh, WorkflowError> {
+    let (_, settings) = mesh_stage(work, &Made::default());
+    let body = with_closed_sulci(&anatomy.labels, SULCUS_MM);
+    let Tagged { whole, .. } = tagged(work, &body, &settings, Some(&anatomy.template_from_patient))?;
+    let before = whole.restricted(|l| label::is_tissue(l) || l == label::RESECTED);
+    let connected = before.and_then(|(mesh, _)| mesh.largest_face_connected_part());
+    Ok(connected.ok_or(WorkflowError::NoTissue { labels: PRE_LABELS })?.0)
+}
+
 /// Size and shape of what is simulated, and how well the `whole` mesh it was cut from fills its label map.
 pub fn mesh_outcome<F: Frame>(
     mesh: &TetMesh,

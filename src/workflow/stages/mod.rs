@@ -30,7 +30,7 @@ pub(crate) use compare::compare;
 pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
-pub(crate) use mesh::{coarser_mesh, mesh, mesh_stage};
+pub(crate) use mesh::{coarser_mesh, mesh, mesh_before_resection, mesh_stage};
 pub(crate) use plan::{PlannedHead, plan};
 pub(crate) use pose::pose;
 pub(crate) use predict::{PredictInput, predict};
