@@ -1,9 +1,11 @@
 //! What the study-level model expects of the tissue of a person nobody has measured.
 
 use crate::material::Task;
+use crate::material::generative::{SampleSettings, SampledMaterial};
 use crate::material::literature::{Curves, table};
 use crate::material::study_level::{
-    Evidence, FitError, MeanPosterior, Of, Spreads, Studies, StudyLevelPrior, predict, refit,
+    Evidence, FitError, MeanPosterior, Of, Spreads, Studies, StudyLevelPrior, drawn_materials, materials_at_levels,
+    predict, refit,
 };
 use crate::material::task::stretches;
 use std::sync::OnceLock;
@@ -34,4 +36,35 @@ pub fn person_prior(task: Task, curves: Curves, points: usize) -> Result<StudyLe
     let (spreads, means) = known.get_or_init(|| fitted(curves)).as_ref().map_err(Clone::clone)?;
     let [low, high] = task.stretch_window();
     Ok(predict(means, spreads, task, Of::Person, &stretches(low, high, points)))
+}
+
+/// Persons drawn for the moments of a modulus: its standard deviation is known to 3 %.
+const PERSONS: u64 = 500;
+
+/// Laws at these standard deviations of ln(shear modulus) over persons, each fitted to a whole random function; their shape is
+/// that of the mean function. An envelope at so many standard deviations everywhere would be no person's: shapes differ, too.
+///
+/// # Errors
+/// [`FitError`], also for a law that cannot be fitted.
+pub fn person_materials(
+    task: Task,
+    sd_levels: &[f64],
+    points: usize,
+    settings: &SampleSettings,
+) -> Result<Vec<SampledMaterial>, FitError> {
+    let person = person_prior(task, settings.curves, points)?;
+    let drawn = drawn_materials(&person, PERSONS, 0, settings)?;
+    let logs: Vec<f64> = drawn.iter().map(|d| d.shear_modulus_pa.ln()).collect();
+    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+    let variance = logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0);
+    let of_mean = materials_at_levels(&person, &[0.0], settings)?.remove(0);
+    let at = |level: &f64| {
+        let mut moved = person.clone();
+        // An energy that is so many times as large has a law that is as many times as stiff.
+        let change = mean + level * variance.sqrt() - of_mean.shear_modulus_pa.ln();
+        moved.mean.iter_mut().for_each(|log_modulus| *log_modulus += change);
+        let material = materials_at_levels(&moved, &[0.0], settings)?.remove(0);
+        Ok(SampledMaterial { sd_level: *level, ..material })
+    };
+    sd_levels.iter().map(at).collect()
 }

@@ -1,7 +1,7 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
 use super::estimate::{LogPrior, Scale, Unknown};
-use super::person_prior::person_prior;
+use super::person_prior::{person_materials, person_prior};
 use super::population::PopulationPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{
@@ -11,7 +11,7 @@ use crate::material::gp::Spread;
 use crate::material::literature::{Curves, LiteratureModel, table};
 use crate::material::meta_model::{FitError, MetaModel, MetaModelSettings};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry};
-use crate::material::study_level::{self, drawn_materials, materials_at_levels};
+use crate::material::study_level::{self, drawn_materials};
 use crate::material::{Region, StudyKind, Task};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -128,14 +128,11 @@ fn materials_of_task(
     }
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: prior.law, ..settings };
-    let materials = match prior.model {
-        GenerativeModel::Published => sample_shear_moduli(task, levels, &settings),
-        GenerativeModel::StudyLevel => {
-            let person = person_prior(task, settings.curves, DRAWN_STRETCHES)?;
-            materials_at_levels(&person, levels, &settings)
-        }
-    };
-    materials.map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })
+    match prior.model {
+        GenerativeModel::Published => sample_shear_moduli(task, levels, &settings)
+            .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source }),
+        GenerativeModel::StudyLevel => Ok(person_materials(task, levels, DRAWN_STRETCHES, &settings)?),
+    }
 }
 
 /// The material of a tissue that is not varied: the mean of its prior. A lesion is too small a part of what moves for two
@@ -372,6 +369,7 @@ mod tests {
             .min_by(|a, b| (known.stretches[*a] - 1.0).abs().total_cmp(&(known.stretches[*b] - 1.0).abs()));
         let (mean, sd) = (known.mean[at_rest.unwrap()], known.sd[at_rest.unwrap()]);
         assert!((own.mean - mean).abs() < 0.5 * sd, "{} beside {mean} +- {sd}", own.mean);
+        assert!((own.sd.unwrap() / sd - 1.0).abs() < 0.4, "{own:?} beside {sd}");
         let two = law_priors(&tissue, &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
         assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));
     }
