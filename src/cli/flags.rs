@@ -187,18 +187,17 @@ impl PopulationOption {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct TaskOption {
     /// Nine samples of every task of the generative model (elastography, linear, hyperelastic; grey, white, healthy brain;
-    /// abnormal tissue where there is a lesion) instead of one task's; one tissue only. `--every-task=false`: one task's again
-    #[arg(
-        long, help_heading = MATERIAL, value_name = "true|false", num_args = 0..=1, require_equals = true,
-        default_missing_value = "true", conflicts_with = "study"
-    )]
-    every_task: Option<bool>,
+    /// abnormal tissue where there is a lesion) instead of one task's; one tissue only. A case goes back to one task's with --study
+    /// or --tissues 2
+    #[arg(long, help_heading = MATERIAL, conflicts_with = "study")]
+    every_task: bool,
 }
 
 impl TaskOption {
-    /// What it sets.
-    pub fn over(&self, flags: &mut Flags) {
-        flags.set("resection.every_task", self.every_task);
+    /// What it sets; one task's samples are asked for by their study or by two tissues.
+    pub fn over(&self, prior: &PriorOptions, tissues: Option<u8>, flags: &mut Flags) {
+        let one = prior.study.is_some() || tissues == Some(2);
+        flags.set("resection.every_task", (self.every_task || one).then_some(self.every_task));
     }
 }
 
@@ -224,7 +223,7 @@ impl AnalysisOptions {
     /// What they set.
     pub fn over(&self, flags: &mut Flags) {
         flags.set("resection.tissues", self.tissues);
-        self.tasks.over(flags);
+        self.tasks.over(&self.prior, self.tissues, flags);
         self.prior.over(flags);
     }
 

@@ -91,7 +91,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
-        WorkflowError::EveryTaskOfTwo => "drop --every-task (of a case: --every-task=false), or use --tissues 1",
+        WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
         WorkflowError::SampleMissing { .. } => {

@@ -28,7 +28,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut flags = Flags::default();
     flags.set("resection.tissues", args.tissues);
-    args.tasks.over(&mut flags);
+    args.tasks.over(&args.prior, args.tissues, &mut flags);
     args.prior.over(&mut flags);
     let settings = session.settings_of(&args.case, flags)?;
     let case = workflow::sweep(args.shard, &session.place(&args.case), &settings, &mut session.listener())?;

@@ -176,7 +176,7 @@ pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
             files.extend(surfaces.map_err(ReportError::HandOff)?);
         }
     }
-    page.files = listing(folder, &files);
+    page.files = listing(folder, &files.iter().map(|(file, _)| file.as_str()).collect());
     files.insert(0, (layout::PAGE.to_owned(), page.to_html().into_bytes()));
     Ok(files)
 }

@@ -1,6 +1,5 @@
 //! What a case folder holds, for the page to link to: the table of [`layout`], with the files that are there.
 
-use super::hand_off::CaseFile;
 use crate::layout::{self, Entry, Family, Maker, Space};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,8 +17,7 @@ pub struct Listed {
 
 /// The files of a case in the table's order, `made` among them: those that are written with the page. What an earlier page
 /// left and this one does not make is not listed, nor is the page itself.
-pub fn listing(folder: &Path, made: &[CaseFile]) -> Vec<Listed> {
-    let made: BTreeSet<&str> = made.iter().map(|(file, _)| file.as_str()).collect();
+pub fn listing(folder: &Path, made: &BTreeSet<&str>) -> Vec<Listed> {
     let mut listed: BTreeSet<String> = BTreeSet::new();
     let rows = layout::TABLE.iter().filter(|entry| ![layout::PAGE, layout::LOCK].contains(&entry.path)).map(|entry| {
         let there = |file: &str| match entry.maker {
@@ -27,7 +25,7 @@ pub fn listing(folder: &Path, made: &[CaseFile]) -> Vec<Listed> {
             _ => folder.join(file).is_file(),
         };
         let mut files = if entry.path.contains('{') {
-            members(folder, Family(entry.path), &made)
+            members(folder, Family(entry.path), made)
         } else {
             vec![entry.path.to_owned()]
         };
@@ -86,10 +84,10 @@ mod tests {
         for file in [layout::OUTCOME, layout::ESTIMATE_STATE, layout::PAGE, &sample, &head_up, &draws, &stale] {
             write_whole(&folder.path().join(file), b"x").unwrap();
         }
-        let made = [(layout::BEST_SURFACE.of("pial"), Vec::new()), (layout::PAGE.to_owned(), Vec::new())];
-        let rows = listing(folder.path(), &made);
+        let pial = layout::BEST_SURFACE.of("pial");
+        let rows = listing(folder.path(), &BTreeSet::from([pial.as_str(), layout::PAGE]));
         let of = |file: &str| rows.iter().filter(|row| row.files.iter().any(|f| f == file)).collect::<Vec<_>>();
-        for file in [layout::OUTCOME, layout::ESTIMATE_STATE, &sample, &head_up, &draws, &made[0].0] {
+        for file in [layout::OUTCOME, layout::ESTIMATE_STATE, &sample, &head_up, &draws, &pial] {
             assert_eq!(of(file).len(), 1, "{file}");
         }
         for file in [layout::PAGE, layout::REST_MESH, &stale] {

@@ -181,6 +181,8 @@ pub fn sweep(
 ) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
     prepared_case(&work, part.is_none())?;
+    // Settings that no sample can be made with are not the case's.
+    samples(settings, work.subject, &[])?;
     let patient = Patient::new(&work, Prepared::read(&work)?)?;
     outcome::keep_settings(&work)?;
     patient.samples(part, SampleMode::Run)?;

@@ -77,7 +77,7 @@ fn slow_a_patient_is_swept_over_every_task_in_parts_or_whole_and_over_one_again(
         let of = |sample: &&Value| sample["id"] == id;
         outcome["samples"].as_array().unwrap().iter().find(of).unwrap()["shear_modulus_pa"]["brain"].as_f64().unwrap()
     };
-    done(&["sweep", "-q", whole_words, "--every-task=false"], &settings);
+    done(&["sweep", "-q", whole_words, "--study", "hyperelastic"], &settings);
     let again = outcome(&whole);
     assert_eq!(tasks(&again), BTreeMap::from([("none".to_owned(), 2)]));
     assert_eq!(stiffness(&again, "sample-01"), stiffness(&found, "hyperelastic-healthy-01"));
