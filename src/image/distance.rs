@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// when the mask is empty.
 #[must_use]
 pub fn distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
-    let mut volume = squared_distance_mm2(mask, true);
+    let mut volume = squared_distance_mm2(mask, true, f32::INFINITY);
     volume.data.par_chunks_mut(1 << 16).for_each(|chunk| chunk.iter_mut().for_each(|d| *d = d.sqrt()));
     volume
 }
@@ -24,18 +24,29 @@ pub fn distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
 pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     let spacing_mm = mask.grid.spacing_mm();
     let half = (0.5 * spacing_mm.iter().copied().fold(f64::INFINITY, f64::min)) as f32;
-    let mut outward = squared_distance_mm2(mask, true);
-    let inward = squared_distance_mm2(mask, false);
-    outward.data.par_chunks_mut(1 << 16).zip(inward.data.par_chunks(1 << 16)).for_each(|(out, inn)| {
-        for (o, i) in out.iter_mut().zip(inn) {
-            *o = if *o > 0.0 { o.sqrt() - half } else { half - i.sqrt() };
+    let mut signed = squared_distance_mm2(mask, true, f32::INFINITY);
+    signed.data.par_chunks_mut(1 << 16).for_each(|chunk| {
+        for d in chunk.iter_mut() {
+            *d = if *d > 0.0 { d.sqrt() - half } else { *d };
         }
     });
-    outward
+    let Some(around) = mask.bounding_box() else { return signed };
+    // The nearest voxel outside lies in the box or in the layer around it.
+    let around = around.grown(&mask.grid, 1e-3 * f64::from(half));
+    let mut part = signed.cropped(&around);
+    let inward = squared_distance_mm2(&mask.cropped(&around), false, f32::INFINITY);
+    part.data.par_chunks_mut(1 << 16).zip(inward.data.par_chunks(1 << 16)).for_each(|(out, inn)| {
+        for (o, i) in out.iter_mut().zip(inn) {
+            *o = if *i > 0.0 { half - i.sqrt() } else { *o };
+        }
+    });
+    signed.paste(&part, &around);
+    signed
 }
 
-/// Squared distance in mm2 to the nearest voxel whose value is `seed`.
-pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volume<f32, F> {
+/// Squared distance in mm2 to the nearest voxel whose value is `seed`; infinite where it is more than `limit`. What lies
+/// farther along one axis is farther still along all: most lines then hold few parabolas or none.
+pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: f32) -> Volume<f32, F> {
     let [nx, ny, nz] = mask.grid.dims;
     let h = mask.grid.spacing_mm();
     let mut data = vec![0f32; mask.data.len()];
@@ -44,7 +55,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volu
     }
     data.par_chunks_mut(nx * ny).zip(mask.data.par_chunks(nx * ny)).for_each(|(plane, inside)| {
         for (row, inside) in plane.chunks_exact_mut(nx).zip(inside.chunks_exact(nx)) {
-            row_distance(row, inside, seed, h[0]);
+            row_distance(row, inside, seed, h[0], limit);
         }
         if ny > 1 {
             let mut envelope = Envelope::new(ny);
@@ -57,7 +68,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volu
                     }
                 }
                 for column in columns.chunks_exact_mut(ny).take(lanes) {
-                    envelope.transform(column, h[1]);
+                    envelope.transform(column, h[1], limit);
                 }
                 for j in 0..ny {
                     for l in 0..lanes {
@@ -81,7 +92,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volu
                     }
                 }
                 for line in lines[first * nz..].chunks_exact_mut(nz).take(lanes) {
-                    envelope.transform(line, h[2]);
+                    envelope.transform(line, h[2], limit);
                 }
             }
         });
@@ -99,7 +110,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volu
 /// Neighbouring lines gathered together, so that a strided read uses the whole cache line.
 const LANES: usize = 16;
 
-fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64) {
+fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64, limit: f32) {
     let n = row.len();
     let mut last = None;
     for i in 0..n {
@@ -114,8 +125,13 @@ fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64) {
             next = Some(i);
         }
         let steps = next.map_or(row[i], |seed: usize| row[i].min((seed - i) as f32));
-        row[i] = (f64::from(steps) * spacing_mm).powi(2) as f32;
+        row[i] = within((f64::from(steps) * spacing_mm).powi(2) as f32, limit);
     }
+}
+
+#[inline(always)]
+fn within(squared: f32, limit: f32) -> f32 {
+    if squared <= limit { squared } else { f32::INFINITY }
 }
 
 /// Lower envelope of the parabolas `f(q) + h^2 (p - q)^2` along one line.
@@ -133,7 +149,7 @@ impl Envelope {
         Self { vertex: vec![0; n], height: vec![0.0; n], begin: vec![0.0; n] }
     }
 
-    fn transform(&mut self, line: &mut [f32], spacing_mm: f64) {
+    fn transform(&mut self, line: &mut [f32], spacing_mm: f64, limit: f32) {
         if line.iter().all(|&f| f == 0.0) {
             return;
         }
@@ -166,7 +182,7 @@ impl Envelope {
                 part += 1;
             }
             let step = p as f64 - self.vertex[part] as f64;
-            *out = (h2 * (step * step + self.height[part])) as f32;
+            *out = within((h2 * (step * step + self.height[part])) as f32, limit);
         }
     }
 }

@@ -15,7 +15,7 @@ pub fn dilate<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
     // Outside this box the mask and the result are both empty.
     let part = mask.cropped(&around.grown(&mask.grid, radius_mm));
     let limit = squared_limit(radius_mm);
-    pasted(mask, &around.grown(&mask.grid, radius_mm), &squared_distance_mm2(&part, true).map(|d2| d2 <= limit))
+    pasted(mask, &around.grown(&mask.grid, radius_mm), &squared_distance_mm2(&part, true, limit).map(|d2| d2 <= limit))
 }
 
 /// Every inside voxel whose centre lies more than `radius_mm` from all centres outside. A radius of 0 changes nothing.
@@ -27,7 +27,7 @@ pub fn erode<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
     let around = around.grown(&mask.grid, 1e-3 * smallest_mm);
     let part = mask.cropped(&around);
     let limit = squared_limit(radius_mm);
-    pasted(mask, &around, &squared_distance_mm2(&part, false).map(|d2| d2 > limit))
+    pasted(mask, &around, &squared_distance_mm2(&part, false, limit).map(|d2| d2 > limit))
 }
 
 /// Erosion, then dilation: removes what is thinner than twice the radius.

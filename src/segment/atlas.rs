@@ -127,7 +127,11 @@ pub fn deep_grey() -> Mask<Mni> {
         ([19.5, -4.0, -1.0], [6.5, 11.0, 7.0], 0.3, 160..212),
     ];
     let t1 = &template().t1;
+    let bright = |value: u8| NUCLEI.iter().any(|nucleus| nucleus.3.contains(&value));
     Mask::from_fn(t1.grid, |n| {
+        if !bright(t1.data[n]) {
+            return false;
+        }
         let p = t1.grid.position(Point3::from(t1.grid.voxel(n).map(|v| v as f64))).mm;
         NUCLEI.iter().any(|(centre, radii, outwards, range)| {
             let x = p.x.abs() - centre[0] + outwards * (p.y - centre[1]);

@@ -11,6 +11,8 @@ const USUAL_COEFFICIENT: f64 = 0.15;
 /// cerebellum of either side, and the brain stem. What all voxels of a region say of the gain is one observation. Counting
 /// every voxel, the field takes up anatomy and calls twice as much grey matter of the template, which has no bias, white.
 const REGIONS: f64 = 17.0;
+/// A constant, the terms, the right side.
+const ROW: usize = TERMS + 2;
 /// Samples summed before partial sums are added in order: independent of the number of threads.
 const CHUNK: usize = 8192;
 
@@ -55,26 +57,11 @@ impl LogBias {
         // Unknowns: a constant, which takes up the error of the class means and is dropped, then the coefficients.
         // The last row holds the right side and the sum of squares.
         let size = used.len() + 1;
-        let sums = observations.par_chunks(CHUNK).map(|chunk| {
-            let mut sums = DMatrix::<f64>::zeros(size + 1, size + 1);
-            for o in chunk {
-                let terms = monomials(dims, o.voxel);
-                let row = |a: usize| match a {
-                    0 => 1.0,
-                    _ if a == size => o.log_gain,
-                    _ => terms[used[a - 1]],
-                };
-                for a in 0..=size {
-                    for b in 0..=a {
-                        sums[(a, b)] += o.weight * row(a) * row(b);
-                    }
-                }
-            }
-            sums
+        let parts: Vec<_> =
+            observations.par_chunks(CHUNK).map(|chunk| products(dims, &used, chunk)).collect();
+        let sums = parts.iter().fold(DMatrix::<f64>::zeros(size + 1, size + 1), |sum, part| {
+            sum + DMatrix::from_fn(size + 1, size + 1, |a, b| part[a.max(b)][a.min(b)])
         });
-        let parts: Vec<_> = sums.collect();
-        let mut sums = parts.iter().fold(DMatrix::<f64>::zeros(size + 1, size + 1), |sum, part| sum + part);
-        sums.fill_upper_triangle_with_lower_triangle();
         let right = sums.view((0, size), (size, 1)).into_owned();
         let solved = |ridge: f64| {
             let mut normal = sums.view((0, 0), (size, size)).into_owned();
@@ -97,6 +84,27 @@ impl LogBias {
         field.mean = parts.iter().sum::<f64>() / (region.len().max(1)) as f64;
         field
     }
+}
+
+/// Weighted products of the rows of a chunk of observations: 1, the used terms, the right side; the lower triangle counts.
+/// Rows of a fixed length, the rest zeros, so that a row of products is a few vector instructions.
+fn products(dims: [usize; 3], used: &[usize], chunk: &[LogRatio]) -> [[f64; ROW]; ROW] {
+    let mut sums = [[0.0; ROW]; ROW];
+    let size = used.len() + 1;
+    for o in chunk {
+        let terms = monomials(dims, o.voxel);
+        let mut row = [0.0; ROW];
+        row[0] = 1.0;
+        for (a, &n) in used.iter().enumerate() {
+            row[a + 1] = terms[n];
+        }
+        row[size] = o.log_gain;
+        for (sums, a) in sums.iter_mut().zip(row) {
+            let weighted = o.weight * a;
+            sums.iter_mut().zip(row).for_each(|(sum, b)| *sum += weighted * b);
+        }
+    }
+    sums
 }
 
 const DEGREE: [usize; TERMS] = [1, 1, 1, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3];

@@ -16,10 +16,6 @@ pub fn labels_on<S: Frame, T: Frame>(
 ) -> LabelMap<T> {
     let mut out = Volume::filled(*target, 0u8);
     carried(source, target, source_from_target, &mut out, |corners| {
-        let first = corners[0].0;
-        if corners.iter().all(|c| c.0 == first) {
-            return first;
-        }
         let mut weights = [0.0f64; LABELS];
         for &(value, weight) in corners {
             weights[usize::from(value).min(LABELS - 1)] += weight;
@@ -48,7 +44,9 @@ pub fn mask_on<S: Frame, T: Frame>(
     out
 }
 
-fn carried<V: Copy + Send + Sync, S: Frame, T: Frame>(
+/// What `value_of` makes of the values and weights of the eight corners around each voxel of `target`, or their value where
+/// they have but one.
+fn carried<V: Copy + PartialEq + Send + Sync, S: Frame, T: Frame>(
     source: &Volume<V, S>,
     target: &Grid<T>,
     source_from_target: &RigidTransform<T, S>,
@@ -75,6 +73,15 @@ fn carried<V: Copy + Send + Sync, S: Frame, T: Frame>(
                 low[a] = x.floor() as usize;
                 high[a] = (low[a] + 1).min(dims[a] - 1);
                 w[a] = x - x.floor();
+            }
+            let at = |bits: usize| {
+                let pick = |a: usize| if bits >> a & 1 == 1 { high[a] } else { low[a] };
+                source.at(pick(0), pick(1), pick(2))
+            };
+            let first = at(0);
+            if (1..8).all(|bits| at(bits) == first) {
+                *value = first;
+                continue;
             }
             let corner = |bits: usize| {
                 let pick = |a: usize| if bits >> a & 1 == 1 { (high[a], w[a]) } else { (low[a], 1.0 - w[a]) };

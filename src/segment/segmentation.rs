@@ -342,7 +342,7 @@ pub(super) fn labelled<F: Frame>(
     }
     let mut labels_mni = most_probable(&model, priors);
     let csf = labels_mni.map(|l| l == label::CSF);
-    let t1_mni = without_bias(&raw, &model);
+    let t1_mni = without_bias(&raw, &model, |_| true);
     let ventricle = if let Some(mask) = overrides.ventricle {
         let given = mask_on(mask, &grid, &t1_from_mni);
         at_each(&raw, |n| given.data[n] && brain.data[n])
@@ -452,12 +452,17 @@ fn computed_brain(
     let deep = at_each(raw, |n| known.data[n] && priors.brain_mm.data[n] < -4.0);
     let model =
         fit_mixture(raw, &deep, priors, &mixture_settings(settings, 2), None).ok_or(SegmentError::NoTissueContrast)?;
-    Ok(brain_mask(&without_bias(raw, &model), known, &model, priors, &settings.brain))
+    let reach = settings.brain.reach_mm as f32;
+    let flat = without_bias(raw, &model, |n| known.data[n] && priors.brain_mm.data[n] < reach);
+    Ok(brain_mask(&flat, known, &model, priors, &settings.brain))
 }
 
-fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture) -> Volume<f32, Mni> {
+/// The image with its bias taken out where it is `wanted`, 0 elsewhere.
+fn without_bias(raw: &Volume<f32, Mni>, model: &Mixture, wanted: impl Fn(usize) -> bool + Sync) -> Volume<f32, Mni> {
     let grid = raw.grid;
-    Volume::from_fn(grid, |n| (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32)
+    Volume::from_fn(grid, |n| {
+        if wanted(n) { (f64::from(raw.data[n]) * (-model.bias.at(grid.voxel(n))).exp()) as f32 } else { 0.0 }
+    })
 }
 
 fn most_probable(model: &Mixture, priors: &AtlasPriors) -> LabelMap<Mni> {
