@@ -5,6 +5,7 @@ pub mod estimate;
 pub mod field;
 pub mod landmarks;
 mod law_outcome;
+mod moments;
 pub mod nodal_field;
 pub mod observed;
 pub mod outcome;

@@ -1,5 +1,6 @@
 //! What the study-level model expects of the tissue of a person nobody has measured.
 
+use super::moments::mean_and_sd;
 use crate::material::Task;
 use crate::material::generative::{SampleSettings, SampledMaterial};
 use crate::material::literature::{Curves, table};
@@ -55,13 +56,12 @@ pub fn person_materials(
     let person = person_prior(task, settings.curves, points)?;
     let drawn = drawn_materials(&person, PERSONS, 0, settings)?;
     let logs: Vec<f64> = drawn.iter().map(|d| d.shear_modulus_pa.ln()).collect();
-    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-    let variance = logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0);
+    let (mean, sd) = mean_and_sd(&logs);
     let of_mean = materials_at_levels(&person, &[0.0], settings)?.remove(0);
     let at = |level: &f64| {
         let mut moved = person.clone();
         // An energy that is so many times as large has a law that is as many times as stiff.
-        let change = mean + level * variance.sqrt() - of_mean.shear_modulus_pa.ln();
+        let change = mean + level * sd - of_mean.shear_modulus_pa.ln();
         moved.mean.iter_mut().for_each(|log_modulus| *log_modulus += change);
         let material = materials_at_levels(&moved, &[0.0], settings)?.remove(0);
         Ok(SampledMaterial { sd_level: *level, ..material })

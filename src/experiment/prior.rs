@@ -1,6 +1,7 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
 use super::estimate::{LogPrior, Scale, Unknown};
+use super::moments::mean_and_sd;
 use super::person_prior::{person_materials, person_prior};
 use super::population::PopulationPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
@@ -288,12 +289,6 @@ fn exponents_of_studies(law: MetaModel) -> Vec<f64> {
         fit_rheometry(law, &test, &MetaModelSettings::default()).ok().map(|fit| fit.parameters[1])
     };
     table().into_iter().filter(hyperelastic).filter(healthy).filter_map(fitted).collect()
-}
-
-fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-    (mean, (squares / (values.len() as f64 - 1.0)).sqrt())
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use statrs::function::gamma::gamma_ur;
 
 /// A test's statistic and the probability of one as large when nothing differs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -21,53 +22,16 @@ impl RankTest {
     }
 }
 
-/// The share of chi-square with these degrees of freedom beyond `x`: by the incomplete gamma function's series or continued
-/// fraction, whichever converges (Press et al., Numerical Recipes, section 6.2).
+/// The share of chi-square with these degrees of freedom beyond `x`.
 fn chi_square_beyond(x: f64, degrees: usize) -> f64 {
-    if degrees == 2 {
-        return (-0.5 * x).exp();
-    }
-    let (a, x) = (0.5 * degrees as f64, 0.5 * x);
     if x.is_nan() || degrees == 0 {
         return f64::NAN;
     }
-    if x <= 0.0 {
-        return 1.0;
+    // Exactly, as for the paper's three treatments.
+    if degrees == 2 {
+        return (-0.5 * x).exp();
     }
-    // Gamma(a) from Gamma(1/2) or Gamma(1).
-    let mut ln_gamma = if degrees % 2 == 1 { 0.5 * std::f64::consts::PI.ln() } else { 0.0 };
-    let mut step = if degrees % 2 == 1 { 0.5 } else { 1.0 };
-    while step < a - 0.25 {
-        ln_gamma += f64::ln(step);
-        step += 1.0;
-    }
-    let front = (a * x.ln() - x - ln_gamma).exp();
-    if x < a + 1.0 {
-        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
-        while term > 1e-17 * sum {
-            n += 1.0;
-            term *= x / n;
-            sum += term;
-        }
-        return 1.0 - front * sum;
-    }
-    // Lentz's way through the fraction.
-    let mut b = x + 1.0 - a;
-    let mut c = 1e300;
-    let mut d = 1.0 / b;
-    let mut fraction = d;
-    for n in 1..500 {
-        let an = -f64::from(n) * (f64::from(n) - a);
-        b += 2.0;
-        d = 1.0 / (an * d + b);
-        c = b + an / c;
-        let change = c * d;
-        fraction *= change;
-        if (change - 1.0).abs() < 1e-15 {
-            break;
-        }
-    }
-    front * fraction
+    if x <= 0.0 { 1.0 } else { gamma_ur(0.5 * degrees as f64, 0.5 * x) }
 }
 
 /// Ranks from 1, ties sharing their mean rank, and the sum of t^3 - t over groups of t ties.

@@ -3,6 +3,7 @@
 use super::colour::{ColourScale, NO_VALUE};
 use super::page::{CaptionedPicture, ShiftFigure};
 use super::picture::Picture;
+use super::shift_figure::length;
 use super::slice::{PLANES, Plane};
 
 /// Pixels for each mm, and around the body.
@@ -94,10 +95,6 @@ fn view(
         ),
         sides: Some(plane.sides()),
     }
-}
-
-fn length(u: [f64; 3]) -> f64 {
-    u.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

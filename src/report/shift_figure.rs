@@ -190,7 +190,8 @@ fn captioned(picture: &Picture, grid: &Grid<Mni>, caption: &str, what: &str) -> 
 /// What a panel shows of the seen and the modelled shift.
 type Panel<'a> = &'a dyn Fn([[f64; 3]; 2]) -> [f64; 3];
 
-fn length(u: [f64; 3]) -> f64 {
+/// Length of a vector.
+pub(super) fn length(u: [f64; 3]) -> f64 {
     u.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 

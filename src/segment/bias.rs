@@ -57,8 +57,7 @@ impl LogBias {
         // Unknowns: a constant, which takes up the error of the class means and is dropped, then the coefficients.
         // The last row holds the right side and the sum of squares.
         let size = used.len() + 1;
-        let parts: Vec<_> =
-            observations.par_chunks(CHUNK).map(|chunk| products(dims, &used, chunk)).collect();
+        let parts: Vec<_> = observations.par_chunks(CHUNK).map(|chunk| products(dims, &used, chunk)).collect();
         let sums = parts.iter().fold(DMatrix::<f64>::zeros(size + 1, size + 1), |sum, part| {
             sum + DMatrix::from_fn(size + 1, size + 1, |a, b| part[a.max(b)][a.min(b)])
         });

@@ -16,6 +16,7 @@ mod fields;
 mod job;
 mod label_maps;
 mod live;
+mod live_server;
 mod made;
 mod material;
 mod mesh_engines;

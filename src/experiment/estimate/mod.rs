@@ -9,6 +9,7 @@ mod correlated;
 mod displacement;
 mod evidence;
 mod findings;
+mod independent;
 mod levenberg_marquardt;
 mod mesh_error;
 mod outcome;
