@@ -39,19 +39,30 @@ pub fn in_a_sentence(shift: &BrainShift) -> String {
     let [x, y, z] = state.largest_at_mm.map(|v| fixed(v, 0));
     let share = shift.explained.as_ref().map_or_else(String::new, |e| format!(" {}", explained(e)));
     format!(
-        "In the state {} the brain moves by up to {} mm ({} mm in the median), most at ({x}, {y}, {z}) mm of the pre-operative \
+        "{}, the brain moves by up to {} mm ({} mm in the median), most at ({x}, {y}, {z}) mm in the frame of the pre-operative \
          scan.{share}",
-        state.state,
+        as_begun(&state.state),
         number(state.largest_mm, 2),
         number(state.median_mm, 2)
     )
+}
+
+/// A state as a sentence begins with it.
+fn as_begun(state: &str) -> String {
+    match state {
+        "estimate" => "As estimated".to_owned(),
+        "fused" => "By model and images together".to_owned(),
+        "observed" => "As the images show it".to_owned(),
+        "predicted" => "As predicted".to_owned(),
+        sample => format!("In {sample}"),
+    }
 }
 
 fn explained(e: &Explained) -> String {
     match (e.share, e.share_sd) {
         (Some(share), Some(sd)) => {
             format!(
-                "The model explains {} of the shift as the images show it, the registration's own error in it.",
+                "The model explains {} of the shift that the images show (with the registration's own error still in it).",
                 percent(share, sd)
             )
         }
@@ -115,7 +126,7 @@ mod tests {
         assert!(said(None).contains("not measurable") && !said(None).contains('%'));
         assert!(
             said(Some(0.8)).contains("80 \u{b1} 5 %")
-                && said(Some(0.8)).contains("state estimate")
+                && said(Some(0.8)).starts_with("As estimated")
                 && said(Some(0.8)).contains("(10, \u{2212}20, 31)"),
             "{}",
             said(Some(0.8))
