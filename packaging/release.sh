@@ -29,7 +29,8 @@ say "static program"
 # With --target the flag is the program's alone; procedural macros are libraries and cannot be static.
 RUSTFLAGS="-C target-feature=+crt-static" cargo build --release --locked --bin hgm --target "$target"
 program="$out.part/hgm-$version-x86_64-linux"
-cp "${CARGO_TARGET_DIR:-target}/$target/release/hgm" "$program"
+# Without its tables of names, which nobody who runs it needs.
+strip -o "$program" "${CARGO_TARGET_DIR:-target}/$target/release/hgm"
 # ldd is content with a static program that can be placed anywhere (static-pie); one that is not static names its libraries.
 if ldd "$program" 2>/dev/null | grep -q '=>'; then
   echo "$program is not static:" >&2

@@ -68,6 +68,7 @@ pub mod geometry;
 pub mod image;
 pub mod layout;
 pub mod live;
+pub mod manual;
 pub mod material;
 pub mod mesh;
 pub mod overlay;

@@ -3,7 +3,6 @@
 
 use super::failure::Failure;
 use crate::workflow::Progress;
-use anyhow::anyhow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a command has left.
@@ -34,18 +33,4 @@ impl Caller {
     pub fn called(&self, ended: Result<(), Failure>) -> Called {
         Called { result: self.result.lock().unwrap_or_else(PoisonError::into_inner).take(), ended }
     }
-}
-
-impl std::fmt::Debug for Caller {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Caller").finish_non_exhaustive()
-    }
-}
-
-/// Words that are no command, told in one line.
-pub fn misspoken(error: &clap::Error) -> Failure {
-    let said = error.to_string();
-    let said = said.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ");
-    let words: Vec<&str> = said.split_whitespace().collect();
-    Failure::Rejected(anyhow!("{}", words.join(" ")))
 }

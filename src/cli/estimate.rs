@@ -1,9 +1,9 @@
 //! `hgm estimate`: the moduli that explain what was observed, with error bars.
 
-use super::flags::{Flags, PopulationOption, PriorModelOption};
+use super::flags::{PopulationOption, PriorModelOption};
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::workflow::{self, Subject};
+use crate::workflow::{self, Layer, Subject};
 use std::path::PathBuf;
 
 /// Shear moduli by optimisation with solver sensitivities: most probable values, 95 % intervals, what limits them
@@ -23,14 +23,14 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     for room in ["resection", "phantom"] {
         flags.set(&format!("{room}.tissues"), args.tissues);
     }
     args.model.over(&mut flags);
     args.population.over(&mut flags)?;
     let settings = session.settings_of(&args.case, flags)?;
-    let case = workflow::estimate(&session.place(&args.case), &settings, &mut session.listener())?;
+    let case = workflow::estimate(&session.place(&args.case), &settings, &mut *session.listener())?;
     let facts = case.estimate()?;
     if case.subject() != Some(Subject::Patient) {
         return session.emit(&facts.estimate, &in_words(&case)?);

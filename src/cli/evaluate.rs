@@ -3,9 +3,7 @@
 use super::{Failure, Session};
 use crate::report::forecast_in_words::evaluation_table;
 use crate::report::in_words::landmark_table;
-use crate::workflow::{
-    Case, EvaluateError, Landmarks, SeenAfterwards, Subject, WorkflowError, evaluate_landmarks, evaluate_prediction,
-};
+use crate::workflow::{Evaluated, Landmarks, SeenAfterwards, evaluate_case};
 use std::path::PathBuf;
 
 /// Landmarks against a case (target registration error), or a prediction against the later case (coverage, scores)
@@ -34,21 +32,14 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let landmarks = args.landmarks.clone().map(|pre| Landmarks { pre, post: args.landmarks_post.clone() });
-    let planned = Case::open(&args.case)?.subject() == Some(Subject::Plan);
-    if let (false, None, Some(landmarks)) = (planned, args.against.as_ref().or(args.post_to_pre.as_ref()), &landmarks) {
-        let found = evaluate_landmarks(&args.case, landmarks)?;
-        return session.emit(&found, &landmark_table(&found));
-    }
-    if !planned && landmarks.is_none() && args.against.is_none() {
-        return Err(WorkflowError::Evaluate(EvaluateError::NoLandmarks { folder: args.case.clone() }).into());
-    }
     let seen = SeenAfterwards {
         case: args.against.clone(),
         state: args.seen.clone(),
-        landmarks,
+        landmarks: args.landmarks.clone().map(|pre| Landmarks { pre, post: args.landmarks_post.clone() }),
         pre_from_post: args.post_to_pre.clone(),
     };
-    let found = evaluate_prediction(&args.case, &seen)?;
-    session.emit(&found, &evaluation_table(&found))
+    match evaluate_case(&args.case, &seen)? {
+        Evaluated::Landmarks(found) => session.emit(&found, &landmark_table(&found)),
+        Evaluated::Prediction(found) => session.emit(&found, &evaluation_table(&found)),
+    }
 }

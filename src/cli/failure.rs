@@ -3,7 +3,7 @@
 use super::output::print_line;
 use super::remedy::remedy;
 use crate::experiment::outcome::Answer;
-use crate::workflow::cohort::{CohortError, DatasetError, MemberError};
+use crate::workflow::cohort::DatasetError;
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
 
@@ -19,6 +19,15 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// An error by whose fault it is.
+    pub fn of(kind: ErrorKind, error: anyhow::Error) -> Self {
+        match kind {
+            ErrorKind::Rejected => Self::Rejected(error),
+            ErrorKind::Failed => Self::Failed(error),
+            ErrorKind::QualityGate => Self::QualityGate(error),
+        }
+    }
+
     /// The number a script sees.
     pub fn code(&self) -> u8 {
         match self {
@@ -66,13 +75,13 @@ impl Failure {
 /// The scans were compared and gave an answer that ends the job.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
-pub struct Answered {
-    pub answer: Answer,
+struct Answered {
+    answer: Answer,
     message: String,
 }
 
 /// An error and its causes, each said once: some texts hold their cause already.
-pub fn in_one_line(error: &anyhow::Error) -> String {
+fn in_one_line(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |said, cause| {
         let cause = cause.trim_end();
         if said.contains(cause) {
@@ -98,11 +107,7 @@ impl<E: Into<anyhow::Error>> From<E> for Failure {
             (error, ErrorKind::QualityGate) => anyhow!("{} (outputs kept)", in_one_line(&error)),
             (error, _) => error,
         };
-        match kind {
-            ErrorKind::Rejected => Self::Rejected(error),
-            ErrorKind::Failed => Self::Failed(error),
-            ErrorKind::QualityGate => Self::QualityGate(error),
-        }
+        Self::of(kind, error)
     }
 }
 
@@ -118,9 +123,7 @@ fn kind(error: &anyhow::Error) -> ErrorKind {
         return error.kind();
     }
     let given = error.is::<InputError>() || error.is::<SettingsError>() || error.is::<DatasetError>();
-    let cohort = error.is::<MemberError>()
-        || error.downcast_ref::<CohortError>().is_some_and(|error| !matches!(error, CohortError::Write(_)));
-    if given || cohort { ErrorKind::Rejected } else { ErrorKind::Failed }
+    if given { ErrorKind::Rejected } else { ErrorKind::Failed }
 }
 
 /// Marks an error as the input's fault (exit code 3).
@@ -135,32 +138,5 @@ pub trait Reject<T> {
 impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
     fn reject(self) -> Result<T, Failure> {
         self.map_err(|error| Failure::Rejected(with_remedy(error.into())))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::resect::{PairError, ResectError};
-    use anyhow::{Context, anyhow};
-
-    #[test]
-    fn no_operation_and_two_people_are_answers_with_a_name_and_exit_code_4() {
-        let pair = |error: PairError| Failure::from(WorkflowError::Pair(error));
-        let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
-        for (failure, name) in [
-            (pair(PairError::NotOnePerson { folds: 0.4 }), Answer::NotOnePerson),
-            (pair(none.into()), Answer::NoOperation),
-        ] {
-            assert_eq!(failure.code(), 4);
-            assert_eq!(failure.parts().1.downcast_ref::<Answered>().map(|a| a.answer), Some(name));
-        }
-    }
-
-    #[test]
-    fn a_cause_is_said_once() {
-        let error = Err::<(), _>(anyhow!("no space left")).context("x.bin: cannot be written (no space left)");
-        let error = error.context("report").unwrap_err();
-        assert_eq!(in_one_line(&error), "report: x.bin: cannot be written (no space left)");
     }
 }

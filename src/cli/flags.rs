@@ -2,14 +2,13 @@
 
 use super::Failure;
 use crate::experiment::population::PopulationPrior;
+use crate::manual::help::laws;
 use crate::material::StudyKind;
 use crate::material::generative::GenerativeModel;
 use crate::material::meta_model::MetaModel;
 use crate::mesh::engine::{Engine, LabelEdge, MeshSize, WallEdge};
-use crate::segment::label;
 use crate::workflow::cohort::population_prior;
-use crate::workflow::{Goal, Inputs};
-use serde::Serialize;
+use crate::workflow::{Goal, Inputs, Layer};
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
@@ -17,36 +16,6 @@ use std::path::PathBuf;
 const MASKS: &str = "Masks";
 const MESH: &str = "Mesh";
 const MATERIAL: &str = "Material";
-
-/// The settings that were given as options: the last layer.
-#[derive(Clone, Debug, Default)]
-pub struct Flags(pub toml::Table);
-
-impl Flags {
-    /// Sets what was given: `path` is the table and the setting, with dots between.
-    pub fn set(&mut self, path: &str, value: Option<impl Serialize>) {
-        let Some(value) = value.and_then(|value| toml::Value::try_from(value).ok()) else { return };
-        let mut names: Vec<&str> = path.split('.').collect();
-        let last = names.pop().unwrap_or_default();
-        let mut table = &mut self.0;
-        for name in names {
-            let below = table.entry(name).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            let toml::Value::Table(below) = below else { return };
-            table = below;
-        }
-        table.insert(last.to_owned(), value);
-    }
-
-    /// The same for an option that is there or not.
-    pub fn switch(&mut self, path: &str, on: bool) {
-        self.set(path, on.then_some(true));
-    }
-
-    /// The same for an option that may be given again and again.
-    pub fn list(&mut self, path: &str, values: &[impl Serialize]) {
-        self.set(path, (!values.is_empty()).then_some(values));
-    }
-}
 
 /// A word that stands for a value of a type, by the names that the settings file has for them.
 pub fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
@@ -66,45 +35,21 @@ pub struct MeshOptions {
     #[arg(long, help_heading = MESH, value_name = "MM", conflicts_with = "cells")]
     pub edge_mm: Option<f64>,
     /// Edges inside a label, times the target: white_matter=1.5 (again for more labels)
-    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR", value_parser = label_edge)]
+    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR")]
     pub edge_in: Vec<LabelEdge>,
     /// Edges at the wall of a label, times the target, and the distance to which that counts: ventricle=0.5@8
-    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR@MM", value_parser = wall_edge)]
+    #[arg(long, help_heading = MESH, value_name = "LABEL=FACTOR@MM")]
     pub edge_near: Vec<WallEdge>,
 }
 
 impl MeshOptions {
     /// What they set.
-    pub fn over(&self, flags: &mut Flags) {
+    pub fn over(&self, flags: &mut Layer) {
         flags.set("mesh.engine", self.mesher);
         flags.set("mesh.size", self.cells.map(MeshSize::Cells).or(self.edge_mm.map(MeshSize::EdgeMm)));
         flags.list("mesh.sizing.labels", &self.edge_in);
         flags.list("mesh.sizing.walls", &self.edge_near);
     }
-}
-
-fn label_edge(text: &str) -> Result<LabelEdge, String> {
-    let read = || {
-        let (label, factor) = text.split_once('=')?;
-        Some(LabelEdge { label: label::number(label)?, factor: factor.parse().ok()? })
-    };
-    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR, such as white_matter=1.5 or 3=1.5"))
-}
-
-fn wall_edge(text: &str) -> Result<WallEdge, String> {
-    let read = || {
-        let (label, rest) = text.split_once('=')?;
-        let (factor, reach) = rest.split_once('@')?;
-        Some(WallEdge { label: label::number(label)?, factor: factor.parse().ok()?, reach_mm: reach.parse().ok()? })
-    };
-    read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
-}
-
-/// A help text with the names of the laws that can be fitted in place of `{}`.
-pub fn laws(help: &str) -> String {
-    let names = MetaModel::names();
-    let (last, others) = names.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
-    help.replace("{}", &format!("{} or {last}", others.join(", ")))
 }
 
 fn engine(name: &str) -> Result<Engine, String> {
@@ -123,7 +68,7 @@ pub struct PriorModelOption {
 
 impl PriorModelOption {
     /// What it sets.
-    pub fn over(&self, flags: &mut Flags) {
+    pub fn over(&self, flags: &mut Layer) {
         flags.set("prior.model", self.model);
     }
 }
@@ -142,7 +87,7 @@ pub struct PriorOptions {
 
 impl PriorOptions {
     /// What they set.
-    pub fn over(&self, flags: &mut Flags) {
+    pub fn over(&self, flags: &mut Layer) {
         self.model.over(flags);
         flags.set("prior.study", self.study);
         flags.set("prior.law", self.law);
@@ -165,17 +110,11 @@ impl PopulationOption {
     }
 
     /// What it sets; a cohort that is one study's worth changes nothing, and that is said.
-    ///
-    /// # Errors
-    /// A file that cannot be read or is no population.
-    pub fn over(&self, flags: &mut Flags) -> Result<(), Failure> {
+    pub fn over(&self, flags: &mut Layer) -> Result<(), Failure> {
         let Some(path) = &self.population else { return Ok(()) };
-        if path.as_os_str() == "none" {
-            flags.set("prior.population", Some(PopulationPrior::none()));
-            return Ok(());
-        }
-        let prior = population_prior(path)?;
-        if prior.parameters.is_empty() {
+        let literature = path.as_os_str() == "none";
+        let prior = if literature { PopulationPrior::none() } else { population_prior(path)? };
+        if prior.parameters.is_empty() && !literature {
             tracing::warn!("{}: one study's worth: the literature's priors stand", path.display());
         }
         flags.set("prior.population", Some(prior));
@@ -195,7 +134,7 @@ pub struct TaskOption {
 
 impl TaskOption {
     /// What it sets; one task's samples are asked for by their study or by two tissues.
-    pub fn over(&self, prior: &PriorOptions, tissues: Option<u8>, flags: &mut Flags) {
+    pub fn over(&self, prior: &PriorOptions, tissues: Option<u8>, flags: &mut Layer) {
         let one = prior.study.is_some() || tissues == Some(2);
         flags.set("resection.every_task", (self.every_task || one).then_some(self.every_task));
     }
@@ -221,7 +160,7 @@ pub struct AnalysisOptions {
 
 impl AnalysisOptions {
     /// What they set.
-    pub fn over(&self, flags: &mut Flags) {
+    pub fn over(&self, flags: &mut Layer) {
         flags.set("resection.tissues", self.tissues);
         self.tasks.over(&self.prior, self.tissues, flags);
         self.prior.over(flags);
@@ -286,34 +225,5 @@ impl PairOptions {
             self.masks.clone();
         let (pre, post) = (self.pre.clone(), self.post.clone());
         Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::workflow::Settings;
-
-    #[test]
-    fn sizes_are_read_by_name_or_number_of_the_label() {
-        let wall = WallEdge { label: label::VENTRICLE, factor: 0.5, reach_mm: 8.0 };
-        assert_eq!([wall_edge("ventricle=0.5@8"), wall_edge("4=0.5@8")], [Ok(wall), Ok(wall)]);
-        assert_eq!(label_edge("white_matter=1.5"), Ok(LabelEdge { label: label::WHITE_MATTER, factor: 1.5 }));
-        for text in ["ventricle", "ventricle=0.5", "falx=0.5@8", "4=half@8", "300=0.5@8"] {
-            assert!(wall_edge(text).unwrap_err().contains("ventricle=0.5@8"), "{text}");
-        }
-        assert!(label_edge("3=").unwrap_err().contains("white_matter=1.5"));
-    }
-
-    #[test]
-    fn options_win_over_the_file_and_leave_the_rest_of_it() {
-        let file =
-            "[mesh]\nengine = \"gmsh\"\n[mesh.size]\nedge_mm = 3.0\n[prior]\npublished = true\n".parse().unwrap();
-        let mut flags = Flags::default();
-        MeshOptions { cells: Some(8000), ..MeshOptions::default() }.over(&mut flags);
-        PriorOptions { law: Some(MetaModel::OGDEN), ..PriorOptions::default() }.over(&mut flags);
-        let settings = Settings::resolve([&file, &flags.0]).unwrap();
-        assert_eq!((settings.mesh.engine, settings.mesh.size), (Engine::GMSH, MeshSize::Cells(8000)));
-        assert!(settings.prior.published && settings.prior.law == MetaModel::OGDEN);
     }
 }

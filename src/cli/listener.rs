@@ -2,7 +2,6 @@
 
 use crate::workflow::{Progress, StageEnded};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Bars and log lines on stderr.
 pub struct Listener {
@@ -61,63 +60,11 @@ impl Progress for Listener {
     }
 }
 
-/// Whoever listens: the terminal, or the program that called.
-pub enum Ear {
-    /// Bars and log lines.
-    Terminal(Listener),
-    /// The caller's own.
-    Caller(Arc<Mutex<dyn Progress + Send>>),
-}
-
-impl Ear {
-    fn tell(&mut self, what: impl FnOnce(&mut dyn Progress)) {
-        match self {
-            Self::Terminal(listener) => what(listener),
-            // A caller that breaks off a job does so by unwinding out of this.
-            Self::Caller(progress) => what(&mut *progress.lock().unwrap_or_else(PoisonError::into_inner)),
-        }
-    }
-}
-
-impl Progress for Ear {
-    fn begin(&mut self, part: &'static str, steps: usize) {
-        self.tell(|p| p.begin(part, steps));
-    }
-
-    fn doing(&mut self, what: &str) {
-        self.tell(|p| p.doing(what));
-    }
-
-    fn step(&mut self) {
-        self.tell(|p| p.step());
-    }
-
-    fn end(&mut self) {
-        self.tell(|p| p.end());
-    }
-
-    fn stage(&mut self, ended: &StageEnded<'_>) {
-        self.tell(|p| p.stage(ended));
-    }
-
-    fn odd(&mut self, file: &str, what: &str) {
-        self.tell(|p| p.odd(file, what));
-    }
-
-    fn noted(&mut self, what: &str) {
-        self.tell(|p| p.noted(what));
-    }
-
-    fn detail(&mut self, of: &str, what: &str) {
-        self.tell(|p| p.detail(of, what));
-    }
-}
-
 /// A bar with the time left.
 ///
 /// # Panics
 /// Never: the template is a constant.
-pub fn bar(steps: u64, what: &'static str) -> ProgressBar {
+fn bar(steps: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{prefix:>14} [{bar:30}] {pos}/{len} {msg} (left {eta})")
         .expect("the template is constant")
         .progress_chars("=> ");

@@ -1,13 +1,12 @@
 //! `hgm live CASE|MESH [SCENARIO]`: a body to pull at in the browser, or a recorded session again.
 
-use super::flags::Flags;
 use super::session::at_signal;
 use super::{Failure, Reject, Session};
 use crate::artefact::{check_writable, write_whole};
-use crate::live::{Colours, Export, LiveBody, Recording, Series, ServeError, serve};
-use crate::workflow::{Resection, Settings, posed_case, posed_mesh, read_text};
+use crate::live::{LiveBody, Recording, ReplayError, ServeError, in_series, replay_to_files, serve};
+use crate::workflow::{Layer, Resection, posed_case, posed_mesh, read_text};
 use anyhow::{Context, anyhow};
-use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -47,17 +46,6 @@ pub struct Args {
     every: Option<u64>,
 }
 
-/// Steps between files of a series: two or three a second of a body of five thousand nodes.
-const EVERY: u64 = 30;
-
-/// What `--json` prints.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Printed {
-    Open { address: String },
-    Replayed { output: String, files: usize, steps: u64, commands: usize, displacement_max_mm: f64, at_rest: bool },
-}
-
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let body = body(args, session)?;
     match (&args.replay, &args.output) {
@@ -78,13 +66,15 @@ fn body(args: &Args, session: &Session) -> Result<LiveBody, Failure> {
         ))
         .reject();
     }
-    let settings: Settings =
-        if folder { session.settings_of(&args.body, Flags::default())? } else { session.settings(Flags::default())? };
-    let posed = if folder {
+    let (settings, posed) = if folder {
+        let settings = session.settings_of(&args.body, Layer::default())?;
         let resection = if args.before_resection { Resection::Undone } else { Resection::Done };
-        posed_case(&session.place(&args.body), &settings, resection, &mut session.listener())?
+        let posed = posed_case(&session.place(&args.body), &settings, resection, &mut *session.listener())?;
+        (settings, posed)
     } else {
-        posed_mesh(&args.body, args.scenario.as_deref(), &settings)?
+        let settings = session.settings(Layer::default())?;
+        let posed = posed_mesh(&args.body, args.scenario.as_deref(), &settings)?;
+        (settings, posed)
     };
     Ok(LiveBody::of(posed, &settings.prior))
 }
@@ -101,7 +91,7 @@ fn open(body: &LiveBody, args: &Args, session: &Session) -> Result<(), Failure> 
     };
     at_signal(server.stopper());
     let address = server.address();
-    session.emit(&Printed::Open { address: address.clone() }, &format!("{address}\nCtrl-C ends it"))?;
+    session.emit(&json!({ "address": address }), &format!("{address}\nCtrl-C ends it"))?;
     if !args.no_browser {
         // Without a browser the printed address serves.
         Command::new("xdg-open").arg(&address).stdout(Stdio::null()).stderr(Stdio::null()).spawn().ok();
@@ -121,48 +111,14 @@ fn replay(
     session: &Session,
 ) -> Result<(), Failure> {
     check_writable(output)?;
-    let in_series = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"));
-    if every.is_some() && !in_series {
+    if every.is_some() && !in_series(output) {
         return Err(anyhow!("{}: --every is for a series; name a .pvd file", output.display())).reject();
     }
     let name = || file.display().to_string();
     let recording = Recording::from_text(&read_text(file)?).with_context(name).reject()?;
-    let bar = session.progress(recording.steps, "steps");
-    let stem = output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let mut series = Series::new(&stem, every.unwrap_or(EVERY));
-    let mut colours = None;
-    let write = |(name, bytes): (String, Vec<u8>)| write_whole(&output.with_file_name(name), &bytes);
-    // The first that cannot be made or written.
-    let mut failed: Option<anyhow::Error> = None;
-    let replayed = recording.replay(body, &mut |seen| {
-        bar.set_position(seen.steps());
-        let colours = &*colours.get_or_insert_with(|| Colours::of(body, seen.mesh()));
-        if in_series && failed.is_none() {
-            let due = series.due(seen, colours).map_err(|reason| anyhow!(reason));
-            failed = due.and_then(|due| Ok(due.map_or(Ok(()), write)?)).err();
-        }
-    });
-    let replayed = replayed.with_context(name).reject()?;
-    bar.finish_and_clear();
-    if let Some(error) = failed {
-        return Err(error.into());
+    match replay_to_files(&recording, body, (output, every), &mut *session.listener()) {
+        Ok(replayed) => session.emit(&replayed, &replayed.in_words()),
+        Err(ReplayError::Recording(error)) => Err(error).with_context(name).reject(),
+        Err(error) => Err(error.into()),
     }
-    let colours = colours.unwrap_or_else(|| Colours::of(body, replayed.mesh()));
-    if in_series {
-        write(series.last(&replayed, &colours).map_err(|reason| anyhow!(reason))?)?;
-        write_whole(output, &series.list())?;
-    } else {
-        let state = Export::of(&replayed).map(|state| state.coloured(&replayed, &colours));
-        write_whole(output, &state.and_then(|state| state.vtu()).map_err(|reason| anyhow!(reason))?)?;
-    }
-    let files = if in_series { series.len() } else { 1 };
-    let largest = replayed.displacement_mm().iter().map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
-    let displacement_max_mm = largest.sqrt();
-    let (steps, commands, at_rest) = (replayed.steps(), recording.commands.len(), replayed.is_at_rest());
-    let text = format!(
-        "{}: {commands} commands, {steps} steps, moved by {displacement_max_mm:.3} mm at most",
-        output.display()
-    );
-    let output = output.display().to_string();
-    session.emit(&Printed::Replayed { output, files, steps, commands, displacement_max_mm, at_rest }, &text)
 }

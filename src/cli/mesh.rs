@@ -1,11 +1,10 @@
 //! `hgm mesh DSEG -o MESH`: conforming tetrahedra of a label map.
 
-use super::flags::{Flags, MeshOptions};
+use super::flags::MeshOptions;
 use super::{Failure, Session};
 use crate::artefact::check_writable;
-use crate::workflow::{MeshFiles, MeshedFile, WorkflowError, mesh_file};
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use crate::workflow::{Layer, MeshFiles, WorkflowError, mesh_file, results_in_words};
+use std::path::PathBuf;
 
 /// Mesh a label map: conforming tetrahedra of every nonzero label, with boundary sets where the map is in MNI space
 ///
@@ -45,7 +44,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     args.mesh.over(&mut flags);
     flags.list("mesh.without", &args.without);
     flags.switch("tag.tentorium", args.tentorium);
@@ -61,33 +60,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         surfaces: args.surfaces.clone(),
     };
     let (force, settings) = (session.options.force, session.settings(flags)?);
-    let meshed = mesh_file(&files, &settings, &session.programs, force, &mut session.listener())?;
-    session.emit(&meshed, &text(&args.output, &meshed))?;
+    let meshed = mesh_file(&files, &settings, &session.programs, force, &mut *session.listener())?;
+    session.emit(&meshed, &results_in_words::meshed(&meshed, &args.output))?;
     if meshed.refused.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(meshed.refused).into()) }
-}
-
-fn text(output: &Path, summary: &MeshedFile) -> String {
-    let m = &summary.mesh;
-    let mut text = format!("{}: {} nodes, {} tetrahedra ({})\n", output.display(), m.nodes, m.tets, m.engine);
-    let figure = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    let _ = writeln!(
-        text,
-        "  dihedral angles from {:.1} degrees, radius ratio {:.2} on average and {:.2} at least, scaled Jacobian from {:.2}",
-        figure(m.dihedral_min_deg),
-        figure(m.radius_ratio_mean),
-        figure(m.radius_ratio_min),
-        figure(m.scaled_jacobian_min),
-    );
-    for (name, percent) in &m.volume_error_percent {
-        let _ = writeln!(text, "  {name}: volume {percent:+.2} %, Dice {:.3}", figure(m.dice.get(name).copied()));
-    }
-    for set in &summary.sets {
-        let [x, y, z] = set.centroid_mm;
-        let _ = writeln!(
-            text,
-            "  set {}: {} nodes, {:.0} mm2 around ({x:.0}, {y:.0}, {z:.0})",
-            set.name, set.nodes, set.area_mm2
-        );
-    }
-    text
 }

@@ -10,8 +10,6 @@ mod compare;
 mod completions;
 mod demo;
 mod doctor;
-#[cfg(test)]
-mod documented;
 mod estimate;
 mod evaluate;
 mod failure;
@@ -22,7 +20,6 @@ mod layout;
 mod listener;
 mod live;
 mod man;
-mod manual;
 mod mesh;
 mod output;
 mod phantom;
@@ -46,11 +43,12 @@ mod why;
 
 pub use call::Called;
 pub use failure::{Failure, Reject};
-pub use session::{GlobalOptions, Session};
 
+use crate::manual::help;
 use crate::workflow::Progress;
-use clap::error::{ContextKind, ContextValue};
+use anyhow::anyhow;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use session::{GlobalOptions, Session};
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
@@ -66,41 +64,61 @@ pub struct Hgm {
     command: Command,
 }
 
-#[derive(Debug, Subcommand)]
-enum Command {
-    Demo(demo::Args),
-    Prep(prep::Args),
-    Run(run::Args),
-    Phantom(phantom::Args),
-    Predict(predict::Args),
-    Sweep(sweep::Args),
-    Reduce(reduce::Args),
-    Estimate(estimate::Args),
-    Warp(warp::Args),
-    Evaluate(evaluate::Args),
-    Compare(compare::Args),
-    Simulate(simulate::Args),
-    Live(live::Args),
-    Synth(synth::Args),
-    Gp(gp::Args),
-    Law(law::Args),
-    Doctor(doctor::Args),
-    Completions(completions::Args),
-    Man(man::Args),
-    Register(register::Args),
-    Mesh(mesh::Args),
-    Segment(segment::Args),
-    Report(report::Args),
-    Bids(bids::Args),
-    Population(population::Args),
-    Why(why::Args),
-    Layout(layout::Args),
-    Schema(schema::Args),
-    Settings(settings::Args),
+/// The commands: what each is called, and the file that has its options and runs it; `of` hands it more.
+macro_rules! commands {
+    ($($name:ident: $file:ident $(of $more:ident)?,)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($name($file::Args),)*
+        }
+
+        fn dispatch(command: Command, session: &Session) -> Result<(), Failure> {
+            match command {
+                $(Command::$name(args) => $file::run(&args, $($more(),)? session),)*
+            }
+        }
+    };
+}
+
+commands! {
+    Demo: demo,
+    Prep: prep,
+    Run: run,
+    Phantom: phantom,
+    Predict: predict,
+    Sweep: sweep,
+    Reduce: reduce,
+    Estimate: estimate,
+    Warp: warp,
+    Evaluate: evaluate,
+    Compare: compare,
+    Simulate: simulate,
+    Live: live,
+    Synth: synth,
+    Gp: gp,
+    Law: law,
+    Doctor: doctor,
+    Completions: completions of command_line,
+    Man: man of command_line,
+    Register: register,
+    Mesh: mesh,
+    Segment: segment,
+    Report: report,
+    Bids: bids,
+    Population: population,
+    Why: why,
+    Layout: layout,
+    Schema: schema,
+    Settings: settings,
+}
+
+/// The whole command line, as it is parsed and shown.
+pub fn command_line() -> clap::Command {
+    help::command(Hgm::command())
 }
 
 fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Hgm, clap::Error> {
-    let mut matches = manual::command(Hgm::command()).try_get_matches_from(words)?;
+    let mut matches = command_line().try_get_matches_from(words)?;
     Hgm::from_arg_matches_mut(&mut matches)
 }
 
@@ -108,11 +126,7 @@ fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Hgm, clap::Error>
 fn said(error: &clap::Error) -> u8 {
     // Whoever reads no further (`hgm --help | head -1`) has what was wanted.
     error.print().ok();
-    let word = error.get(ContextKind::InvalidSubcommand).and_then(|value| match value {
-        ContextValue::String(word) => Some(word.clone()),
-        _ => None,
-    });
-    let meant = word.map(|word| manual::meant_below(&Hgm::command(), &word)).unwrap_or_default();
+    let meant = help::meant_by(&Hgm::command(), error);
     if !meant.is_empty() {
         eprintln!("hgm: there is `{}`", meant.join("` and `"));
     }
@@ -149,69 +163,7 @@ pub fn main_with(words: impl IntoIterator<Item = OsString>) -> u8 {
 pub fn call(words: &[OsString], beside: Option<&Path>, progress: Arc<Mutex<dyn Progress + Send>>) -> Called {
     let caller = call::Caller::new(progress);
     let ended = parsed(std::iter::once("hgm".into()).chain(words.iter().cloned()))
-        .map_err(|error| call::misspoken(&error))
+        .map_err(|error| Failure::Rejected(anyhow!(help::in_one_line(&error))))
         .and_then(|hgm| dispatch(hgm.command, &Session::within(hgm.global, beside, caller.clone())?));
     caller.called(ended)
-}
-
-fn dispatch(command: Command, session: &Session) -> Result<(), Failure> {
-    match command {
-        Command::Demo(args) => demo::run(&args, session),
-        Command::Prep(args) => prep::run(&args, session),
-        Command::Run(args) => run::run(&args, session),
-        Command::Phantom(args) => phantom::run(&args, session),
-        Command::Predict(args) => predict::run(&args, session),
-        Command::Sweep(args) => sweep::run(&args, session),
-        Command::Reduce(args) => reduce::run(&args, session),
-        Command::Estimate(args) => estimate::run(&args, session),
-        Command::Warp(args) => warp::run(&args, session),
-        Command::Evaluate(args) => evaluate::run(&args, session),
-        Command::Compare(args) => compare::run(&args, session),
-        Command::Simulate(args) => simulate::run(&args, session),
-        Command::Live(args) => live::run(&args, session),
-        Command::Synth(args) => synth::run(&args, session),
-        Command::Gp(args) => gp::run(&args, session),
-        Command::Law(args) => law::run(&args, session),
-        Command::Doctor(args) => doctor::run(&args, session),
-        Command::Completions(args) => completions::run(&args, manual::command(Hgm::command()), session),
-        Command::Man(args) => man::run(&args, manual::command(Hgm::command()), session),
-        Command::Mesh(args) => mesh::run(&args, session),
-        Command::Register(args) => register::run(&args, session),
-        Command::Segment(args) => segment::run(&args, session),
-        Command::Report(args) => report::run(&args, session),
-        Command::Bids(args) => bids::run(&args, session),
-        Command::Population(args) => population::run(&args, session),
-        Command::Why(args) => why::run(&args, session),
-        Command::Layout(args) => layout::run(&args, session),
-        Command::Schema(args) => schema::run(&args, session),
-        Command::Settings(args) => settings::run(&args, session),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::workflow::Silent;
-
-    fn called(words: &[&str]) -> Called {
-        let words: Vec<OsString> = words.iter().map(OsString::from).collect();
-        call(&words, None, Arc::new(Mutex::new(Silent)))
-    }
-
-    #[test]
-    fn a_called_command_returns_what_it_would_print_and_says_what_it_would_say() {
-        let layout = called(&["layout"]);
-        assert!(layout.ended.is_ok());
-        let told: serde_json::Value = serde_json::from_str(&layout.result.unwrap()).unwrap();
-        assert!(told["files"].as_array().unwrap().len() > 50);
-
-        let none = called(&["report", "no-such-folder"]);
-        let failure = none.ended.unwrap_err();
-        assert_eq!((failure.code(), none.result), (3, None));
-        assert!(failure.message().contains("no-such-folder"), "{}", failure.message());
-
-        let usage = called(&["simulate", "mesh.vtu"]).ended.unwrap_err();
-        assert_eq!(usage.code(), 3);
-        assert!(usage.message().contains("<SCENARIO>"), "{}", usage.message());
-    }
 }

@@ -1,10 +1,9 @@
 //! `hgm phantom`: known moduli go in and must come out.
 
-use super::flags::{Flags, MeshOptions, PriorOptions};
+use super::flags::{MeshOptions, PriorOptions};
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::experiment::outcome::ExperimentOutcome;
-use crate::workflow;
+use crate::workflow::{self, Layer};
 use std::path::PathBuf;
 
 /// The synthetic validation on the template: a reference of known moduli, found again among the samples
@@ -32,26 +31,12 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     flags.set("phantom.tissues", args.tissues);
     flags.switch("phantom.include_reference", args.include_reference);
     args.prior.over(&mut flags);
     args.mesh.over(&mut flags);
-    let (outcome, text) = made(flags, args.every_task, &args.output, session)?;
-    session.emit(&outcome, &text)
-}
-
-/// A phantom's numbers, and those that matter for a terminal.
-///
-/// # Errors
-/// The first stage that is rejected or fails.
-pub fn made(
-    flags: Flags,
-    every_task: bool,
-    folder: &std::path::Path,
-    session: &Session,
-) -> Result<(ExperimentOutcome, String), Failure> {
-    let settings = session.settings(flags)?;
-    let case = workflow::phantom(every_task, &session.place(folder), &settings, &mut session.listener())?;
-    Ok((case.outcome()?, in_words(&case)?))
+    let (settings, place) = (session.settings(flags)?, session.place(&args.output));
+    let case = workflow::phantom(args.every_task, &place, &settings, &mut *session.listener())?;
+    session.emit(&case.outcome()?, &in_words(&case)?)
 }

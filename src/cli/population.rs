@@ -2,8 +2,7 @@
 
 use super::{Failure, Session};
 use crate::artefact::write_whole;
-use crate::experiment::population::PopulationFile;
-use crate::report::cohort_population::in_words;
+use crate::report::cohort_population::file_in_words;
 use crate::workflow::cohort::{merge_populations, read_population};
 use std::path::PathBuf;
 
@@ -51,7 +50,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Merge(args) => merge(args, session),
         Command::Show(args) => {
             let file = read_population(&args.file)?;
-            session.emit(&file, &words(&file))
+            session.emit(&file, &file_in_words(&file))
         }
     }
 }
@@ -59,9 +58,5 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn merge(args: &MergeArgs, session: &Session) -> Result<(), Failure> {
     let file = merge_populations(&args.files)?;
     write_whole(&args.output, file.to_toml().as_bytes())?;
-    session.emit(&file, &(words(&file) + &args.output.display().to_string()))
-}
-
-fn words(file: &PopulationFile) -> String {
-    file.parameters.iter().map(|taught| in_words(taught) + "\n").collect()
+    session.emit(&file, &(file_in_words(&file) + &args.output.display().to_string()))
 }

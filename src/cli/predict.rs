@@ -1,11 +1,11 @@
 //! `hgm predict`: before the operation, how the brain will move.
 
-use super::flags::{Flags, MeshOptions, PopulationOption, PriorOptions};
+use super::flags::{MeshOptions, PopulationOption, PriorOptions};
 use super::{Failure, Session};
 use crate::layout::PLANS_PAGE;
 use crate::report::forecast_in_words::plans_table;
 use crate::report::in_words::prediction_table;
-use crate::workflow::{Case, PlanInputs, PlannedResection, PredictError, WorkflowError, predict, predict_plans};
+use crate::workflow::{Case, Layer, PlanInputs, PlannedResection, predict, predict_plans};
 use std::path::PathBuf;
 
 /// Before the operation, from one scan and a plan: expected brain shift, how sure it is, where targets will lie
@@ -74,7 +74,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     args.mesh.over(&mut flags);
     args.prior.over(&mut flags);
     args.population.over(&mut flags)?;
@@ -84,7 +84,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("predict.draws", args.draws);
     flags.set("predict.checks", args.checks);
     flags.set("predict.tissues", args.tissues);
-    let mut plans = args.plans()?;
+    let mut plans = PlannedResection::all(&args.resection, &args.resection_label, &args.resection_ellipsoid)?;
     let (settings, place) = (session.settings(flags)?, session.place(&args.output));
     let inputs = PlanInputs {
         pre: args.pre.clone(),
@@ -97,23 +97,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         ventricle_mask: args.ventricle_mask.clone(),
     };
     if plans.is_empty() {
-        let (case, prediction) = predict(&inputs, &place, &settings, &mut session.listener())?;
+        let (case, prediction) = predict(&inputs, &place, &settings, &mut *session.listener())?;
         session.emit(&prediction, &(prediction_table(&prediction) + &case.page().display().to_string()))?;
         return Ok(case.quality_gate()?);
     }
-    let (cases, comparison) = predict_plans(&inputs, &plans, &place, &settings, &mut session.listener())?;
+    let (cases, comparison) = predict_plans(&inputs, &plans, &place, &settings, &mut *session.listener())?;
     let page = args.output.join(PLANS_PAGE);
     session.emit(&comparison, &(plans_table(&comparison) + &page.display().to_string()))?;
     Ok(cases.iter().try_for_each(Case::quality_gate)?)
-}
-
-impl Args {
-    /// The plans: files first, then labels, then ellipsoids.
-    fn plans(&self) -> Result<Vec<PlannedResection>, WorkflowError> {
-        let files = self.resection.iter().map(|path| Ok(PlannedResection::file(path.clone())));
-        let labels = self.resection_label.iter().map(|text| PlannedResection::label(text));
-        let ellipsoids = self.resection_ellipsoid.iter().map(|text| PlannedResection::ellipsoid(text));
-        let plans = files.chain(labels).chain(ellipsoids).collect::<Result<Vec<_>, PredictError>>()?;
-        if plans.is_empty() { Err(PredictError::NoPlan.into()) } else { Ok(plans) }
-    }
 }

@@ -1,9 +1,9 @@
 //! `hgm prep`: a T1 pair to registered images, masks and a tagged mesh.
 
-use super::flags::{Flags, PairOptions};
+use super::flags::PairOptions;
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::workflow::{Goal, run_to};
+use crate::workflow::{Goal, Layer, run_to};
 
 /// T1 pair -> registered images, masks, tagged mesh and a page to check them
 ///
@@ -18,11 +18,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     args.pair.mesh.over(&mut flags);
     let goal = if args.no_mesh { Goal::Images } else { Goal::Mesh };
     let (settings, place) = (session.settings(flags)?, session.place(&args.pair.output));
-    let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut session.listener())?;
+    let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut *session.listener())?;
     session.emit(&case.outcome()?, &in_words(&case)?)?;
     if goal == Goal::Mesh { Ok(case.quality_gate()?) } else { Ok(()) }
 }

@@ -6,10 +6,10 @@ use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::mesh::engine::EngineError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
-use crate::workflow::cohort::{CohortError, DatasetError};
+use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
-    CaseError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError, SettingsError,
-    SimulationError, Subject, WorkflowError,
+    CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError,
+    SettingsError, SimulationError, Subject, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -24,13 +24,12 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     if let Some(NiftiError { problem, .. }) = cause.downcast_ref() {
         return of_image(problem);
     }
-    if let Some(HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_)) =
-        cause.downcast_ref()
-    {
-        return Some("--brain-mask takes one");
+    match cause.downcast_ref()? {
+        HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_) => {
+            Some("--brain-mask takes one")
+        }
+        _ => None,
     }
-    let CohortError::Log { .. } = cause.downcast_ref()? else { return None };
-    Some("`hgm bids BIDS_DIR OUT participant --participant-label` runs one subject")
 }
 
 fn of_image(problem: &NiftiProblem) -> Option<&'static str> {
@@ -57,6 +56,8 @@ fn of_engine(error: &EngineError) -> &'static str {
 fn of_workflow(error: &WorkflowError) -> Option<String> {
     let said = match error {
         WorkflowError::Case(error) => return of_case(error),
+        WorkflowError::Dataset(error) => return of_dataset(error),
+        WorkflowError::Cohort(CohortError::NobodyRun { .. }) => "run `hgm bids BIDS_DIR OUT participant` first",
         WorkflowError::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
         WorkflowError::Engine { source, .. } => of_engine(source),
         WorkflowError::Labels(LabelMapError::Import {
@@ -166,7 +167,7 @@ fn of_case(error: &CaseError) -> Option<String> {
         ),
         CaseError::Held { .. } => "wait until it has ended".to_owned(),
         CaseError::NothingResected { .. } => "leave --before-resection out".to_owned(),
-        CaseError::NoField { .. } | CaseError::Unreadable { .. } => return None,
+        CaseError::NoField { .. } | CaseError::NoStage { .. } | CaseError::Unreadable { .. } => return None,
     })
 }
 

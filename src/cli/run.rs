@@ -1,9 +1,9 @@
 //! `hgm run`: prep, sweep or estimate, report.
 
-use super::flags::{AnalysisOptions, Flags, MeshOptions, PairOptions};
+use super::flags::{AnalysisOptions, MeshOptions, PairOptions};
 use super::{Failure, Session};
 use crate::report::in_words::summary;
-use crate::workflow::{Case, Settings, run_to};
+use crate::workflow::{Case, Layer, Settings, run_to};
 use anyhow::anyhow;
 
 /// T1 pair -> everything: prep, a sweep over the prior, per-node errors, report; resumable
@@ -17,24 +17,17 @@ pub struct Args {
     analysis: AnalysisOptions,
 }
 
-/// Tetrahedra of an estimate's mesh: from 60,000 (of the engine `cgal`) to this many the moduli of a synthetic patient moved by +14 and
-/// -13 %, towards what another engine's mesh gave.
-const ESTIMATE_CELLS: usize = 160_000;
-
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = settings(&args.analysis, &args.pair.mesh, session)?;
     let (goal, place) = (args.analysis.goal(), session.place(&args.pair.output));
-    let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut session.listener())?;
+    let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut *session.listener())?;
     session.emit(&case.outcome()?, &in_words(&case)?)?;
     Ok(case.quality_gate()?)
 }
 
-/// The settings of a patient's whole job: an estimate has a finer mesh unless another is asked for.
+/// The settings of a patient's whole job.
 pub fn settings(analysis: &AnalysisOptions, mesh: &MeshOptions, session: &Session) -> Result<Settings, Failure> {
-    let (mut own, mut flags) = (Flags::default(), Flags::default());
-    if analysis.estimate {
-        own.set("mesh.size.cells", Some(ESTIMATE_CELLS));
-    }
+    let mut flags = Layer::default();
     analysis.over(&mut flags);
     if analysis.population.given() && !analysis.estimate {
         return Err(Failure::Rejected(anyhow!(
@@ -43,7 +36,7 @@ pub fn settings(analysis: &AnalysisOptions, mesh: &MeshOptions, session: &Sessio
     }
     analysis.population.over(&mut flags)?;
     mesh.over(&mut flags);
-    session.settings_over(&own.0, flags)
+    session.settings_over(&analysis.goal().own_settings().0, flags)
 }
 
 /// What a job has found, for a terminal: the page's own verdict, its figures, and where the page is.

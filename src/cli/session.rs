@@ -2,14 +2,13 @@
 
 use super::call::Caller;
 use super::failure::Failure;
-use super::flags::{Flags, word};
-use super::listener::{Ear, Listener, bar};
+use super::flags::word;
+use super::listener::Listener;
 use super::output::print_line;
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
-use crate::workflow::{Case, Place, Programs, Settings, read_text};
+use crate::workflow::{Case, Layer, Place, Programs, Progress, Settings, Shared, read_text};
 use anyhow::{Context, anyhow};
-use indicatif::ProgressBar;
 use serde::Serialize;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -69,7 +68,6 @@ pub struct GlobalOptions {
 }
 
 /// The global options, resolved: thread pool built, settings file parsed, logging on.
-#[derive(Debug)]
 pub struct Session {
     /// The options as given.
     pub options: GlobalOptions,
@@ -81,9 +79,6 @@ pub struct Session {
 
 impl Session {
     /// Starts logging and the thread pool and reads the settings file.
-    ///
-    /// # Errors
-    /// A settings file that cannot be read or parsed is rejected.
     pub fn open(options: GlobalOptions) -> Result<Self, Failure> {
         let level = match (options.quiet, options.verbose) {
             (true, _) => "error",
@@ -111,9 +106,6 @@ impl Session {
 
     /// For a caller: no signal handlers, no thread pool, no logs, nothing printed. `beside` is where programs are looked for
     /// before the `PATH`.
-    ///
-    /// # Errors
-    /// As [`Session::open`].
     pub fn within(options: GlobalOptions, beside: Option<&Path>, caller: Caller) -> Result<Self, Failure> {
         let config = config(&options)?;
         let programs = Programs::look_up(beside, |name| std::env::var_os(name));
@@ -121,26 +113,17 @@ impl Session {
     }
 
     /// The settings of a job that makes something new: the defaults, over them the settings file, over that the options.
-    ///
-    /// # Errors
-    /// Values that no room takes are rejected.
-    pub fn settings(&self, flags: Flags) -> Result<Settings, Failure> {
+    pub fn settings(&self, flags: Layer) -> Result<Settings, Failure> {
         self.settings_over(&toml::Table::new(), flags)
     }
 
     /// The settings of a job on a case: its own come between the defaults and the settings file.
-    ///
-    /// # Errors
-    /// As [`Session::settings`]; also a case whose settings cannot be read.
-    pub fn settings_of(&self, folder: &Path, flags: Flags) -> Result<Settings, Failure> {
+    pub fn settings_of(&self, folder: &Path, flags: Layer) -> Result<Settings, Failure> {
         self.settings_over(&Case::open(folder)?.settings()?, flags)
     }
 
     /// The settings over those of a job's own, which take the place of the defaults.
-    ///
-    /// # Errors
-    /// As [`Session::settings`].
-    pub fn settings_over(&self, own: &toml::Table, mut flags: Flags) -> Result<Settings, Failure> {
+    pub fn settings_over(&self, own: &toml::Table, mut flags: Layer) -> Result<Settings, Failure> {
         flags.set("image.prefer", self.options.prefer);
         flags.set("image.volume", self.options.volume);
         for room in ["register", "gp", "synth"] {
@@ -155,10 +138,10 @@ impl Session {
     }
 
     /// Whoever listens to a job.
-    pub fn listener(&self) -> Ear {
+    pub fn listener(&self) -> Box<dyn Progress> {
         match &self.caller {
-            Some(caller) => Ear::Caller(Arc::clone(&caller.progress)),
-            None => Ear::Terminal(Listener::new(self.shows_bars())),
+            Some(caller) => Box::new(Shared(Arc::clone(&caller.progress))),
+            None => Box::new(Listener::new(self.shows_bars())),
         }
     }
 
@@ -166,10 +149,12 @@ impl Session {
         self.caller.is_none() && !self.options.quiet && std::io::stderr().is_terminal()
     }
 
+    /// Log lines of what a reader must know of a result.
+    pub fn warn(&self, warnings: &[String]) {
+        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+    }
+
     /// Prints the result: `value` with `--json`, else the text.
-    ///
-    /// # Errors
-    /// A value that cannot be serialised.
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
         if let Some(caller) = &self.caller {
             *caller.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(serde_json::to_string(value)?);
@@ -182,11 +167,6 @@ impl Session {
             print_line(text.trim_end())?;
         }
         Ok(())
-    }
-
-    /// A progress bar of `steps` steps with time left; hidden when stderr is not a terminal or with `-q`.
-    pub fn progress(&self, steps: u64, what: &'static str) -> ProgressBar {
-        if self.shows_bars() { bar(steps, what) } else { ProgressBar::hidden() }
     }
 }
 

@@ -1,9 +1,7 @@
 //! `hgm settings`: every setting with default, unit and what it is.
 
-use super::flags::Flags;
 use super::{Failure, Session};
-use crate::workflow::{annotated, every_setting};
-use anyhow::anyhow;
+use crate::workflow::{Layer, annotated, every_setting, settings_of_table};
 use std::path::PathBuf;
 
 /// Print every table and key of a settings file with value, unit and what it is; edit it and give it back with --config
@@ -21,21 +19,13 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = match &args.used {
-        Some(case) => session.settings_of(case, Flags::default())?,
-        None => session.settings(Flags::default())?,
+        Some(case) => session.settings_of(case, Layer::default())?,
+        None => session.settings(Layer::default())?,
     };
-    let mut all = every_setting(&settings);
-    if let Some(wanted) = &args.table {
-        let tables: Vec<String> = all.iter().filter_map(|s| s.table.split('.').next()).map(str::to_owned).collect();
-        all.retain(|s| s.table == *wanted || s.table.starts_with(&format!("{wanted}.")));
-        if all.is_empty() {
-            let mut tables = tables;
-            tables.dedup();
-            return Err(Failure::Rejected(anyhow!(
-                "there is no table [{wanted}]; the tables are {}",
-                tables.join(", ")
-            )));
-        }
-    }
+    let all = every_setting(&settings);
+    let all = match &args.table {
+        Some(wanted) => settings_of_table(all, wanted)?,
+        None => all,
+    };
     session.emit(&serde_json::json!({ "settings": all }), &annotated(&all))
 }

@@ -1,9 +1,9 @@
 //! `hgm sweep`: the prior's samples on a prepared case, all of them or a part.
 
-use super::flags::{Flags, PriorOptions, TaskOption};
+use super::flags::{PriorOptions, TaskOption};
 use super::run::in_words;
 use super::{Failure, Session};
-use crate::workflow::{self, Shard};
+use crate::workflow::{self, Layer, Shard};
 use std::path::PathBuf;
 
 /// Samples of the prior simulated on a prepared case; --shard K/N runs a part, `hgm reduce` joins the parts
@@ -26,12 +26,12 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     flags.set("resection.tissues", args.tissues);
     args.tasks.over(&args.prior, args.tissues, &mut flags);
     args.prior.over(&mut flags);
     let settings = session.settings_of(&args.case, flags)?;
-    let case = workflow::sweep(args.shard, &session.place(&args.case), &settings, &mut session.listener())?;
+    let case = workflow::sweep(args.shard, &session.place(&args.case), &settings, &mut *session.listener())?;
     if let Some(Shard { number, of }) = args.shard {
         session.emit(
             &serde_json::json!({ "shard": number, "of": of }),

@@ -1,10 +1,10 @@
 //! `hgm synth -o DIR`: a synthetic patient.
 
-use super::flags::{Flags, word};
+use super::flags::word;
 use super::{Failure, Session};
 use crate::experiment::synth::{Contrast, Lobe, SagKind};
 use crate::segment::atlas::Side;
-use crate::workflow::{SyntheticFiles, synthetic_patient};
+use crate::workflow::{Layer, SyntheticFiles, results_in_words, synthetic_patient};
 use std::path::PathBuf;
 
 /// Make a synthetic patient: pre- and post-operative T1 and the truth behind them
@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "head", conflicts_with_all = ["lobe", "resection_cc"])]
     pub resected_mask: Option<PathBuf>,
     /// Operated lobe [default: temporal]
-    #[arg(long, value_parser = lobe, value_name = "temporal|frontal|parietal|occipital|insular")]
+    #[arg(long, value_name = "temporal|frontal|parietal|occipital|insular")]
     pub lobe: Option<Lobe>,
     /// Operated side [default: left]
     #[arg(long, value_parser = word::<Side>, value_name = "left|right")]
@@ -60,12 +60,8 @@ pub struct Args {
     pub contrast: Option<Contrast>,
 }
 
-fn lobe(text: &str) -> Result<Lobe, String> {
-    Lobe::of_name(text).ok_or_else(|| "say temporal, frontal, parietal, occipital or insular".to_owned())
-}
-
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     flags.set("synth.side", args.side);
     flags.set("synth.lobe", args.lobe);
     flags.set("synth.resection_cc", args.resection_cc);
@@ -76,7 +72,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("synth.contrast", args.contrast);
     flags.set("synth.spacing_mm", args.spacing_mm);
     // Slices are never thinner than the voxels asked for.
-    let slices = session.settings(Flags::default())?.synth.post_slice_mm;
+    let slices = session.settings(Layer::default())?.synth.post_slice_mm;
     flags.set("synth.post_slice_mm", args.slice_mm.or(args.spacing_mm.map(|spacing| slices.max(spacing))));
     let settings = session.settings(flags)?;
     let files = SyntheticFiles {
@@ -86,17 +82,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         labels: args.labels.clone(),
         resected_mask: args.resected_mask.clone(),
     };
-    let truth = synthetic_patient(&files, &settings, session.options.force, &mut session.listener())?;
-    let figure = |name: &str| truth[name].as_f64().unwrap_or(f64::NAN);
-    let text = format!(
-        "{}: {} {}, resected {:.1} cc, cavity {:.1} cc, brain shift up to {:.1} mm, head turned by {:.1} degrees between the scans",
-        args.output.display(),
-        settings.synth.side,
-        if args.resected_mask.is_some() { "mask" } else { settings.synth.lobe.name() },
-        figure("resected_cc"),
-        figure("cavity_cc"),
-        figure("largest_displacement_mm"),
-        figure("rotation_deg"),
-    );
+    let truth = synthetic_patient(&files, &settings, session.options.force, &mut *session.listener())?;
+    let text = results_in_words::synthesised(&truth, &files, &settings);
     session.emit(&serde_json::json!({ "folder": args.output.display().to_string(), "truth": truth }), &text)
 }

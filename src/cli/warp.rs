@@ -1,10 +1,11 @@
 //! `hgm warp`: a user's image, points, streamlines or surface carried by a case.
 
-use super::flags::{Flags, word};
+use super::flags::word;
 use super::{Failure, Session};
 use crate::artefact::check_writable;
 use crate::report::in_words::warped;
-use crate::workflow::{Through, Warp, WarpTo, warp};
+use crate::workflow::{Layer, Through, Warp, WarpTo, warp};
+use anyhow::anyhow;
 use std::path::PathBuf;
 
 /// Carry a file of one scan to the other by brain shift and rigid motion: images, label maps (.nii.gz), points (.csv, .fcsv,
@@ -38,17 +39,13 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (through, file) = match (&args.paths[..], &args.field) {
         ([file], Some(field)) => (Through::Field(field.clone()), file),
         ([case, file], None) => (Through::Case { folder: case.clone(), to: args.to, state: args.state.clone() }, file),
-        (_, field) => {
-            let said = if field.is_some() {
-                "--field takes the place of the case: name the file alone"
-            } else {
-                "name the case and the file"
-            };
-            return Err(Failure::Rejected(anyhow::anyhow!(said)));
+        (_, Some(_)) => {
+            return Err(Failure::Rejected(anyhow!("--field takes the place of the case: name the file alone")));
         }
+        (_, None) => return Err(Failure::Rejected(anyhow!("name the case and the file"))),
     };
     check_writable(&args.output)?;
-    let reading = session.settings(Flags::default())?.image;
+    let reading = session.settings(Layer::default())?.image;
     let asked = Warp { file: file.clone(), output: args.output.clone(), through, labels: args.labels, reading };
     let done = warp(&asked)?;
     session

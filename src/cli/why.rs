@@ -2,8 +2,7 @@
 
 use super::flags::{AnalysisOptions, MeshOptions};
 use super::{Failure, Session, run};
-use crate::workflow::{Asked, Explained, why};
-use anyhow::anyhow;
+use crate::workflow::{Asked, results_in_words, why};
 use std::path::PathBuf;
 
 /// Which input or setting would make a stage of a case run again, if `hgm run` were called with these options
@@ -29,23 +28,8 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = run::settings(&args.analysis, &args.mesh, session)?;
-    let asked = Asked { goal: args.analysis.goal(), pre: args.pre.clone(), post: args.post.clone() };
-    let mut explained = why(&asked, &session.place(&args.case), &settings)?;
-    if let Some(wanted) = &args.stage {
-        let names: Vec<String> = explained.iter().map(|e| e.stage.clone()).collect();
-        explained.retain(|e| e.stage == *wanted);
-        if explained.is_empty() {
-            return Err(Failure::Rejected(anyhow!("no stage `{wanted}` in this case; it has {}", names.join(", "))));
-        }
-    }
-    let line = |e: &Explained| {
-        let what = if e.would_run {
-            e.reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
-        } else {
-            "up to date".to_owned()
-        };
-        format!("{:<16} {what}\n", e.stage)
-    };
-    let text: String = explained.iter().map(line).collect();
-    session.emit(&serde_json::json!({ "stages": explained }), &text)
+    let asked =
+        Asked { goal: args.analysis.goal(), stage: args.stage.clone(), pre: args.pre.clone(), post: args.post.clone() };
+    let explained = why(&asked, &session.place(&args.case), &settings)?;
+    session.emit(&serde_json::json!({ "stages": explained }), &results_in_words::explained(&explained))
 }

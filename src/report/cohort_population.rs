@@ -1,6 +1,6 @@
 //! What a cohort says of people, beside the table of its subjects.
 
-use crate::experiment::population::{Shrunken, Taught};
+use crate::experiment::population::{PopulationFile, Shrunken, Taught};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -48,6 +48,11 @@ impl CohortPopulation {
         said.extend(self.parameters.iter().map(in_words));
         said
     }
+}
+
+/// What a population's file says, a line for each parameter.
+pub fn file_in_words(file: &PopulationFile) -> String {
+    file.parameters.iter().map(|taught| in_words(taught) + "\n").collect()
 }
 
 /// One parameter of a population in words.

@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use super::error::{EvaluateError, WorkflowError};
-use super::evaluate::{Landmarks, Pair, pairs};
+use super::evaluate::{Landmarks, Pair, evaluate_landmarks, pairs};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
 use super::outcome::write_page;
@@ -10,6 +10,7 @@ use super::stage_name::{StageName, Subject};
 use super::stages::{OBSERVED, Predicted, grid_of, mask_of, mni_from_pre, read_draws, transforms};
 use super::user_file::{read_text, shown};
 use crate::artefact::{Manifest, sha256_hex, write_whole};
+use crate::experiment::landmarks::Evaluation;
 use crate::experiment::predict::{
     Compared, Found, HeadEvaluation, LandmarkForecast, Locator, Modes, Prediction, PredictionEvaluation, Scatter,
     TakenAgainstPlan, TargetPlace, scores,
@@ -34,6 +35,30 @@ pub struct SeenAfterwards {
     /// The rigid motion that carries a point of the later scan to the earlier one, where no case says it: 4x4 text (RAS, mm) or
     /// ITK's.
     pub pre_from_post: Option<PathBuf>,
+}
+
+/// What a case was held against, and how it did.
+#[derive(Clone, Debug)]
+pub enum Evaluated {
+    /// Landmarks carried by a case of two scans.
+    Landmarks(Evaluation),
+    /// A prediction.
+    Prediction(PredictionEvaluation),
+}
+
+/// A case of two scans by landmarks, a prediction by what was seen afterwards.
+///
+/// # Errors
+/// As [`evaluate_landmarks`] and [`evaluate_prediction`]; also nothing to hold it against.
+pub fn evaluate_case(folder: &Path, seen: &SeenAfterwards) -> Result<Evaluated, WorkflowError> {
+    if Case::open(folder)?.subject() == Some(Subject::Plan) || seen.case.is_some() {
+        return evaluate_prediction(folder, seen).map(Evaluated::Prediction);
+    }
+    match &seen.landmarks {
+        None => Err(EvaluateError::NoLandmarks { folder: folder.to_path_buf() }.into()),
+        Some(_) if seen.pre_from_post.is_some() => evaluate_prediction(folder, seen).map(Evaluated::Prediction),
+        Some(landmarks) => evaluate_landmarks(folder, landmarks).map(Evaluated::Landmarks),
+    }
 }
 
 /// A landmark further than this from the predicted tissue belongs to no brain, mm.

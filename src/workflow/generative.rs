@@ -88,6 +88,19 @@ pub struct GenerativeFiles {
     pub facts: Value,
 }
 
+impl GenerativeFiles {
+    /// The facts' `text`, the table for a terminal, which is no fact of its own.
+    pub fn take_text(&mut self) -> String {
+        let text = self.facts.as_object_mut().and_then(|facts| facts.remove("text"));
+        text.as_ref().and_then(Value::as_str).unwrap_or_default().to_owned()
+    }
+
+    /// The files' names.
+    pub fn names(&self) -> Vec<String> {
+        self.files.iter().map(|file| file.display().to_string()).collect()
+    }
+}
+
 /// Hyperparameters of greatest likelihood, into `hyperparameters.toml` of `folder`.
 ///
 /// # Errors

@@ -20,6 +20,7 @@
 //! # }
 //! ```
 
+mod bundled_pair;
 mod case;
 mod error;
 mod estimate_options;
@@ -30,6 +31,8 @@ mod fresh;
 mod generative;
 mod inputs;
 mod labels;
+mod law_fitting;
+mod layer;
 mod lock;
 mod maps;
 mod meshing;
@@ -45,6 +48,8 @@ mod prediction;
 mod programs;
 mod progress;
 mod refusal;
+mod registering;
+mod segmenting;
 mod settings;
 mod settings_manual;
 mod several_plans;
@@ -60,19 +65,23 @@ mod why;
 mod work;
 
 pub mod cohort;
+pub mod results_in_words;
 
+pub use bundled_pair::{demo, demo_pair_settings, demo_phantom_settings};
 pub use case::Case;
 pub use error::{
-    CaseError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError,
-    PredictError, SimulationError, WarpError, WorkflowError,
+    CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
+    MeshFileError, PredictError, SimulationError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};
-pub use evaluate_prediction::{SeenAfterwards, evaluate_prediction};
+pub use evaluate_prediction::{Evaluated, SeenAfterwards, evaluate_case, evaluate_prediction};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
 pub use inputs::{Inputs, ScanSums, read_mask_of};
 pub use labels::{any_labels, labels_of_tool};
+pub use law_fitting::{FittedLaw, LawTest, fit_laws};
+pub use layer::Layer;
 pub use maps::{WarpTo, default_state};
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use paper::paper;
@@ -82,10 +91,12 @@ pub use planned_resection::PlannedResection;
 pub use planned_scan::PlanInputs;
 pub use posed::{Posed, Resection, posed_case, posed_mesh};
 pub use prediction::predict;
-pub use programs::{Known, Programs, known};
-pub use progress::{Progress, Silent, StageEnded};
+pub use programs::{Finding, Known, Programs, known};
+pub use progress::{Progress, Shared, Silent, StageEnded};
+pub use registering::{Onto, RegisterFiles, Registered, register_files};
+pub use segmenting::{SegmentFiles, Segmented, segment_file};
 pub use settings::{Settings, SettingsError, in_words};
-pub use settings_manual::{Setting, annotated, every_setting};
+pub use settings_manual::{Setting, annotated, every_setting, settings_of_table};
 pub use several_plans::predict_plans;
 pub use sights::{Scan, Sights};
 pub use simulation::{Simulation, SimulationFiles, simulate, simulate_mesh};

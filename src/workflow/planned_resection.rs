@@ -35,6 +35,18 @@ const NOTED_BESIDE: f64 = 0.1;
 const LARGE_ENOUGH_MM3: f64 = 1000.0;
 
 impl PlannedResection {
+    /// Plans as they were written: files first, then labels, then ellipsoids; one at least.
+    ///
+    /// # Errors
+    /// [`PredictError::NoPlan`], and one that cannot be read.
+    pub fn all(files: &[PathBuf], labels: &[String], ellipsoids: &[String]) -> Result<Vec<Self>, WorkflowError> {
+        let files = files.iter().map(|path| Ok(Self::file(path.clone())));
+        let labels = labels.iter().map(|text| Self::label(text));
+        let ellipsoids = ellipsoids.iter().map(|text| Self::ellipsoid(text));
+        let plans = files.chain(labels).chain(ellipsoids).collect::<Result<Vec<_>, PredictError>>()?;
+        if plans.is_empty() { Err(PredictError::NoPlan.into()) } else { Ok(plans) }
+    }
+
     /// A file: a surface by the end of its name, else a mask.
     pub fn file(path: PathBuf) -> Self {
         if Drawing::knows(&shown(&path)) { Self::Surface(path) } else { Self::Mask(path) }

@@ -1,6 +1,7 @@
 //! The programs of other people that hgm can use: looked up here and nowhere else.
 
 use crate::mesh::engine::{Engine, EnginePrograms, Program};
+use serde::Serialize;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +70,33 @@ impl Programs {
     /// Those that make meshes.
     pub fn engines(&self) -> EnginePrograms {
         EnginePrograms::of(|name| self.find(name).map(Path::to_path_buf))
+    }
+}
+
+/// One program that hgm can use but does not need, and whether it is there.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// Its file's name.
+    pub what: &'static str,
+    /// What it is used for.
+    pub used_for: &'static str,
+    /// Whether it was found.
+    pub found: bool,
+    /// Where.
+    pub location: Option<String>,
+    /// The command that installs it.
+    pub install: &'static str,
+}
+
+impl Programs {
+    /// Every program that hgm can use, with where it is.
+    pub fn findings(&self) -> Vec<Finding> {
+        let finding = |known: Known| {
+            let location = self.find(known.name).map(|path| path.display().to_string());
+            let Known { name: what, used_for, install, .. } = known;
+            Finding { what, used_for, found: location.is_some(), location, install }
+        };
+        known().map(finding).collect()
     }
 }
 

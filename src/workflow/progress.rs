@@ -2,6 +2,7 @@
 
 use super::stage_name::StageName;
 use crate::artefact::Reason;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Listens to a job. Every method may be left out.
 #[allow(unused_variables, reason = "the names say what is handed over")]
@@ -42,3 +43,48 @@ pub struct StageEnded<'a> {
 pub struct Silent;
 
 impl Progress for Silent {}
+
+/// One that whoever asked for the job keeps a hold of. A caller that breaks a job off does so by unwinding out of it, which
+/// must not silence it.
+#[derive(Clone)]
+pub struct Shared(pub Arc<Mutex<dyn Progress + Send>>);
+
+impl Shared {
+    fn tell(&self, what: impl FnOnce(&mut dyn Progress)) {
+        what(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+impl Progress for Shared {
+    fn begin(&mut self, part: &'static str, steps: usize) {
+        self.tell(|p| p.begin(part, steps));
+    }
+
+    fn doing(&mut self, what: &str) {
+        self.tell(|p| p.doing(what));
+    }
+
+    fn step(&mut self) {
+        self.tell(|p| p.step());
+    }
+
+    fn end(&mut self) {
+        self.tell(|p| p.end());
+    }
+
+    fn stage(&mut self, ended: &StageEnded<'_>) {
+        self.tell(|p| p.stage(ended));
+    }
+
+    fn odd(&mut self, file: &str, what: &str) {
+        self.tell(|p| p.odd(file, what));
+    }
+
+    fn noted(&mut self, what: &str) {
+        self.tell(|p| p.noted(what));
+    }
+
+    fn detail(&mut self, of: &str, what: &str) {
+        self.tell(|p| p.detail(of, what));
+    }
+}

@@ -1,7 +1,7 @@
 //! Every setting with its value, its default, its unit and what it is: the settings file that documents itself. The words
 //! are the doc comments of the settings' own types.
 
-use super::settings::Settings;
+use super::settings::{Settings, SettingsError};
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use serde_json::Value;
@@ -60,6 +60,21 @@ pub fn every_setting(settings: &Settings) -> Vec<Setting> {
     let mut all = Vec::new();
     collect(&schema, &schema, "", [&json(settings), &json(&Settings::default())], &mut all);
     all
+}
+
+/// Those of a table and of the tables below it.
+///
+/// # Errors
+/// A table that does not exist.
+pub fn settings_of_table(mut all: Vec<Setting>, wanted: &str) -> Result<Vec<Setting>, SettingsError> {
+    let mut tables: Vec<String> = all.iter().filter_map(|s| s.table.split('.').next()).map(str::to_owned).collect();
+    tables.dedup();
+    all.retain(|s| s.table == *wanted || s.table.starts_with(&format!("{wanted}.")));
+    if all.is_empty() {
+        let reason = format!("there is no table [{wanted}]; the tables are {}", tables.join(", "));
+        return Err(SettingsError { file: None, line: None, table: None, reason });
+    }
+    Ok(all)
 }
 
 /// What a reference in a schema stands for; an optional value's own schema.

@@ -1,7 +1,7 @@
 //! What made a stage run again, or would.
 
 use super::case::Case;
-use super::error::WorkflowError;
+use super::error::{CaseError, WorkflowError};
 use super::facts::MeshFacts;
 use super::inputs::ScanSums;
 use super::plan::{self, Goal, plan_with};
@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 pub struct Asked {
     /// How far it would go.
     pub goal: Goal,
+    /// Only this stage, by its name in the manifests.
+    pub stage: Option<String>,
     /// The pre-operative scan.
     pub pre: Option<PathBuf>,
     /// The post-operative scan.
@@ -40,7 +42,7 @@ pub struct Explained {
 /// Which stages of a case would run again if the job were done with these settings, and why.
 ///
 /// # Errors
-/// A folder in which no stage has finished, or a scan that cannot be read.
+/// A folder in which no stage has finished, or not the one that is asked about; a scan that cannot be read.
 pub fn why(asked: &Asked, place: &Place, settings: &Settings) -> Result<Vec<Explained>, WorkflowError> {
     let case = Case::open(&place.folder)?;
     let recorded = case.recorded();
@@ -53,6 +55,12 @@ pub fn why(asked: &Asked, place: &Place, settings: &Settings) -> Result<Vec<Expl
     let known = |stage: &&Stage| recorded.iter().all(|manifest| manifest.stage != stage.name());
     explained.extend(posed.iter().filter(known).map(|stage| entry(stage.name(), stage.why())));
     follow(&mut explained, &recorded);
+    let Some(wanted) = &asked.stage else { return Ok(explained) };
+    let stages: Vec<String> = explained.iter().map(|e| e.stage.clone()).collect();
+    explained.retain(|e| e.stage == *wanted);
+    if explained.is_empty() {
+        return Err(CaseError::NoStage { wanted: wanted.clone(), stages }.into());
+    }
     Ok(explained)
 }
 

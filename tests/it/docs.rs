@@ -1,5 +1,5 @@
 //! The documents say what is: reference pages as the program writes them, commands that run, paths that exist, notebooks that
-//! print what they show. (That every command parses is held by `src/cli/documented.rs`.)
+//! print what they show. (That every command parses is held by `tests/it/documented.rs`.)
 
 use crate::job::{contents, output, program, sample};
 use crate::made::{copy, finished_pair};
@@ -12,7 +12,7 @@ pub fn root() -> &'static Path {
 }
 
 /// Every document with its text, those that the program writes among them.
-fn documents() -> Vec<(PathBuf, String)> {
+pub fn documents() -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     let mut folders = vec![root().join("docs")];
     while let Some(folder) = folders.pop() {

@@ -2,6 +2,7 @@
 
 mod answers;
 mod bids;
+mod called;
 mod circles;
 mod cluster;
 mod cohort;
@@ -9,6 +10,7 @@ mod command_line;
 mod damaged_files;
 mod dependencies;
 mod docs;
+mod documented;
 mod doubtful_inputs;
 mod examples;
 mod fem;
@@ -18,6 +20,7 @@ mod label_maps;
 mod live;
 mod live_server;
 mod made;
+mod manual;
 mod material;
 mod mesh_engines;
 mod mesh_files;

@@ -24,6 +24,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         "report",
         "workflow",
         "live",
+        "manual",
     ];
     BTreeMap::from([
         ("anatomy", vec![]),
@@ -46,6 +47,7 @@ fn table() -> BTreeMap<&'static str, Vec<&'static str>> {
         ),
         ("workflow", all[..15].to_vec()),
         ("live", vec!["artefact", "mesh", "material", "fem", "experiment", "workflow"]),
+        ("manual", vec!["material", "experiment", "layout", "report", "workflow"]),
         ("cli", all.to_vec()),
     ])
 }

@@ -1,13 +1,12 @@
 //! `hgm bids`: a BIDS App, from a data set of T1 pairs to derivatives and a table of all subjects.
 
-mod group;
 mod options;
 mod participant;
 
 pub use options::Args;
 
 use super::{Failure, Session};
-use crate::workflow::cohort::Dataset;
+use crate::workflow::cohort::{Dataset, group};
 use options::Level;
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -15,6 +14,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     match args.level {
         Level::Participant if args.dry_run => participant::plan(args, &dataset, session),
         Level::Participant => participant::run(args, &dataset, session),
-        Level::Group => group::run(args, &dataset, session),
+        Level::Group => {
+            let found = group(&dataset, &args.out, args.cases())?;
+            let said: String = found.population.iter().map(|line| format!("{line}\n")).collect();
+            session.emit(&found.cohort, &format!("{}\n{said}{}", found.cohort.to_tsv(), found.page.display()))
+        }
     }
 }

@@ -1,113 +1,42 @@
 //! The participant level: each subject through the same code as `hgm run`, then its files under BIDS names.
 
 use super::options::Args;
-use crate::artefact::write_whole;
-use crate::cli::failure::{Answered, in_one_line};
 use crate::cli::{Failure, Session, run};
-use crate::report::cohort::Status;
-use crate::workflow::Settings;
-use crate::workflow::cohort::{self, Dataset, Log, case_folder, log_file};
+use crate::workflow::cohort::{
+    Dataset, Log, Participants, SubjectError, participants, planned, planned_table, table, unwell,
+};
+use crate::workflow::{Place, Settings};
 use anyhow::anyhow;
-use serde::Serialize;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use serde_json::json;
 
-/// How a subject ended, for `--json`.
-#[derive(Debug, Serialize)]
-struct Done {
-    participant_id: String,
-    status: Status,
-    page: Option<PathBuf>,
-    message: Option<String>,
-}
-
-/// What would be run, for workflows: the scans and the case folder of every subject.
-#[derive(Debug, Serialize)]
-struct Planned {
-    participant_id: String,
-    pre: Option<PathBuf>,
-    post: Option<PathBuf>,
-    case: PathBuf,
-    message: Option<String>,
+impl Args {
+    fn asked<'a>(&'a self, dataset: &'a Dataset, cases: &'a Place) -> Participants<'a> {
+        let (goal, stop_on_first_crash) = (self.analysis.goal(), self.stop_on_first_crash);
+        Participants { dataset, entities: &self.entity, goal, out: &self.out, cases, stop_on_first_crash }
+    }
 }
 
 pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    let plan = |subject: &String| {
-        let (pair, message) = match dataset.pair(subject, &args.entity) {
-            Ok(pair) => (Some(pair), None),
-            Err(error) => (None, Some(in_one_line(Failure::from(error).parts().1))),
-        };
-        Planned {
-            participant_id: subject.clone(),
-            pre: pair.as_ref().map(|pair| dataset.folder.join(&pair.pre.0)),
-            post: pair.as_ref().map(|pair| dataset.folder.join(&pair.post.0)),
-            case: case_folder(args.cases(), subject),
-            message,
-        }
-    };
-    let planned: Vec<Planned> = dataset.subjects.iter().map(plan).collect();
-    let line = |p: &Planned| {
-        let what = p.message.clone().unwrap_or_else(|| format!("would be run into {}", p.case.display()));
-        format!("{:<16} {what}\n", p.participant_id)
-    };
-    let text: String = planned.iter().map(line).collect();
-    session.emit(&serde_json::json!({ "subjects": planned }), &text)
+    let place = session.place(args.cases());
+    let planned = planned(&args.asked(dataset, &place), &|error| Failure::from(error).message());
+    session.emit(&json!({ "subjects": planned }), &planned_table(&planned))
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
-    let settings = settings(args, session)?;
-    cohort::begin(dataset, &args.out)?;
-    let mut done: Vec<Done> = Vec::new();
-    let mut worst: Option<Failure> = None;
-    for subject in &dataset.subjects {
-        // A defect of the program in one subject must not cost the others their night.
-        let end = catch_unwind(AssertUnwindSafe(|| one(args, dataset, subject, &settings, session)));
-        let end = end.unwrap_or_else(|_| Err(defect().into()));
-        let page = args.out.join(format!("{subject}.html"));
-        let log = log_file(&args.out, subject);
-        let status = match &end {
-            Ok(()) => {
-                std::fs::remove_file(&log).ok();
-                Status::Done
-            }
-            Err(failure) => {
-                let log_bytes = serde_json::to_string_pretty(&record(failure, args))? + "\n";
-                write_whole(&log, log_bytes.as_bytes())?;
-                let (kind, error) = failure.parts();
-                eprintln!("hgm: {kind}: {subject}: {}", in_one_line(error));
-                match failure {
-                    Failure::QualityGate(e) => Status::of(e.downcast_ref::<Answered>().map(|a| a.answer)),
-                    _ => Status::Failed,
-                }
-            }
+    let (settings, place) = (settings(args, session)?, session.place(args.cases()));
+    let mut words = |subject: &str, error: SubjectError| {
+        let failure = match error {
+            SubjectError::Job(error) => Failure::from(error),
+            defect @ SubjectError::Defect => Failure::from(defect),
         };
-        let failed = status == Status::Failed;
-        let message = end.as_ref().err().map(|failure| record(failure, args).message);
-        let page = (!failed).then_some(page);
-        done.push(Done { participant_id: subject.clone(), status, page, message });
-        worst = end.err().into_iter().chain(worst).max_by_key(severity);
-        if failed && args.stop_on_first_crash {
-            break;
-        }
-    }
-    session.emit(&serde_json::json!({ "subjects": done }), &table(&done))?;
-    let unwell: Vec<&str> =
-        done.iter().filter(|d| d.status != Status::Done).map(|d| d.participant_id.as_str()).collect();
-    let left = dataset.subjects.len() - done.len();
-    let stopped = if left > 0 { format!(", {left} not begun") } else { String::new() };
-    let summary = anyhow!(
-        "{} of {} subjects did not end well: {}{stopped}; see {}/logs",
-        unwell.len(),
-        dataset.subjects.len(),
-        unwell.join(", "),
-        args.out.display()
-    );
-    match worst {
-        None => Ok(()),
-        Some(Failure::Failed(_)) => Err(Failure::Failed(summary)),
-        Some(Failure::Rejected(_)) => Err(Failure::Rejected(summary)),
-        Some(Failure::QualityGate(_)) => Err(Failure::QualityGate(summary)),
-    }
+        let (kind, message) = (failure.parts().0.to_owned(), failure.message());
+        eprintln!("hgm: {kind}: {subject}: {message}");
+        Log { kind, message, exit_code: failure.code() }
+    };
+    let asked = args.asked(dataset, &place);
+    let done = participants(&asked, &settings, &mut *session.listener(), &mut words)?;
+    session.emit(&json!({ "subjects": done }), &table(&done))?;
+    unwell(&done, &asked).map_or(Ok(()), |(worst, summary)| Err(Failure::of(worst, anyhow!(summary))))
 }
 
 /// Those of `hgm run`, with the memory that the mesh engines may take.
@@ -117,48 +46,4 @@ fn settings(args: &Args, session: &Session) -> Result<Settings, Failure> {
         settings.mesh.limits.memory_mb = 1000 * gb;
     }
     Ok(settings)
-}
-
-/// One subject from scans to derivatives.
-fn one(args: &Args, dataset: &Dataset, subject: &str, settings: &Settings, session: &Session) -> Result<(), Failure> {
-    let pair = dataset.pair(subject, &args.entity)?;
-    tracing::info!("{subject}");
-    let (goal, place) = (args.analysis.goal(), session.place(&case_folder(args.cases(), subject)));
-    let case = cohort::subject(goal, (dataset, &pair), (&args.out, &place), settings, &mut session.listener())?;
-    Ok(case.quality_gate()?)
-}
-
-/// What is kept of a failure: without the folders of this machine.
-fn record(failure: &Failure, args: &Args) -> Log {
-    let (kind, error) = failure.parts();
-    let mut message = in_one_line(error);
-    for folder in [&args.out, &args.bids_dir] {
-        message = message.replace(&format!("{}/", folder.display()), "");
-    }
-    Log { kind: kind.to_owned(), message, exit_code: failure.code() }
-}
-
-/// What is said of a subject that met a panic.
-fn defect() -> anyhow::Error {
-    anyhow!(
-        "the program stopped by a defect of its own (its words are on standard error, above this line); the other \
-         subjects go on; please report it with those words"
-    )
-}
-
-/// A crash is worse than an input that was refused, and that worse than a gate.
-fn severity(failure: &Failure) -> u8 {
-    match failure {
-        Failure::Failed(_) => 2,
-        Failure::Rejected(_) => 1,
-        Failure::QualityGate(_) => 0,
-    }
-}
-
-fn table(done: &[Done]) -> String {
-    let line = |d: &Done| {
-        let page = d.page.as_ref().map(|page| page.display().to_string());
-        format!("{:<16} {:<13} {}\n", d.participant_id, d.status.name(), page.unwrap_or_default())
-    };
-    done.iter().map(line).collect()
 }

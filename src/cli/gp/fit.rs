@@ -1,10 +1,9 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
 use super::options::{ModelOption, StudyOptions, only_with};
-use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
 use crate::material::generative::GenerativeModel;
-use crate::workflow::{fit_gp, fit_study_level};
+use crate::workflow::{Layer, fit_gp, fit_study_level, results_in_words};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -35,7 +34,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.model.get() == GenerativeModel::StudyLevel {
         return study_level(args, session);
     }
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     flags.set("gp.rank", args.rank);
     flags.set("gp.starts", args.starts);
     let mut settings = session.settings(flags)?.gp;
@@ -43,18 +42,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
     let made = fit_gp(&studies, &settings, &args.output, session.options.force)?;
     let (facts, file) = (made.facts, made.files[0].display().to_string());
-    let figure = |name: &str| facts[name].as_f64().unwrap_or(f64::NAN);
-    let text = format!(
-        "{} observations of {} studies, rank {}\n\
-         negative log marginal likelihood {:.6} (at the published hyperparameters {:.6})\n\
-         lengthscale {:.6}\n{file}",
-        facts["observations"],
-        facts["studies"],
-        settings.rank,
-        figure("negative_log_likelihood"),
-        figure("negative_log_likelihood_of_published_hyperparameters"),
-        figure("lengthscale"),
-    );
+    let text = results_in_words::fitted_process(&facts, settings.rank) + &file;
     session.emit(&json!({ "hyperparameters": file, "settings": settings, "fit": facts }), &text)
 }
 
@@ -63,13 +51,8 @@ fn study_level(args: &Args, session: &Session) -> Result<(), Failure> {
     only_with(args.starts.is_some(), "--starts", "published")?;
     let place = (args.output.as_path(), session.options.force);
     let mut made = fit_study_level(&args.studies.read()?, session.options.seed.unwrap_or(0), place)?;
-    let text = made.facts.as_object_mut().and_then(|facts| facts.remove("text"));
+    let text = made.take_text();
     let (facts, file) = (made.facts, made.files[0].display().to_string());
-    let text = format!(
-        "{} points of {} publications\n{}\n{file}",
-        facts["points"],
-        facts["publications"],
-        text.as_ref().and_then(|text| text.as_str()).unwrap_or_default()
-    );
+    let text = format!("{} points of {} publications\n{text}\n{file}", facts["points"], facts["publications"]);
     session.emit(&json!({ "study_level": file, "settings": made.settings, "fit": facts }), &text)
 }

@@ -1,9 +1,8 @@
 //! `hgm gp paper`: every figure and table of the paper.
 
-use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session};
 use crate::mesh::engine::Engine;
-use crate::workflow::paper;
+use crate::workflow::{Layer, paper};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -24,12 +23,12 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut flags = Flags::default();
+    let mut flags = Layer::default();
     flags.set("mesh.engine", Some(Engine::LATTICE));
     flags.set("mesh.size.cells", Some(args.cells));
     flags.set("phantom.tissues", Some(1));
     let settings = session.settings(flags)?;
-    let made = paper(&session.place(&args.output), &settings, &mut session.listener())?;
-    let files: Vec<String> = made.files.iter().map(|file| file.display().to_string()).collect();
+    let made = paper(&session.place(&args.output), &settings, &mut *session.listener())?;
+    let files = made.names();
     session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &files.join("\n"))
 }

@@ -1,18 +1,16 @@
 //! `hgm gp sample`: materials from the generative model.
 
 use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
-use crate::cli::flags::laws;
 use crate::cli::{Failure, Session};
+use crate::manual::help::laws;
 use crate::material::Task;
-use crate::material::generative::GenerativeModel;
-use crate::material::generative::{SampleSettings, nine_levels};
+use crate::material::generative::{GenerativeModel, SampleSettings, nine_levels};
 use crate::material::gp::Spread;
 use crate::material::meta_model::MetaModel;
 use crate::material::study_level::Of;
-use crate::workflow::{Expected, GenerativeFiles, Wanted, sample_gp, sample_study_level};
+use crate::workflow::{Expected, GenerativeFiles, Wanted, results_in_words, sample_gp, sample_study_level};
 use anyhow::anyhow;
 use serde_json::json;
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Materials of one tissue: at standard deviations from the mean, or fitted to random curves
@@ -34,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with = "levels")]
     draws: Option<u64>,
     /// What a draw is of: the tissue's own curve, or what one more study would report of it [default: tissue]
-    #[arg(long, value_parser = spread, value_name = "tissue|study")]
+    #[arg(long, value_name = "tissue|study")]
     spread: Option<Spread>,
     #[command(flatten)]
     model: ModelOption,
@@ -56,14 +54,6 @@ pub struct Args {
     /// Where to write
     #[arg(short, long, value_name = "DIR", default_value = "gp")]
     output: PathBuf,
-}
-
-fn spread(text: &str) -> Result<Spread, String> {
-    match text {
-        "tissue" => Ok(Spread::Tissue),
-        "study" => Ok(Spread::Study),
-        _ => Err("say tissue or study".to_owned()),
-    }
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -101,38 +91,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn emit(made: GenerativeFiles, seed: u64, session: &Session) -> Result<(), Failure> {
     let (file, facts) = (made.files[0].display().to_string(), made.facts);
-    session.emit(
-        &json!({ "file": file, "settings": made.settings, "seed": seed, "result": facts }),
-        &summary(&facts, &file),
-    )
-}
-
-fn summary(facts: &serde_json::Value, file: &str) -> String {
-    let mut text = String::new();
-    let rows = facts["materials"].as_array().map_or(&[][..], Vec::as_slice);
-    if rows.iter().all(|row| row["sd_level"].is_number()) {
-        text += "   sd   shear modulus (Pa)      R2\n";
-        for row in rows {
-            let number = |v: &serde_json::Value| v.as_f64().unwrap_or(f64::NAN);
-            let fit = &row["fit"];
-            let (modulus, r2) = (number(&fit["shear_modulus_pa"]), number(&fit["r_squared"]));
-            let _ = writeln!(text, "{:>5.2}   {modulus:>18.1}   {r2:.3}", number(&row["sd_level"]));
-        }
-    } else {
-        let q = &facts["shear_modulus_pa"];
-        let pa = |name: &str| q[name].as_f64().unwrap_or(f64::NAN);
-        let _ = writeln!(
-            text,
-            "{} draws, {} fitted by a law stable at every stretch\nshear modulus: median {:.1} Pa, 68 % in {:.1} to \
-             {:.1}, 95 % in {:.1} to {:.1}",
-            q["count"],
-            q["stable"],
-            pa("median"),
-            pa("p16"),
-            pa("p84"),
-            pa("p2.5"),
-            pa("p97.5")
-        );
-    }
-    text + file
+    let text = results_in_words::materials(&facts) + &file;
+    session.emit(&json!({ "file": file, "settings": made.settings, "seed": seed, "result": facts }), &text)
 }

@@ -2,8 +2,7 @@
 
 use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
 use crate::cli::{Failure, Session};
-use crate::material::generative::GenerativeModel;
-use crate::material::generative::SampleSettings;
+use crate::material::generative::{GenerativeModel, SampleSettings};
 use crate::workflow::{GenerativeFiles, show_gp, show_study_level};
 use serde_json::json;
 use std::path::PathBuf;
@@ -51,8 +50,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn emit(mut made: GenerativeFiles, session: &Session) -> Result<(), Failure> {
-    let text = made.facts.as_object_mut().and_then(|facts| facts.remove("text"));
-    let files: Vec<String> = made.files.iter().map(|file| file.display().to_string()).collect();
-    let shown = format!("{}\n{}", text.as_ref().and_then(|text| text.as_str()).unwrap_or_default(), files.join("\n"));
+    let (text, files) = (made.take_text(), made.names());
+    let shown = format!("{text}\n{}", files.join("\n"));
     session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &shown)
 }

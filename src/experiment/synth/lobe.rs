@@ -38,11 +38,6 @@ impl Lobe {
         }
     }
 
-    /// The place that a word names.
-    pub fn of_name(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|lobe| lobe.name() == word)
-    }
-
     /// Whether a point of the template lies in the lobe of this side.
     pub(super) fn holds(self, side: Side, p: Position<Mni>) -> bool {
         let own_side = if side == Side::Left { p.mm.x < -2.0 } else { p.mm.x > 2.0 };
@@ -75,6 +70,14 @@ impl Lobe {
     }
 }
 
+impl std::str::FromStr for Lobe {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        let known = Self::ALL.into_iter().find(|lobe| lobe.name() == word);
+        known.ok_or_else(|| "say temporal, frontal, parietal, occipital or insular".to_owned())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,7 +99,7 @@ mod tests {
                 let other = if side == Side::Left { Side::Right } else { Side::Left };
                 assert!(Lobe::ALL.iter().all(|l| !l.holds(other, p)));
             }
-            assert_eq!(Lobe::of_name(lobe.name()), Some(lobe));
+            assert_eq!(lobe.name().parse(), Ok(lobe));
         }
     }
 }

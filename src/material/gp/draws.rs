@@ -27,6 +27,17 @@ pub enum Spread {
     Study,
 }
 
+impl std::str::FromStr for Spread {
+    type Err = String;
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "tissue" => Ok(Self::Tissue),
+            "study" => Ok(Self::Study),
+            _ => Err("say tissue or study".to_owned()),
+        }
+    }
+}
+
 /// Posterior of one task's curve with the covariance between stretches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPosterior {

@@ -6,8 +6,10 @@ use crate::image::distance::signed_distance_mm;
 use crate::image::{Grid, Mask};
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::Point;
+use crate::segment::label;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Where edges shall be other than the target. With [`super::MeshSize::Cells`] the target itself is what gives that many
 /// tets. The lattice's cubes have these sizes to the nearest power of two; gmsh and TetGen follow inside a surface that does.
@@ -40,6 +42,31 @@ pub struct WallEdge {
     pub factor: f64,
     /// Distance in mm at which the wall counts no more.
     pub reach_mm: f64,
+}
+
+impl FromStr for LabelEdge {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (label, factor) = text.split_once('=')?;
+            Some(Self { label: label::number(label)?, factor: factor.parse().ok()? })
+        };
+        read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR, such as white_matter=1.5 or 3=1.5"))
+    }
+}
+
+impl FromStr for WallEdge {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (label, rest) = text.split_once('=')?;
+            let (factor, reach) = rest.split_once('@')?;
+            Some(Self { label: label::number(label)?, factor: factor.parse().ok()?, reach_mm: reach.parse().ok()? })
+        };
+        read().ok_or_else(|| format!("`{text}` is not LABEL=FACTOR@MM, such as ventricle=0.5@8 or 4=0.5@8"))
+    }
 }
 
 /// Factors on edges lie between these.
@@ -224,6 +251,17 @@ pub(crate) fn interface_seeds(field: &LabelField, per_part: usize) -> Vec<Point>
 mod tests {
     use super::*;
     use crate::mesh::engine::meshing::tests::ball_in_shell;
+
+    #[test]
+    fn sizes_are_read_by_name_or_number_of_the_label() {
+        let wall = Ok(WallEdge { label: label::VENTRICLE, factor: 0.5, reach_mm: 8.0 });
+        assert_eq!(["ventricle=0.5@8".parse(), "4=0.5@8".parse()], [wall.clone(), wall]);
+        assert_eq!("white_matter=1.5".parse(), Ok(LabelEdge { label: label::WHITE_MATTER, factor: 1.5 }));
+        for text in ["ventricle", "ventricle=0.5", "falx=0.5@8", "4=half@8", "300=0.5@8"] {
+            assert!(text.parse::<WallEdge>().unwrap_err().contains("ventricle=0.5@8"), "{text}");
+        }
+        assert!("3=".parse::<LabelEdge>().unwrap_err().contains("white_matter=1.5"));
+    }
 
     #[test]
     fn edges_have_their_factor_at_the_wall_and_grow_gently_from_there() {

@@ -1,20 +1,26 @@
 //! A cohort: the subjects of a BIDS data set, each as one case, and all of them together.
 
 mod dataset;
+mod group_level;
+mod participant_level;
 mod population;
 
 pub use dataset::{Dataset, DatasetError, ScanPair};
+pub use group_level::{Group, group};
+pub use participant_level::{
+    Ended, Participants, Planned, SubjectError, participants, planned, planned_table, table, unwell,
+};
 pub use population::{Learnt, POPULATION, learn, merge_populations, population_prior, read_population};
 
+use super::error::CohortError;
 use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError, run_to};
-use crate::artefact::{WriteError, sha256_hex, write_whole};
+use crate::artefact::{sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// The case folder of a subject below the derivatives.
 pub fn case_folder(out: &Path, subject: &str) -> PathBuf {
@@ -35,20 +41,6 @@ pub struct Log {
     pub message: String,
     /// What a run of this subject alone would have ended with.
     pub exit_code: u8,
-}
-
-/// Why the derivatives cannot be begun, or a log of theirs not read.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum CohortError {
-    #[error("{}: the folder for the derivatives cannot be made; name a folder that you may write to: {source}", out.display())]
-    NoFolder { out: PathBuf, source: std::io::Error },
-    #[error("{}: the folder cannot be found; check the path: {source}", folder.display())]
-    Lost { folder: PathBuf, source: std::io::Error },
-    #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
-    Log { file: PathBuf },
-    #[error(transparent)]
-    Write(#[from] WriteError),
 }
 
 /// Writes what lies once at the top of the derivatives.
@@ -98,7 +90,7 @@ pub fn subject(
 ///
 /// # Errors
 /// An outcome or a log that is damaged.
-pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, MemberError> {
+pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, CohortError> {
     let case = case_folder(cases, subject);
     let read = |file: &str| std::fs::read_to_string(case.join(file)).ok();
     let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
@@ -123,15 +115,4 @@ pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, MemberE
         outcome: outcome.transpose()?,
         settings_sha256: read(layout::SETTINGS).map(|text| sha256_hex(text.as_bytes())),
     })
-}
-
-/// Why a subject cannot stand in the table.
-#[derive(Debug, Error)]
-pub enum MemberError {
-    /// Its log.
-    #[error(transparent)]
-    Log(#[from] CohortError),
-    /// Its outcome.
-    #[error(transparent)]
-    Outcome(#[from] crate::experiment::outcome::OutcomeError),
 }

@@ -9,6 +9,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CaseError {
+    #[error("no stage `{wanted}` in this case; it has {}", stages.join(", "))]
+    NoStage { wanted: String, stages: Vec<String> },
     #[error("{}: not a case folder", folder.display())]
     NotACase { folder: PathBuf },
     #[error("{}: {file} is not there", folder.display())]

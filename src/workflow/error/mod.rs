@@ -1,6 +1,7 @@
 //! Why a job did not end well.
 
 mod case;
+mod cohort;
 mod evaluate;
 mod input;
 mod label_map;
@@ -11,6 +12,7 @@ mod simulation;
 mod warp;
 
 pub use case::CaseError;
+pub use cohort::CohortError;
 pub use evaluate::EvaluateError;
 pub use input::{InputError, MaskRole};
 pub use label_map::LabelMapError;
@@ -20,6 +22,7 @@ pub use predict::PredictError;
 pub use simulation::SimulationError;
 pub use warp::WarpError;
 
+use super::cohort::DatasetError;
 use super::settings::SettingsError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
@@ -35,6 +38,7 @@ use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
 use crate::material::literature::StudyError;
 use crate::material::meta_model::FitError;
+use crate::material::rheometry::RheometryError;
 use crate::material::study_level;
 use crate::mesh::engine::EngineError;
 use crate::mesh::format::{ReadError, WriteError as FormatError};
@@ -44,6 +48,7 @@ use crate::register::transform_text::TransformTextError;
 use crate::report::case::ReportError;
 use crate::report::derivatives::DerivativesError;
 use crate::resect::{PairError, ResectError};
+use crate::segment::HeadError;
 use crate::tag::{MARGIN, TagError};
 use thiserror::Error;
 
@@ -76,6 +81,10 @@ pub enum WorkflowError {
     Transform(#[from] TransformTextError),
     #[error("registering {what}: {source}")]
     Registration { what: &'static str, source: RegisterError },
+    #[error("{images}: {source}")]
+    Rigid { images: String, source: RegisterError },
+    #[error("{scan}: {source}")]
+    Head { scan: String, source: HeadError },
     #[error(transparent)]
     Pair(#[from] PairError),
     #[error("{labels}: {source}")]
@@ -106,6 +115,10 @@ pub enum WorkflowError {
     Gp(#[from] FitRefusal),
     #[error(transparent)]
     Law(#[from] FitError),
+    #[error("{file}: {source}")]
+    Rheometry { file: String, source: RheometryError },
+    #[error("{test}: {source}")]
+    LawOfTest { test: String, source: FitError },
     #[error("samples of every task compare materials of the whole brain: they do not go with two tissues")]
     EveryTaskOfTwo,
     #[error("the table [{table}] asks for a simulation that cannot be done: {source}")]
@@ -151,6 +164,10 @@ pub enum WorkflowError {
     #[error("population: {0}")]
     TooMany(#[from] TooMany),
     #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    #[error(transparent)]
+    Cohort(#[from] CohortError),
+    #[error(transparent)]
     Outcome(#[from] OutcomeError),
     #[error(transparent)]
     Report(#[from] ReportError),
@@ -190,6 +207,7 @@ impl WorkflowError {
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
             Self::Write(_)
+            | Self::Cohort(CohortError::Write(_))
             | Self::Format(_)
             | Self::Outcome(OutcomeError { .. })
             | Self::Derivatives(_)

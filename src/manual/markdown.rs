@@ -1,6 +1,6 @@
 //! The reference pages of the documentation: every command, every setting, every file of a case.
 
-use crate::cli::manual::by_tasks;
+use super::help::by_tasks;
 use crate::layout::TABLE;
 use crate::workflow::{Setting, Settings, every_setting};
 use clap::{Arg, ArgAction, Command};
@@ -171,28 +171,6 @@ Lengths are mm, RAS+; `mni` is the template's frame reached rigidly: sizes stay 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::{Hgm, manual};
-    use clap::CommandFactory;
-
-    #[test]
-    fn every_command_option_setting_and_file_is_in_the_reference() {
-        let hgm = manual::command(Hgm::command());
-        let [commands, settings, files] = pages(hgm.clone()).try_into().unwrap();
-        let text = |page: (String, Vec<u8>)| String::from_utf8(page.1).unwrap();
-        let (commands, settings, files) = (text(commands), text(settings), text(files));
-        for command in hgm.get_subcommands() {
-            assert!(commands.contains(&format!("\n### hgm {}\n", command.get_name())), "{}", command.get_name());
-            for long in command.get_arguments().filter(|arg| listed_here(arg)).filter_map(Arg::get_long) {
-                assert!(commands.contains(&format!("--{long}")), "{long}");
-            }
-        }
-        for setting in every_setting(&Settings::default()) {
-            assert!(settings.contains(&format!("- `{}` = ", setting.name)), "{}", setting.name);
-        }
-        assert!(TABLE.iter().all(|file| files.contains(&format!("| `{}` | ", file.path))));
-        // Told once, not with every command.
-        assert_eq!(commands.matches("Machine-readable result on stdout").count(), 1);
-    }
 
     #[test]
     fn markup_in_a_help_text_is_text() {

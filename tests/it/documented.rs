@@ -1,28 +1,10 @@
 //! Every command that a document shows is one that this program takes: parsed to the end, required and conflicting options
 //! included, not run.
 
-use super::{Hgm, manual};
+use crate::docs::documents;
+use clap::FromArgMatches;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches};
-use std::path::{Path, PathBuf};
-
-/// The documents: README and its like, and all pages of the site.
-fn documents() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut found: Vec<PathBuf> = ["README.md", "CONTRIBUTING.md"].map(|name| root.join(name)).into();
-    let mut folders = vec![root.join("docs")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "md") {
-                found.push(path);
-            }
-        }
-    }
-    found
-}
+use hgm::cli::{Hgm, command_line};
 
 /// The command lines in a document's blocks of commands that call hgm, as words.
 fn commands(text: &str) -> Vec<Vec<String>> {
@@ -55,9 +37,8 @@ fn commands(text: &str) -> Vec<Vec<String>> {
 }
 
 fn taken(words: &[String]) -> Result<(), clap::Error> {
-    let parsed = manual::command(Hgm::command())
-        .try_get_matches_from(words)
-        .and_then(|mut matches| Hgm::from_arg_matches_mut(&mut matches));
+    let parsed =
+        command_line().try_get_matches_from(words).and_then(|mut matches| Hgm::from_arg_matches_mut(&mut matches));
     match parsed {
         Err(error) if !matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => Err(error),
         _ => Ok(()),
@@ -67,8 +48,8 @@ fn taken(words: &[String]) -> Result<(), clap::Error> {
 #[test]
 fn every_command_that_a_document_shows_is_taken_as_it_stands() {
     let mut seen = 0;
-    for document in documents() {
-        for words in commands(&std::fs::read_to_string(&document).unwrap()) {
+    for (document, text) in documents() {
+        for words in commands(&text) {
             seen += 1;
             if let Err(error) = taken(&words) {
                 panic!("{}: `{}`: {error}", document.display(), words.join(" "));
@@ -80,9 +61,8 @@ fn every_command_that_a_document_shows_is_taken_as_it_stands() {
 
 #[test]
 fn every_command_named_within_a_sentence_exists() {
-    let hgm = manual::command(Hgm::command());
-    for document in documents() {
-        let text = std::fs::read_to_string(&document).unwrap();
+    let hgm = command_line();
+    for (document, text) in documents() {
         for span in text.split('`').filter_map(|span| span.strip_prefix("hgm ")) {
             let word = span.split_whitespace().next().unwrap_or_default();
             // `hgm COMMAND`: any of them.

@@ -1,7 +1,9 @@
 //! The command line as help, man pages and completions show it: commands by task, options under headings, and what a script
 //! needs to know besides (exit codes, variables of the environment).
 
+use crate::material::meta_model::MetaModel;
 use crate::workflow::known;
+use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, ArgAction, Command};
 
 /// The commands by what one wants to do; one that stands in no list comes last, under [`OTHERS`].
@@ -124,6 +126,14 @@ fn line(command: &Command, name: &str) -> Option<String> {
     Some(text + "\n")
 }
 
+/// The commands that an unknown one may mean; none where something else was wrong with the words.
+pub fn meant_by(command: &Command, error: &clap::Error) -> Vec<String> {
+    match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(word)) => meant_below(command, word),
+        _ => Vec::new(),
+    }
+}
+
 /// Where a mistyped command is the name of a command below another one: `fit` for `gp fit` and `law fit`.
 pub fn meant_below(command: &Command, word: &str) -> Vec<String> {
     let below = |holder: &Command| {
@@ -133,59 +143,16 @@ pub fn meant_below(command: &Command, word: &str) -> Vec<String> {
     command.get_subcommands().flat_map(below).collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cli::Hgm;
-    use clap::CommandFactory;
+/// A help text with the names of the laws that can be fitted in place of `{}`.
+pub fn laws(help: &str) -> String {
+    let names = MetaModel::names();
+    let (last, others) = names.split_last().map_or(("", &[][..]), |(last, others)| (*last, others));
+    help.replace("{}", &format!("{} or {last}", others.join(", ")))
+}
 
-    fn command() -> Command {
-        super::command(Hgm::command())
-    }
-
-    fn help_of(words: &[&str]) -> String {
-        let words = ["hgm"].iter().chain(words).chain(&["--help"]);
-        command().try_get_matches_from(words).unwrap_err().render().to_string()
-    }
-
-    #[test]
-    fn the_command_line_is_consistent_and_every_command_is_listed_once() {
-        command().debug_assert();
-        let help = help_of(&[]);
-        for sub in Hgm::command().get_subcommands() {
-            let lines = help.lines().filter(|line| line.starts_with(&format!("  {} ", sub.get_name())));
-            assert_eq!(lines.count(), 1, "{} in\n{help}", sub.get_name());
-        }
-        assert!(help.find("A patient").unwrap() < help.find("One step alone").unwrap());
-        assert!(help.lines().all(|line| line.chars().count() <= 120), "{help}");
-    }
-
-    #[test]
-    fn options_stand_under_headings_and_the_common_ones_come_last_and_together() {
-        let help = help_of(&["run"]);
-        let at = |what: &str| help.find(what).unwrap_or_else(|| panic!("no {what} in\n{help}"));
-        let headings = ["Options:", "Masks:", "Mesh:", "Material:", "Common:", "Exit codes:"];
-        assert!(headings.windows(2).all(|pair| at(pair[0]) < at(pair[1])), "{help}");
-        let common = &help[at("Common:")..];
-        for option in ["--config", "--json", "--threads", "--seed", "--force", "--verbose", "--quiet", "--help"] {
-            assert!(common.contains(option) && help.matches(&format!("{option} ")).count() <= 2, "{option} in\n{help}");
-        }
-        assert!(at("--cavity-mask") < at("Mesh:") && at("--cells") < at("Material:"));
-    }
-
-    #[test]
-    fn exit_codes_and_variables_stand_in_every_help() {
-        for words in [&[][..], &["run"], &["gp", "fit"]] {
-            let help = help_of(words);
-            assert!(help.contains("4  computed") && help.contains("HGM_CGAL_MESHER"), "{words:?}: {help}");
-        }
-    }
-
-    #[test]
-    fn a_word_that_is_a_command_below_another_is_known() {
-        assert_eq!(meant_below(&Hgm::command(), "fit"), ["hgm gp fit", "hgm law fit"]);
-        assert!(meant_below(&Hgm::command(), "nonsense").is_empty());
-        let said = command().try_get_matches_from(["hgm", "estimat"]).unwrap_err().to_string();
-        assert!(said.contains("'estimate'"), "{said}");
-    }
+/// What is wrong with words that are no command, in one line.
+pub fn in_one_line(error: &clap::Error) -> String {
+    let said = error.to_string();
+    let said = said.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ");
+    said.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -115,30 +115,3 @@ fn integer(parser: &ValueParser) -> bool {
     let kind = parser.type_id();
     kind == std::any::TypeId::of::<usize>() || kind == std::any::TypeId::of::<u64>()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cli::{Hgm, manual};
-    use clap::CommandFactory;
-
-    #[test]
-    fn every_value_key_has_one_input_and_every_flag_is_one_that_the_command_takes() {
-        let hgm = manual::command(Hgm::command());
-        let (_, text) = descriptor(&hgm).unwrap();
-        let descriptor: Value = serde_json::from_slice(&text).unwrap();
-        let line = descriptor["command-line"].as_str().unwrap();
-        let inputs = descriptor["inputs"].as_array().unwrap();
-        assert_eq!(line.matches('[').count(), inputs.len());
-        assert!(line.starts_with("hgm bids [BIDS_DIR] [OUT] [LEVEL]"), "{line}");
-        let find = |id: &str| inputs.iter().find(|input| input["id"] == id).unwrap();
-        assert_eq!(find("participant_label")["list"], true);
-        assert_eq!(find("nprocs")["type"], "Number");
-        assert_eq!(find("level")["value-choices"], json!(["participant", "group"]));
-        assert_eq!(find("dry_run")["type"], "Flag");
-        assert!(find("bids_dir")["optional"] == false && find("estimate")["optional"] == true);
-        // A command line made from it is one that hgm takes.
-        let words = ["hgm", "bids", "study", "out", "participant", "--participant-label", "01", "02", "--cells", "9"];
-        assert!(hgm.try_get_matches_from(words).is_ok());
-    }
-}

@@ -1,0 +1,47 @@
+//! `hgm man`: the program's description of itself.
+
+use super::{Failure, Session};
+use crate::artefact::write_whole;
+use crate::manual::{boutiques, man_pages, markdown};
+use std::path::PathBuf;
+
+/// Write man pages, one per command; or the reference pages of the documentation, or the descriptor of the BIDS App
+///
+/// Example: hgm man -o ~/.local/share/man/man1
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder to write into
+    #[arg(short, long, default_value = "man")]
+    output: PathBuf,
+    /// What to write
+    #[arg(long, value_enum, value_name = "FORM", default_value = "man")]
+    form: Form,
+}
+
+/// What `hgm man` writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Form {
+    /// Man pages, one per command
+    Man,
+    /// Commands, settings and files of a case as Markdown
+    Markdown,
+    /// `hgm bids` as a Boutiques descriptor
+    Boutiques,
+}
+
+pub fn run(args: &Args, hgm: clap::Command, session: &Session) -> Result<(), Failure> {
+    let written = match args.form {
+        Form::Man => {
+            man_pages::pages(hgm, "hgm")?.into_iter().map(|(name, page)| (format!("{name}.1"), page)).collect()
+        }
+        Form::Markdown => markdown::pages(hgm),
+        Form::Boutiques => boutiques::descriptor(&hgm).into_iter().collect::<Vec<_>>(),
+    };
+    let mut files = Vec::new();
+    for (name, text) in written {
+        let file = args.output.join(name);
+        write_whole(&file, &text)?;
+        files.push(file.display().to_string());
+    }
+    session.emit(&serde_json::json!({ "files": files }), "")
+}

@@ -1,0 +1,110 @@
+//! A recording done again, into files.
+
+use super::body::LiveBody;
+use super::colours::Colours;
+use super::export::Export;
+use super::recording::{Recording, RecordingError};
+use super::series::Series;
+use super::session::Session;
+use crate::artefact::{WriteError, write_whole};
+use crate::workflow::Progress;
+use serde::Serialize;
+use std::path::Path;
+use thiserror::Error;
+
+/// Steps from one file of a series to the next: two or three files a second of a body of five thousand nodes.
+const EVERY: u64 = 30;
+
+/// Why a recording has left no files.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum ReplayError {
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error("{0}")]
+    State(String),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What a replay has left.
+#[derive(Clone, Debug, Serialize)]
+pub struct Replayed {
+    /// The state at the end, or the list of a series.
+    pub output: String,
+    /// States written.
+    pub files: usize,
+    /// Steps done.
+    pub steps: u64,
+    /// Commands done.
+    pub commands: usize,
+    /// Largest displacement at the end, mm.
+    pub displacement_max_mm: f64,
+    /// Whether the body rests at the end.
+    pub at_rest: bool,
+}
+
+/// Whether the name asks for a series (.pvd, its files beside it) and not for one state.
+pub fn in_series(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"))
+}
+
+/// Repeats a recording and writes the state at its end, or a series with one every so many steps.
+///
+/// # Errors
+/// [`ReplayError`]: a recording of another body or with a command that is refused, a state that cannot be written.
+pub fn replay_to_files(
+    recording: &Recording,
+    body: &LiveBody,
+    (output, every): (&Path, Option<u64>),
+    progress: &mut dyn Progress,
+) -> Result<Replayed, ReplayError> {
+    let in_series = in_series(output);
+    let stem = output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let mut series = Series::new(&stem, every.unwrap_or(EVERY));
+    let mut colours = None;
+    let write = |(name, bytes): (String, Vec<u8>)| write_whole(&output.with_file_name(name), &bytes);
+    // The first that cannot be made or written.
+    let mut failed: Option<ReplayError> = None;
+    let mut shown = 0;
+    progress.begin("steps", recording.steps as usize);
+    let replayed = recording.replay(body, &mut |seen: &Session| {
+        (shown..seen.steps()).for_each(|_| progress.step());
+        shown = seen.steps();
+        let colours = &*colours.get_or_insert_with(|| Colours::of(body, seen.mesh()));
+        if in_series && failed.is_none() {
+            let due = series.due(seen, colours).map_err(ReplayError::State);
+            failed = due.and_then(|due| Ok(due.map_or(Ok(()), write)?)).err();
+        }
+    });
+    progress.end();
+    let replayed = replayed?;
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    let colours = colours.unwrap_or_else(|| Colours::of(body, replayed.mesh()));
+    if in_series {
+        write(series.last(&replayed, &colours).map_err(ReplayError::State)?)?;
+        write_whole(output, &series.list())?;
+    } else {
+        let state = Export::of(&replayed).map(|state| state.coloured(&replayed, &colours));
+        write_whole(output, &state.and_then(|state| state.vtu()).map_err(ReplayError::State)?)?;
+    }
+    let largest = replayed.displacement_mm().iter().map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
+    Ok(Replayed {
+        output: output.display().to_string(),
+        files: if in_series { series.len() } else { 1 },
+        steps: replayed.steps(),
+        commands: recording.commands.len(),
+        displacement_max_mm: largest.sqrt(),
+        at_rest: replayed.is_at_rest(),
+    })
+}
+
+impl Replayed {
+    /// In a line.
+    pub fn in_words(&self) -> String {
+        let Self { output, steps, commands, displacement_max_mm: most, .. } = self;
+        format!("{output}: {commands} commands, {steps} steps, moved by {most:.3} mm at most")
+    }
+}

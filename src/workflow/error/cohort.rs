@@ -1,0 +1,24 @@
+//! Why the derivatives of a cohort cannot be made, or a subject not stand among all.
+
+use crate::artefact::WriteError;
+use crate::experiment::outcome::OutcomeError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why the derivatives of a cohort cannot be made, or a subject not stand among all.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum CohortError {
+    #[error("{}: the folder for the derivatives cannot be made; name a folder that you may write to: {source}", out.display())]
+    NoFolder { out: PathBuf, source: std::io::Error },
+    #[error("{}: the folder cannot be found; check the path: {source}", folder.display())]
+    Lost { folder: PathBuf, source: std::io::Error },
+    #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
+    Log { file: PathBuf },
+    #[error("{}: no subject has been run here", out.display())]
+    NobodyRun { out: PathBuf },
+    #[error(transparent)]
+    Outcome(#[from] OutcomeError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

@@ -1,0 +1,121 @@
+//! One image in a file registered rigidly to another, or to the template.
+
+use super::error::WorkflowError;
+use super::inputs::read_mask_of;
+use super::settings::Settings;
+use super::user_file::read_input;
+use crate::artefact::{check_writable, write_whole};
+use crate::geometry::{Frame, Native, RigidTransform};
+use crate::image::Volume;
+use crate::image::nifti::{self, NiftiImage};
+use crate::register::transform_text::{to_itk_text, to_matrix_text};
+use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid};
+use crate::segment::pose_of_head;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What an image is registered to.
+#[derive(Clone, Debug)]
+pub enum Onto {
+    /// The template; its own brain is what is compared.
+    Template,
+    /// Another image.
+    Image {
+        /// Its file.
+        fixed: PathBuf,
+        /// Compare only inside this mask of the image that is moved.
+        moving_mask: Option<PathBuf>,
+        /// Compare only inside this mask of the image that stays.
+        fixed_mask: Option<PathBuf>,
+    },
+}
+
+/// The files of a registration.
+#[derive(Clone, Debug)]
+pub struct RegisterFiles {
+    /// The image that is moved.
+    pub moving: PathBuf,
+    /// What it is moved onto.
+    pub onto: Onto,
+    /// Where the 4x4 text goes; the ITK transform gets the same name with .tfm.
+    pub output: PathBuf,
+}
+
+/// The motion that was found.
+#[derive(Debug, Serialize)]
+pub struct Registered {
+    /// 4x4 text (RAS mm, maps a point of the moving image to the fixed one).
+    pub transform: PathBuf,
+    /// The same as an ITK transform.
+    pub itk_transform: PathBuf,
+    /// How well the images agree.
+    pub quality: FitQuality,
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+    /// Why the quality gate refuses it.
+    #[serde(skip)]
+    pub refused: Vec<String>,
+}
+
+/// Finds the motion and writes it twice. One that is not to be believed is written all the same ([`Registered::refused`]).
+///
+/// # Errors
+/// An image or mask that cannot be used, images that cannot be registered, the disk's.
+pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Registered, WorkflowError> {
+    let transform = match files.output.extension() {
+        Some(e) if e != "tfm" => files.output.clone(),
+        _ => files.output.with_extension("txt"),
+    };
+    let itk_transform = transform.with_extension("tfm");
+    check_writable(&transform)?;
+    let mut warnings = Vec::new();
+    let (moving, moving_bytes) = image(&files.moving, settings, &mut warnings)?;
+    let onto = match &files.onto {
+        Onto::Template => "MNI".to_owned(),
+        Onto::Image { fixed, .. } => fixed.display().to_string(),
+    };
+    let images = format!("{} onto {onto}", files.moving.display());
+    let refused = |source| WorkflowError::Rigid { images: images.clone(), source };
+    let (found, quality, doubts) = match &files.onto {
+        Onto::Template => parts(pose_of_head(&moving).map_err(refused)?),
+        Onto::Image { fixed, moving_mask, fixed_mask } => {
+            let mask = |path: &Option<PathBuf>, of: &Volume<f32, Native>, warnings: &mut Vec<String>| {
+                path.as_deref().map(|path| read_mask_of(path, &of.grid, &settings.image, warnings)).transpose()
+            };
+            let moving_mask = mask(moving_mask, &moving, &mut warnings)?;
+            let (fixed, fixed_bytes) = image(fixed, settings, &mut warnings)?;
+            if fixed_bytes == moving_bytes {
+                warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
+            }
+            let fixed_mask = mask(fixed_mask, &fixed, &mut warnings)?;
+            let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
+            parts(register_rigid(&moving, &fixed, masks, &settings.register).map_err(refused)?)
+        }
+    };
+    warnings.extend(doubts.iter().map(ToString::to_string));
+    write_whole(&transform, to_matrix_text(&found).as_bytes())?;
+    write_whole(&itk_transform, to_itk_text(&found).as_bytes()).inspect_err(|_| {
+        // Both or neither.
+        std::fs::remove_file(&transform).ok();
+    })?;
+    let doubtful = doubts.iter().find(|doubt| matches!(doubt, FitWarning::LowSimilarity { .. }));
+    let refused = doubtful.map(|doubt| format!("{images}: {doubt}")).into_iter().collect();
+    Ok(Registered { transform, itk_transform, quality, warnings, refused })
+}
+
+/// The fit without its frames: of files an image is what it is.
+fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Native>, FitQuality, Vec<FitWarning>) {
+    (fit.fixed_from_moving.relabelled(), fit.quality, fit.warnings)
+}
+
+fn image(
+    path: &Path,
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+) -> Result<(Volume<f32, Native>, Vec<u8>), WorkflowError> {
+    let bytes = read_input(path)?;
+    let name = path.display().to_string();
+    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &settings.image)?;
+    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    Ok((volume, bytes))
+}

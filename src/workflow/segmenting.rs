@@ -1,0 +1,83 @@
+//! One T1 in a file to a label map.
+
+use super::error::WorkflowError;
+use super::inputs::read_mask_of;
+use super::progress::Progress;
+use super::settings::Settings;
+use super::user_file::read_input;
+use crate::artefact::{check_writable, write_whole};
+use crate::image::nifti::{self, encode_mask, encode_u8};
+use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The files of a segmentation.
+#[derive(Clone, Debug, Default)]
+pub struct SegmentFiles {
+    /// T1-weighted scan.
+    pub t1: PathBuf,
+    /// Label map to write (.nii.gz).
+    pub output: PathBuf,
+    /// A brain mask in the scan's grid that wins over the computed one.
+    pub brain_mask: Option<PathBuf>,
+    /// Where the brain mask goes, too.
+    pub write_brain_mask: Option<PathBuf>,
+    /// On the 1 mm MNI grid instead of the scan's own.
+    pub in_mni: bool,
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+pub struct Segmented {
+    /// The label map.
+    pub labels: PathBuf,
+    /// Volumes of the tissues.
+    pub volumes: TissueVolumes,
+    /// Mean brightness of CSF, grey and white matter.
+    pub tissue_means: [f64; 3],
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+}
+
+/// Labels a scan.
+///
+/// # Errors
+/// A scan or mask that cannot be used, a head that cannot be labelled, the disk's.
+pub fn segment_file(
+    files: &SegmentFiles,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<Segmented, WorkflowError> {
+    for path in [Some(&files.output), files.write_brain_mask.as_ref()].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let name = files.t1.display().to_string();
+    let read = nifti::decode(&read_input(&files.t1)?, &name, &settings.image)?;
+    let (t1, mut warnings) = (read.volume, read.warnings);
+    let own = files.brain_mask.as_deref();
+    let own = own.map(|path| read_mask_of(path, &t1.grid, &settings.image, &mut warnings)).transpose()?;
+
+    progress.begin("segment", 2);
+    progress.doing("to MNI");
+    let fit = pose_of_head(&t1).map_err(|source| WorkflowError::Rigid { images: name.clone(), source })?;
+    progress.step();
+    progress.doing("labels");
+    let overrides = SegmentOverrides { brain: own.as_ref(), ..SegmentOverrides::default() };
+    let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &settings.deformable, &settings.segment)
+        .map_err(|source| WorkflowError::Head { scan: name, source })?;
+    progress.end();
+
+    let (labels, brain) = if files.in_mni {
+        (encode_u8(&found.labels_mni), encode_mask(&found.brain_mni))
+    } else {
+        (encode_u8(&found.labels), encode_mask(&found.brain))
+    };
+    write_whole(&files.output, &labels)?;
+    if let Some(path) = &files.write_brain_mask {
+        write_whole(path, &brain)?;
+    }
+    warnings.extend(fit.warnings.iter().map(ToString::to_string));
+    warnings.extend(found.warnings.iter().map(ToString::to_string));
+    let labels = files.output.clone();
+    Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, warnings })
+}
