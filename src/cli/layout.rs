@@ -20,7 +20,11 @@ struct Command {
     words: &'static [&'static str],
 }
 
-const COHORT: [Command; 5] = [
+const COHORT: [Command; 6] = [
+    Command {
+        name: "predict",
+        words: &["bids", "{bids_dir}", "{out}", "participant", "--predict", "--participant-label", "{participant_id}"],
+    },
     Command { name: "prep", words: &["prep", "{pre}", "{post}", "-o", "{case}"] },
     Command { name: "sweep", words: &["sweep", "{case}", "--shard", "{shard}"] },
     Command { name: "reduce", words: &["reduce", "{case}"] },

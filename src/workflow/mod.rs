@@ -21,6 +21,7 @@
 //! ```
 
 mod case;
+mod earlier_prediction;
 mod error;
 mod estimate_options;
 mod evaluate;
@@ -64,7 +65,7 @@ pub mod cohort;
 pub use case::Case;
 pub use error::{
     CaseError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole, MeshFileError,
-    PredictError, SimulationError, WarpError, WorkflowError,
+    PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};

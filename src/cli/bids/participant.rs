@@ -3,10 +3,11 @@
 use super::options::Args;
 use crate::artefact::write_whole;
 use crate::cli::failure::{Answered, in_one_line};
+use crate::cli::flags::Flags;
 use crate::cli::{Failure, Session, run};
 use crate::report::cohort::Status;
 use crate::workflow::Settings;
-use crate::workflow::cohort::{self, Dataset, Log, case_folder, log_file};
+use crate::workflow::cohort::{self, Dataset, Log, case_folder, log_file, plan_folder};
 use anyhow::anyhow;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -27,21 +28,32 @@ struct Planned {
     participant_id: String,
     pre: Option<PathBuf>,
     post: Option<PathBuf>,
+    /// The mask of what is to be taken, with `--predict`.
+    plan: Option<PathBuf>,
     case: PathBuf,
     message: Option<String>,
 }
 
 pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
     let plan = |subject: &String| {
-        let (pair, message) = match dataset.pair(subject, &args.entity) {
-            Ok(pair) => (Some(pair), None),
+        let found = if args.predict {
+            let plans = args.plans();
+            let found = dataset.planned(subject, &args.entity, (&plans, &args.plan));
+            found.map(|found| (found.pre, None, Some(found.plan)))
+        } else {
+            dataset.pair(subject, &args.entity).map(|pair| (pair.pre, Some(pair.post), None))
+        };
+        let (found, message) = match found {
+            Ok(found) => (Some(found), None),
             Err(error) => (None, Some(in_one_line(Failure::from(error).parts().1))),
         };
+        let (pre, post, plan) = found.map_or((None, None, None), |(pre, post, plan)| (Some(pre), post, plan));
         Planned {
             participant_id: subject.clone(),
-            pre: pair.as_ref().map(|pair| dataset.folder.join(&pair.pre.0)),
-            post: pair.as_ref().map(|pair| dataset.folder.join(&pair.post.0)),
-            case: case_folder(args.cases(), subject),
+            pre: pre.map(|pre| dataset.folder.join(pre.0)),
+            post: post.map(|post| dataset.folder.join(post.0)),
+            plan,
+            case: folder_of(args, subject),
             message,
         }
     };
@@ -63,8 +75,9 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
         // A defect of the program in one subject must not cost the others their night.
         let end = catch_unwind(AssertUnwindSafe(|| one(args, dataset, subject, &settings, session)));
         let end = end.unwrap_or_else(|_| Err(defect().into()));
-        let page = args.out.join(format!("{subject}.html"));
-        let log = log_file(&args.out, subject);
+        let name = name_of(args, subject);
+        let page = args.out.join(format!("{name}.html"));
+        let log = log_file(&args.out, &name);
         let status = match &end {
             Ok(()) => {
                 std::fs::remove_file(&log).ok();
@@ -110,20 +123,45 @@ pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fail
     }
 }
 
-/// Those of `hgm run`, with the memory that the mesh engines may take.
+/// Those of `hgm run` or `hgm predict`, with the memory that the mesh engines may take.
 fn settings(args: &Args, session: &Session) -> Result<Settings, Failure> {
-    let mut settings = run::settings(&args.analysis, &args.mesh, session)?;
+    let mut settings = if args.predict {
+        let mut flags = Flags::default();
+        args.mesh.over(&mut flags);
+        args.analysis.prior.over(&mut flags);
+        args.analysis.population.over(&mut flags)?;
+        session.settings(flags)?
+    } else {
+        run::settings(&args.analysis, &args.mesh, session)?
+    };
     if let Some(gb) = args.mem_gb {
         settings.mesh.limits.memory_mb = 1000 * gb;
     }
     Ok(settings)
 }
 
+/// What page and log of a subject are called.
+fn name_of(args: &Args, subject: &str) -> String {
+    if args.predict { format!("{subject}_plan") } else { subject.to_owned() }
+}
+
+fn folder_of(args: &Args, subject: &str) -> PathBuf {
+    if args.predict { plan_folder(args.cases(), subject) } else { case_folder(args.cases(), subject) }
+}
+
 /// One subject from scans to derivatives.
 fn one(args: &Args, dataset: &Dataset, subject: &str, settings: &Settings, session: &Session) -> Result<(), Failure> {
+    let place = session.place(&folder_of(args, subject));
+    if args.predict {
+        let planned = dataset.planned(subject, &args.entity, (&args.plans(), &args.plan))?;
+        tracing::info!("{subject}");
+        let out = (args.out.as_path(), &place);
+        let case = cohort::planned_subject((dataset, &planned), out, settings, &mut session.listener())?;
+        return Ok(case.quality_gate()?);
+    }
     let pair = dataset.pair(subject, &args.entity)?;
     tracing::info!("{subject}");
-    let (goal, place) = (args.analysis.goal(), session.place(&case_folder(args.cases(), subject)));
+    let goal = args.analysis.goal();
     let case = cohort::subject(goal, (dataset, &pair), (&args.out, &place), settings, &mut session.listener())?;
     Ok(case.quality_gate()?)
 }
