@@ -75,7 +75,7 @@ fn slow_a_subject_with_a_plan_is_predicted_and_its_pair_takes_that_up_and_is_the
     let errors: Vec<&Value> = issues.iter().filter(|issue| issue["severity"] == "error").collect();
     assert!(errors.is_empty(), "{errors:#?}");
 
-    let ended = bids(&["--participant-label", "01", CHEAP[0], CHEAP[1]]);
+    let ended = bids(&["-v", "--participant-label", "01", CHEAP[0], CHEAP[1]]);
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert!(ended.status.success() && said.contains("are the prediction's"), "{said}");
     let (case, alone) = (contents(&out.join("sub-01/hgm")), contents(&finished_pair()));
@@ -90,7 +90,7 @@ fn slow_a_subject_with_a_plan_is_predicted_and_its_pair_takes_that_up_and_is_the
     // Other settings: the pair goes without.
     let finer = folder.path().join("finer.toml");
     std::fs::write(&finer, text(Path::new(CHEAP[1])).replace("iterations = 10", "iterations = 11")).unwrap();
-    let ended = bids(&["--participant-label", "01", "--config", finer.to_str().unwrap(), "-w", out.to_str().unwrap()]);
+    let ended = bids(&["-v", "--participant-label", "01", "--config", finer.to_str().unwrap()]);
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert!(ended.status.success() && said.contains("otherwise than this pair would"), "{said}");
 }

@@ -238,7 +238,7 @@ fn slow_a_pair_takes_up_its_prediction_to_the_same_bytes_and_holds_it_against_wh
     let run = |name: &str, more: &[&str]| {
         let case = folder.path().join(name).join("case");
         let place = words(&case);
-        (output(&[&["run", &pre, &post, "-o", &place, "--threads", "1"], more, &CHEAP[..]].concat()), case)
+        (output(&[&["run", &pre, &post, "-o", &place, "-v", "--threads", "1"], more, &CHEAP[..]].concat()), case)
     };
     let same = |first: &Path, second: &Path| {
         let (first, second) = (contents(first), contents(second));
@@ -275,7 +275,8 @@ fn slow_a_pair_takes_up_its_prediction_to_the_same_bytes_and_holds_it_against_wh
     let ended = output(&[&["predict", &patient, "-o", &words(&other)], &away[..], &CHEAP[..]].concat());
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     let finer = folder.path().join("finer.toml");
-    std::fs::write(&finer, "[anat.segment]\niterations = 11\n").unwrap();
+    let cheap = std::fs::read_to_string(CHEAP[1]).unwrap();
+    std::fs::write(&finer, cheap.replace("iterations = 10", "iterations = 11")).unwrap();
     let brain = words(&plan_folder.join("anat/pre_space-native_desc-brain_mask.nii.gz"));
     let cases: [(&Path, &[&str], &[&str]); 5] = [
         (&other, &CHEAP, &["another pre-operative scan", "leave --prediction out"]),
