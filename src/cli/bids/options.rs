@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Example: hgm bids study study/derivatives/hgm participant --participant-label 01 02
 #[derive(Debug, clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub struct Args {
     /// The data set: sub-*/ses-preop/anat/*_T1w.nii.gz and sub-*/ses-postop/anat/*_T1w.nii.gz
     pub bids_dir: PathBuf,

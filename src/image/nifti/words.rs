@@ -88,7 +88,7 @@ impl Bits {
         }
     }
 
-    fn to_byte(&mut self) {
+    fn end_byte(&mut self) {
         let bytes = self.count.div_ceil(8);
         self.put(0, 8 * bytes - self.count);
         if self.count > 0 {
@@ -212,10 +212,10 @@ pub(super) fn deflate(block: &[u8], last: bool) -> Vec<u8> {
     if !last {
         // An empty stored block leads to the border, as a sync flush does.
         bits.put(0, 3);
-        bits.to_byte();
+        bits.end_byte();
         bits.put(0xffff_0000, 32);
     }
-    bits.to_byte();
+    bits.end_byte();
     bits.done()
 }
 
