@@ -49,6 +49,7 @@ def run(
     ventricle_mask: Any = None,
     cavity_mask: Any = None,
     resected_mask: Any = None,
+    prediction: Any = None,
     force: bool = False,
     progress: Optional[Progress] = None,
 ) -> Case:
@@ -74,6 +75,8 @@ def run(
         A rigid transform to the MNI frame.
     brain_mask, ventricle_mask, cavity_mask, resected_mask : path or nibabel image, optional
         Masks of your own: they win over the computed ones.
+    prediction : path, optional
+        A folder of :func:`predict` of the same scan: its work is taken up, and it is held against the case at the end.
     force : bool
         Makes again what is there.
     progress : callable, optional
@@ -101,6 +104,7 @@ def run(
             ventricle_mask=ventricle_mask,
             cavity_mask=cavity_mask,
             resected_mask=resected_mask,
+            prediction=prediction,
         )
         words = ["run", temporary.path("pre", pre), temporary.path("post", post)]
         words += options(

@@ -224,6 +224,7 @@ impl PairOptions {
         let OwnMasks { dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask } =
             self.masks.clone();
         let (pre, post) = (self.pre.clone(), self.post.clone());
-        Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask }
+        let prediction = None;
+        Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask, prediction }
     }
 }

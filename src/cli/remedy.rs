@@ -3,13 +3,14 @@
 use crate::anatomy::LabelError;
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
+use crate::layout;
 use crate::mesh::engine::EngineError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
     CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError,
-    SettingsError, SimulationError, Subject, WorkflowError,
+    SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -89,6 +90,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Predict(PredictError::NoTarget { .. } | PredictError::TargetOutside { .. }) => "see --targets",
         WorkflowError::Predict(PredictError::NoDraws { .. }) => "run `hgm predict` on it again",
         WorkflowError::Evaluate(error) => of_evaluation(error)?,
+        WorkflowError::TakenUp(error) => return Some(of_taking_up(error)),
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
@@ -129,6 +131,19 @@ fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
             return None;
         }
     })
+}
+
+fn of_taking_up(error: &TakenUpError) -> String {
+    match error {
+        TakenUpError::NoPrediction { .. } => "--prediction takes a folder that `hgm predict` has made".to_owned(),
+        TakenUpError::OtherScan { .. } => {
+            "give the scan that the prediction was made from, or leave --prediction out".to_owned()
+        }
+        TakenUpError::MadeOtherwise { folder, .. } => format!(
+            "give the settings (--config {}) and the masks that the prediction was made with, make it again, or leave --prediction out",
+            folder.join(layout::SETTINGS).display()
+        ),
+    }
 }
 
 fn of_settings(error: &SettingsError) -> Option<String> {
@@ -175,6 +190,10 @@ fn of_dataset(error: &DatasetError) -> Option<String> {
     Some(match error {
         DatasetError::Absent { .. } => "see --participant-label".to_owned(),
         DatasetError::NoScan { .. } => "--participant-label names those that are done".to_owned(),
+        DatasetError::NoPlan { .. } => {
+            "--plans names another folder, --participant-label those that are planned".to_owned()
+        }
+        DatasetError::SeveralPlans { entity, .. } => format!("choose one with --plan, such as --plan {entity}"),
         DatasetError::SeveralScans { entity, .. } => format!("choose one with --entity, such as --entity {entity}"),
         _ => return None,
     })

@@ -43,6 +43,10 @@ pub const POST_VENTRICLE: &str = "anat/post_space-MNI_label-ventricle_mask.nii.g
 pub const SAG: &str = "anat/pre_space-MNI_desc-sag_displacement.nii.gz";
 /// How far a point of the patient lies from its like in the template, mm.
 pub const TEMPLATE_DISPLACEMENT: &str = "anat/pre_space-MNI_desc-template_displacement.nii.gz";
+/// The same map to the last digit, in voxels of its own grid: what a later case takes from a prediction.
+pub const TEMPLATE_FIT: &str = "anat/pre_space-MNI_desc-template_fit.nii.gz";
+/// The pre-operative scan without its coil's gain, to the last digit: what a later case takes from a prediction.
+pub const PRE_EVEN_T1: &str = "anat/pre_space-MNI_desc-even_T1w.nii.gz";
 /// The labels as 3D Slicer takes them.
 pub const LABELS_FOR_SLICER: &str = "anat/pre_space-MNI_dseg.seg.nrrd";
 /// The cavity as 3D Slicer takes it.
@@ -229,6 +233,8 @@ pub const TABLE: &[Entry] = &[
     ),
     file(SAG, "displacement from the pre-operative to the post-operative scan, mm", Space::Mni, Maker::Anat),
     file(TEMPLATE_DISPLACEMENT, "displacement from the patient to the template, mm", Space::Mni, Maker::Anat),
+    file(PRE_EVEN_T1, "pre-operative scan without its coil's gain, of a prediction", Space::Mni, Maker::Anat),
+    file(TEMPLATE_FIT, "the template's fit, in voxels, of a prediction", Space::Mni, Maker::Anat),
     file(REST_MESH, "undeformed mesh of the tissue with its boundary sets", Space::Mni, Maker::Mesh),
     file(REST_GMSH, "the same for gmsh", Space::Mni, Maker::Mesh),
     file(REST_SURFACE.0, "surface of a boundary set", Space::Mni, Maker::Mesh),

@@ -3,9 +3,10 @@
 
 const MARKUP: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
-/// One script: wire, picture, what is seen beside the body, panel.
+/// One script: wire, fineness, picture, what is seen beside the body, panel.
 const SCRIPT: &str = concat!(
     include_str!("page/wire.js"),
+    include_str!("page/fineness.js"),
     include_str!("page/picture.js"),
     include_str!("page/sights.js"),
     include_str!("page/panel.js")

@@ -10,7 +10,11 @@ pub struct CohortCommand {
 }
 
 /// In the order in which they are run.
-pub const COHORT: [CohortCommand; 5] = [
+pub const COHORT: [CohortCommand; 6] = [
+    CohortCommand {
+        name: "predict",
+        words: &["bids", "{bids_dir}", "{out}", "participant", "--predict", "--participant-label", "{participant_id}"],
+    },
     CohortCommand { name: "prep", words: &["prep", "{pre}", "{post}", "-o", "{case}"] },
     CohortCommand { name: "sweep", words: &["sweep", "{case}", "--shard", "{shard}"] },
     CohortCommand { name: "reduce", words: &["reduce", "{case}"] },

@@ -91,6 +91,37 @@ pub fn subject_files(case: &Path, pre: &RawScan, post: &RawScan) -> Result<Vec<C
     Ok(files)
 }
 
+/// The same of a prediction: its fields, and the plan on the template. Images of the scan itself are named once there is a pair; the rest
+/// stays in the case folder.
+///
+/// # Errors
+/// As [`subject_files`].
+pub fn plan_files(case: &Path, pre: &RawScan) -> Result<Vec<CaseFile>, DerivativesError> {
+    let read = |file: &str| {
+        std::fs::read(case.join(file)).map_err(|source| DerivativesError::Read { file: file.to_owned(), source })
+    };
+    let sources = [pre.uri()];
+    let mut files = Vec::new();
+    let mut add = |name: &str, bytes: Vec<u8>, own: Value| {
+        let mut sidecar = json!({ "RawSources": sources, "Sources": sources, "GeneratedBy": generated_by() });
+        sidecar.as_object_mut().into_iter().zip(own.as_object()).for_each(|(all, own)| all.extend(own.clone()));
+        let stem = format!("{}_{}", pre.stem(), name.trim_end_matches(".nii.gz"));
+        files.push((format!("{stem}.json"), pretty(&sidecar)));
+        files.push((format!("{stem}.nii.gz"), bytes));
+    };
+    for (file, bids) in layout::TABLE.iter().filter_map(|file| Some((file, file.bids?))) {
+        if file.path.contains('{') && bids.of == Scan::Pre {
+            for (member, path) in members(case, Family(file.path)) {
+                add(&bids.spelt_of(&member), read(&path)?, json!({ "Description": bids.description }));
+            }
+        }
+    }
+    let own = json!({ "Description": "Tissue that is to be taken", "SpatialReference": TEMPLATE, "Type": "ROI" });
+    let name = format!("space-{TEMPLATE}_label-resection_mask.nii.gz");
+    add(&name, read(layout::RESECTED)?, own);
+    Ok(files)
+}
+
 /// The files of a family that are there, by member, in order.
 fn members(case: &Path, family: Family) -> Vec<(String, String)> {
     let entries = std::fs::read_dir(case.join(family.folder())).into_iter().flatten().flatten();
@@ -146,14 +177,16 @@ pub fn dataset_files(raw: Option<&str>) -> Vec<CaseFile> {
 }
 
 /// BIDS has no names for meshes, simulations, transforms of this kind and pages.
-const IGNORED: &str = "sub-*/hgm\n*_xfm.*\n*.html\n/group.*\n/logs\n";
+const IGNORED: &str = "sub-*/hgm\nsub-*/hgm-plan\n*_xfm.*\n*.html\n/group.*\n/logs\n";
 
 const README: &str = "\
 What hgm made of the T1 pairs (ses-preop, ses-postop) of the data set that bids:raw: stands for in the sidecars.
 
 sub-X.html                the subject's page; group.html has all subjects, outliers first
+sub-X_plan.html           the page of its prediction, where `--predict` made one
 sub-X/ses-*/anat          images, labels and masks; dseg.tsv names the labels
 sub-X/hgm                 the subject's case folder: meshes, simulations, transforms, settings, checksums
+sub-X/hgm-plan            the prediction's case folder
 logs/sub-X.json           why a subject could not be done (absent when it could)
 group.json, group.tsv     a line of figures per subject, with median and median absolute deviation
 group.tasks.tsv           tasks of the generative model by ranks (absent with fewer than five subjects of every task)

@@ -10,7 +10,7 @@ use super::{
 use crate::geometry::{Mni, Post, Pre, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
-use crate::register::deformable::{AtlasFit, DeformableSettings};
+use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
 use crate::segment::native::labels_on;
 use crate::segment::{
     HeadError, Scale, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, fit_template_to_labels,
@@ -80,6 +80,19 @@ pub struct GivenMasks {
     pub cavity: Option<Mask<Mni>>,
     /// The resected tissue.
     pub resected: Option<Mask<Mni>>,
+    /// The pre-operative head as [`take_head_apart`] has left it, with these masks and settings.
+    pub head: Option<HeadApart>,
+}
+
+/// A pre-operative head taken apart.
+#[derive(Clone, Debug)]
+pub struct HeadApart {
+    /// Its tissue.
+    pub pre: Segmentation<Pre>,
+    /// Where in the template a point of the patient lies; both in the MNI frame reached rigidly.
+    pub template_from_patient: DisplacementField<Mni>,
+    /// How its intensities go with tissue.
+    pub scale: Scale,
 }
 
 /// Both scans with their labels and what the operation took.
@@ -93,8 +106,8 @@ pub struct OperatedBrain {
     pub post: Segmentation<Post>,
     /// Cavity, resected tissue, side.
     pub finding: CavityFinding,
-    /// The template deformed onto the pre-operative head; both in the MNI frame reached rigidly.
-    pub template: AtlasFit<Mni>,
+    /// Where in the template a point of the pre-operative head lies; both in the MNI frame reached rigidly.
+    pub template_from_patient: DisplacementField<Mni>,
     /// Where the pre-operative brain lies after the operation, around the cavity; both in the MNI frame reached rigidly.
     pub sag: AtlasFit<Mni>,
     /// Ventricles of the post-operative scan, apart from the cavity.
@@ -166,7 +179,14 @@ pub fn take_pair_apart(
     }
 
     step("pre-operative tissue");
-    let (before, pre_fit, scale) = take_head_apart(pre, mni_from_pre, given, settings)?;
+    let apart = |(pre, template, scale): (_, AtlasFit<Mni>, _)| {
+        let template_from_patient = template.atlas_from_subject;
+        HeadApart { pre, template_from_patient, scale }
+    };
+    let HeadApart { pre: before, template_from_patient, scale } = match &given.head {
+        Some(head) => head.clone(),
+        None => apart(take_head_apart(pre, mni_from_pre, given, settings)?),
+    };
 
     step("cavity");
     let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
@@ -233,7 +253,7 @@ pub fn take_pair_apart(
     }
 
     step("post-operative tissue");
-    let post_priors = carried_priors(|p| pre_fit.atlas_from_subject.apply(sag.atlas_from_subject.apply(p)));
+    let post_priors = carried_priors(|p| template_from_patient.apply(sag.atlas_from_subject.apply(p)));
     let [fluid, grey, white] = before.tissue_means;
     let as_in_t1 = scale.turned_at.is_none() && fluid < grey && grey < white;
     let after = if given.labels.is_some() && !as_in_t1 {
@@ -254,7 +274,7 @@ pub fn take_pair_apart(
         pre: before,
         post: after,
         finding,
-        template: pre_fit,
+        template_from_patient,
         sag,
         post_ventricle,
         post_brain,

@@ -10,12 +10,13 @@ use crate::image::resample::{Interpolation, resample, resample_nearest};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
+use serde::{Deserialize, Serialize};
 
 /// Sulci narrower than twice this are part of the brain, as in a computed mask, mm.
 const CLOSING_MM: f64 = 5.0;
 
 /// How the intensities of a scan are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scale {
     /// Fluid is brighter than tissue (T2): values are read as this less the value, so that fluid is dark.
     pub turned_at: Option<f32>,

@@ -110,7 +110,7 @@ pub struct TissueVolumes {
 }
 
 /// Findings that do not stop the work.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, Error)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum SegmentWarning {
     /// The field of view ends inside the brain.

@@ -34,6 +34,8 @@ pub struct Inputs {
     pub cavity_mask: Option<PathBuf>,
     /// The resected tissue, in the grid of either scan.
     pub resected_mask: Option<PathBuf>,
+    /// The folder of a prediction of this pre-operative scan: what it has made of the scan is taken from it.
+    pub prediction: Option<PathBuf>,
 }
 
 impl Inputs {

@@ -22,6 +22,7 @@
 
 mod bundled_pair;
 mod case;
+mod earlier_prediction;
 mod error;
 mod estimate_options;
 mod evaluate;
@@ -71,7 +72,7 @@ pub use bundled_pair::{demo, demo_pair_settings, demo_phantom_settings};
 pub use case::Case;
 pub use error::{
     CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
-    MeshFileError, PredictError, SimulationError, WarpError, WorkflowError,
+    MeshFileError, PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::{Landmarks, evaluate_landmarks};

@@ -1,5 +1,6 @@
 //! A patient's case: from two scans to the mesh, and from there to samples or an estimate.
 
+use super::earlier_prediction::earlier_prediction;
 use super::error::{CaseError, WorkflowError};
 use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
@@ -8,7 +9,8 @@ use super::plan;
 use super::refusal;
 use super::stage_name::StageName;
 use super::stages::{
-    self, AnatFacts, Anatomy, EstimateInput, FieldsInput, HeldBody, RegistrationFacts, SampleMode, SeenShift, Sweep,
+    self, AnatFacts, Anatomy, Earlier, EstimateInput, FieldsInput, HeldBody, RegistrationFacts, SampleMode, SeenShift,
+    Sweep,
 };
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
@@ -48,6 +50,7 @@ impl FromStr for Shard {
 /// The stages of images, with their figures.
 pub(crate) struct Images {
     pub made: Made,
+    earlier: Option<Earlier>,
     registration: RegistrationFacts,
     anat: AnatFacts,
 }
@@ -57,19 +60,24 @@ impl Images {
     pub fn make(work: &Work<'_>, inputs: &Inputs) -> Result<Self, WorkflowError> {
         let scans = Scans::read(inputs, &work.settings.image)?;
         let own = OwnMasks::read(inputs, &scans, work)?;
+        let earlier = inputs.prediction.as_deref().map(|folder| earlier_prediction(folder, &scans, &own, work));
+        let earlier = earlier.transpose()?;
+        if earlier.is_some() {
+            work.tell(|p| p.noted("pose and tissue of the pre-operative scan are the prediction's"));
+        }
         work.hold(true)?;
         check_scans(work, &scans.sums)?;
         keep_settings(work)?;
         let mut made = Made::default();
-        let registration = match stages::registration(work, &mut made, &scans, &own) {
+        let registration = match stages::registration(work, &mut made, &scans, &own, earlier.as_ref()) {
             Ok(registration) => registration,
             Err(error) => {
                 refusal::keep(work, &scans, "registration", &[], &error)?;
                 return Err(error);
             }
         };
-        match stages::anat(work, &mut made, &scans, &own) {
-            Ok(anat) => Ok(Self { made, registration, anat }),
+        match stages::anat(work, &mut made, &scans, &own, earlier.as_ref()) {
+            Ok(anat) => Ok(Self { made, earlier, registration, anat }),
             Err(error) => {
                 refusal::keep(work, &scans, "anat", &in_order(&made, &[StageName::Registration]), &error)?;
                 Err(error)
@@ -126,10 +134,10 @@ pub(crate) struct Prepared {
 impl Prepared {
     /// Runs (or skips) the stages up to mesh and target.
     pub fn make(work: &Work<'_>, inputs: &Inputs) -> Result<Self, WorkflowError> {
-        let Images { mut made, registration, anat } = Images::make(work, inputs)?;
+        let Images { mut made, earlier, registration, anat } = Images::make(work, inputs)?;
         let anatomy = Anatomy::read(&work.case)?;
         let landmarks = Some(&anatomy.template_from_patient);
-        let mesh = stages::mesh(work, &mut made, &anatomy.labels, landmarks)?;
+        let mesh = stages::mesh(work, &mut made, &anatomy.labels, landmarks, earlier.as_ref())?;
         stages::reference(work, &mut made, &anatomy)?;
         Ok(Self { made, registration, anat, mesh })
     }

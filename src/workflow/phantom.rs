@@ -39,7 +39,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
         keep_settings(work)?;
         let mut made = Made::default();
         stages::labels(work, &mut made)?;
-        let figures = stages::mesh(work, &mut made, &atlas::template().labels, None)?;
+        let figures = stages::mesh(work, &mut made, &atlas::template().labels, None, None)?;
         stages::phantom_reference(work, &mut made, &work.case.mesh()?)?;
         Self::new(work, made, figures)
     }

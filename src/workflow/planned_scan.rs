@@ -11,7 +11,7 @@ use crate::geometry::{Mni, Native, Pre, RigidTransform};
 use crate::image::nifti::{self, encode_mask};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::register::deformable::AtlasFit;
-use crate::segment::Segmentation;
+use crate::segment::{Scale, Segmentation};
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -69,7 +69,7 @@ pub(crate) struct Shared {
     /// Where the scan lies, with what was noticed.
     pub pose: OnceCell<(RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<String>)>,
     /// Its tissue, and the template carried onto it.
-    pub head: OnceCell<(Segmentation<Pre>, AtlasFit<Mni>)>,
+    pub head: OnceCell<(Segmentation<Pre>, AtlasFit<Mni>, Scale)>,
 }
 
 /// What a cell holds, made where it is empty.

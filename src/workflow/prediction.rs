@@ -67,7 +67,7 @@ pub(super) fn predict_scan(
     let posed = stages::pose(work, &mut made, scan)?;
     let planned = stages::plan(work, &mut made, scan)?;
     let head = PlannedHead::read(&work.case)?;
-    let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient))?;
+    let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;
     work.case.drop_stale();
     let bytes = work.case.read(REST_MESH)?;
     let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;

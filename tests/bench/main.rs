@@ -11,6 +11,7 @@ mod corruptions;
 mod evidence;
 mod experiment;
 mod fem;
+mod fields;
 mod heads;
 mod imaging;
 mod job;
@@ -48,6 +49,7 @@ fn main() {
         ("pairs", pairs::bars),
         ("patients", patients::bars),
         ("predict", predict::bars),
+        ("fields", fields::bars),
         ("kills", kills::bars),
         ("bytes", bytes::bars),
         ("stale", stale::bars),

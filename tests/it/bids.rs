@@ -1,7 +1,7 @@
 //! `hgm bids`: a data set in, valid derivatives and one table out.
 
 use crate::job::{CHEAP, contents, output, sample};
-use crate::made::{prepared_pair, prepared_patient, synthetic_patient};
+use crate::made::{finished_pair, prepared_pair, prepared_patient, synthetic_patient};
 use crate::python::tool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -20,6 +20,79 @@ pub fn data_set(folder: &Path) -> PathBuf {
     }
     std::fs::write(raw.join("dataset_description.json"), r#"{"Name": "two", "BIDSVersion": "1.10.0"}"#).unwrap();
     raw
+}
+
+/// The plan of the first subject in that data set: the tissue that was taken. The second has none.
+pub fn add_plan(raw: &Path) {
+    let anat = raw.join("derivatives/plans/sub-01/ses-preop/anat");
+    std::fs::create_dir_all(&anat).unwrap();
+    let plan = anat.join("sub-01_ses-preop_label-resection_mask.nii.gz");
+    std::fs::copy(sample("truth/resected_pre.nii.gz"), plan).unwrap();
+}
+
+/// The cheap settings with few draws, in a file.
+pub fn few_draws(folder: &Path) -> PathBuf {
+    let file = folder.join("few.toml");
+    std::fs::write(&file, text(Path::new(CHEAP[1])) + "\n[predict]\ndraws = 16\nchecks = 0\n").unwrap();
+    file
+}
+
+#[test]
+fn slow_a_subject_with_a_plan_is_predicted_and_its_pair_takes_that_up_and_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = data_set(folder.path());
+    add_plan(&raw);
+    let out = raw.join("derivatives/hgm");
+    let few = few_draws(folder.path());
+    let bids = |rest: &[&str]| {
+        output(&[&["bids", raw.to_str().unwrap(), out.to_str().unwrap(), "participant"], rest].concat())
+    };
+    let planned = bids(&["--predict", "--dry-run", "--json"]);
+    let planned: Value = serde_json::from_slice(&planned.stdout).unwrap();
+    let [one, other] = [0, 1].map(|n| &planned["subjects"][n]);
+    assert!(one["plan"].as_str().unwrap().ends_with("sub-01_ses-preop_label-resection_mask.nii.gz"), "{planned}");
+    assert!(one["case"].as_str().unwrap().ends_with("sub-01/hgm-plan") && one["post"].is_null());
+    assert!(other["plan"].is_null() && other["message"].as_str().unwrap().contains("--plans"), "{planned}");
+
+    let ended = bids(&["--predict", "--config", few.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(3), "{said}");
+    assert!(said.contains("1 of 2 subjects did not end well: sub-02"), "{said}");
+    let first = contents(&out);
+    let anat = "sub-01/ses-preop/anat/sub-01_ses-preop_";
+    for file in [
+        "sub-01_plan.html".to_owned(),
+        "logs/sub-02_plan.json".to_owned(),
+        format!("{anat}from-T1w_to-deformed_desc-predicted_mode-points_xfm.nii.gz"),
+        format!("{anat}space-MNI152NLin2009aSym_label-resection_mask.json"),
+        "sub-01/hgm-plan/sim/prediction.json".to_owned(),
+    ] {
+        assert!(first.contains_key(&file), "{file}: {:?}", first.keys());
+    }
+    let said = tool(folder.path(), "bids-validator-deno", &["--format", "json", out.to_str().unwrap()]);
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let issues = said["issues"]["issues"].as_array().unwrap();
+    let errors: Vec<&Value> = issues.iter().filter(|issue| issue["severity"] == "error").collect();
+    assert!(errors.is_empty(), "{errors:#?}");
+
+    let ended = bids(&["-v", "--participant-label", "01", CHEAP[0], CHEAP[1]]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.success() && said.contains("are the prediction's"), "{said}");
+    let (case, alone) = (contents(&out.join("sub-01/hgm")), contents(&finished_pair()));
+    // Pages are headed by the folder's name.
+    for (name, bytes) in alone.iter().filter(|(name, _)| *name != "report.html") {
+        assert!(case.get(name) == Some(bytes), "{name} differs");
+    }
+    let held: Value = serde_json::from_str(&text(&out.join("sub-01/hgm-plan/sim/evaluation.json"))).unwrap();
+    assert!(held["taken"]["dice"].as_f64().unwrap() > 0.5, "{held}");
+    assert!(text(&out.join("sub-01_plan.html")).contains("Predicted against seen"));
+
+    // Other settings: the pair goes without.
+    let finer = folder.path().join("finer.toml");
+    std::fs::write(&finer, text(Path::new(CHEAP[1])).replace("iterations = 10", "iterations = 11")).unwrap();
+    let ended = bids(&["-v", "--participant-label", "01", "--config", finer.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.success() && said.contains("otherwise than this pair would"), "{said}");
 }
 
 fn text(path: &Path) -> String {

@@ -77,6 +77,18 @@ pub fn printed(name: &str, arguments: &[&str]) -> String {
 
 /// Starts the workflow in `folder` with this program; what it says goes to `snakemake.log` there.
 pub fn snakemake(program: &Path, folder: &Path, profile: &str, raw: &Path, out: &Path, settings: &Path) -> Child {
+    workflow(program, folder, profile, (raw, out), settings, &[])
+}
+
+/// The same with more words of its configuration.
+pub fn workflow(
+    program: &Path,
+    folder: &Path,
+    profile: &str,
+    (raw, out): (&Path, &Path),
+    settings: &Path,
+    more: &[&str],
+) -> Child {
     std::fs::create_dir_all(folder).unwrap();
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/cohort");
     let log = std::fs::File::create(folder.join("snakemake.log")).unwrap();
@@ -85,6 +97,7 @@ pub fn snakemake(program: &Path, folder: &Path, profile: &str, raw: &Path, out: 
     command.arg("--workflow-profile").arg(pipeline.join("profiles").join(profile));
     command.arg("--config").arg(format!("bids_dir={}", raw.display())).arg(format!("out={}", out.display()));
     command.arg(format!("settings={}", settings.display())).arg(format!("hgm={}", program.display()));
+    command.args(more);
     command.current_dir(folder).env("HOME", folder);
     command.stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap()
 }

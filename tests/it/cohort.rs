@@ -1,7 +1,7 @@
 //! A cohort by one command, by Snakemake on this machine, and by Snakemake on a Slurm cluster of one node: the same files.
 
-use crate::bids::data_set;
-use crate::cluster::{OneNodeSlurm, printed, snakemake};
+use crate::bids::{add_plan, data_set, few_draws};
+use crate::cluster::{OneNodeSlurm, printed, snakemake, workflow};
 use crate::job::{CHEAP, contents, output, program};
 use crate::made::{prepared_pair, prepared_patient};
 use std::collections::BTreeMap;
@@ -72,4 +72,29 @@ fn slow_a_cohort_has_the_same_files_by_one_command_by_snakemake_and_on_slurm_wit
     assert!(cluster.wait().unwrap().success(), "{}", said("slurm"));
     assert!(said("slurm").contains("Trying to restart job"), "{}", said("slurm"));
     assert_same(&expected, &outs[2]);
+}
+
+#[test]
+fn slow_a_workflow_predicts_a_subject_before_its_pair_as_the_commands_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = data_set(folder.path());
+    std::fs::remove_dir_all(raw.join("sub-02")).unwrap();
+    add_plan(&raw);
+    let settings = few_draws(folder.path());
+    let outs: [PathBuf; 2] = ["command", "local"].map(|name| folder.path().join(name).join("out"));
+    let bids = |rest: &[&str]| {
+        let [config, raw, out] = [&settings, &raw, &outs[0]].map(|path| path.to_str().unwrap());
+        let ended = output(&[&["--config", config, "bids", raw, out], rest].concat());
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    };
+    bids(&["participant", "--predict"]);
+    bids(&["participant"]);
+    bids(&["group"]);
+    let expected = products(&outs[0]);
+    assert!(expected.contains_key("sub-01/hgm-plan/sim/evaluation.json") && expected.contains_key("group.json"));
+    let place = folder.path().join("local");
+    let mut ended = workflow(&program(), &place, "local", (&raw, &outs[1]), &settings, &["predict=true"]);
+    let said = || std::fs::read_to_string(place.join("snakemake.log")).unwrap();
+    assert!(ended.wait().unwrap().success(), "{}", said());
+    assert_same(&expected, &outs[1]);
 }

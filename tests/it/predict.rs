@@ -226,6 +226,80 @@ fn slow_a_prediction_is_held_against_what_was_seen_and_nothing_else() {
     assert_eq!(std::fs::read_to_string(case.join("sim/evaluation.json")).unwrap(), kept);
 }
 
+#[test]
+fn slow_a_pair_takes_up_its_prediction_to_the_same_bytes_and_holds_it_against_what_was_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = |path: &Path| path.to_str().unwrap().to_owned();
+    let (plan_folder, mask) = (folder.path().join("plan"), plan().display().to_string());
+    let ended = planned(&plan_folder, &["--resection", &mask, "--draws", "16", "--checks", "0", "-q"]);
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|scan| words(&sample(scan)));
+    let taken_up = words(&plan_folder);
+    let run = |name: &str, more: &[&str]| {
+        let case = folder.path().join(name).join("case");
+        let place = words(&case);
+        (output(&[&["run", &pre, &post, "-o", &place, "-v", "--threads", "1"], more, &CHEAP[..]].concat()), case)
+    };
+    let same = |first: &Path, second: &Path| {
+        let (first, second) = (contents(first), contents(second));
+        assert_eq!(first.keys().collect::<Vec<_>>(), second.keys().collect::<Vec<_>>());
+        for (name, bytes) in &first {
+            assert!(*bytes == second[name], "{name} differs");
+        }
+    };
+    let mesh_is_theirs =
+        |ended: &Output| String::from_utf8_lossy(&ended.stderr).contains("the mesh is the prediction's");
+
+    // Another tissue was taken than was planned: everything before the operation is taken up, and a mesh made of its own.
+    let (ended, case) = run("taken", &["--prediction", &taken_up]);
+    let said = String::from_utf8_lossy(&ended.stdout).into_owned();
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert!(said.contains("planned") && said.contains("plan/report.html"), "{said}");
+    assert!(!mesh_is_theirs(&ended) && plan_folder.join("sim/evaluation.json").exists());
+    same(&finished_pair(), &case);
+
+    // The planned tissue was taken.
+    let as_planned = ["--resected-mask", mask.as_str()];
+    let (ended, without) = run("alone", &as_planned);
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let (ended, case) = run("planned", &[&as_planned[..], &["--prediction", &taken_up]].concat());
+    assert!(ended.status.success() && mesh_is_theirs(&ended), "{}", String::from_utf8_lossy(&ended.stderr));
+    same(&without, &case);
+    let found: serde_json::Value = serde_json::from_slice(&contents(&plan_folder)["sim/evaluation.json"]).unwrap();
+    assert_eq!(found["taken"]["dice"], 1.0, "{found}");
+
+    // What it was not made for is refused before anything is written.
+    let other = folder.path().join("other");
+    let patient = crate::made::synthetic_patient()[0].display().to_string();
+    let away = ["--resection-ellipsoid", "20,0,40,9,9,9", "--draws", "16", "--checks", "0", "-q"];
+    let ended = output(&[&["predict", &patient, "-o", &words(&other)], &away[..], &CHEAP[..]].concat());
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let finer = folder.path().join("finer.toml");
+    let cheap = std::fs::read_to_string(CHEAP[1]).unwrap();
+    std::fs::write(&finer, cheap.replace("iterations = 10", "iterations = 11")).unwrap();
+    let brain = words(&plan_folder.join("anat/pre_space-native_desc-brain_mask.nii.gz"));
+    let cases: [(&Path, &[&str], &[&str]); 5] = [
+        (&other, &CHEAP, &["another pre-operative scan", "leave --prediction out"]),
+        (&case, &CHEAP, &["no prediction", "hgm predict"]),
+        (folder.path(), &CHEAP, &["not a case folder"]),
+        (
+            &plan_folder,
+            &["--config", finer.to_str().unwrap()],
+            &["segment.iterations", "11", "--config", "settings.toml"],
+        ),
+        (&plan_folder, &["--brain-mask", &brain, CHEAP[0], CHEAP[1]], &["brain mask", "leave --prediction out"]),
+    ];
+    for (prediction, more, found) in cases {
+        let case = folder.path().join("none");
+        let asked = ["run", &pre, &post, "-o", &words(&case), "--prediction", &words(prediction)];
+        let ended = output(&[&asked[..], more].concat());
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(3), "{more:?}: {said}");
+        assert!(found.iter().all(|w| said.contains(w)) && said.trim().lines().count() == 1, "{more:?}: {said}");
+        assert!(!case.exists(), "{more:?} left something behind");
+    }
+}
+
 fn evaluated(arguments: &[&str]) -> serde_json::Value {
     let ended = output(&[&["evaluate", "--json"], arguments].concat());
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Example: hgm bids study study/derivatives/hgm participant --participant-label 01 02
 #[derive(Debug, clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub struct Args {
     /// The data set: sub-*/ses-preop/anat/*_T1w.nii.gz and sub-*/ses-postop/anat/*_T1w.nii.gz
     pub bids_dir: PathBuf,
@@ -21,6 +22,17 @@ pub struct Args {
     /// Where a session has several T1 scans: take the one with this entity, such as run-2
     #[arg(long, value_name = "ENTITY")]
     pub entity: Vec<String>,
+    /// Before the operation: each subject's scan of ses-preop and the mask of what is to be taken, as `hgm predict` (table [predict] of the
+    /// settings), into sub-*/hgm-plan. A pair that is run later takes the prediction's work up and holds it against what was seen
+    #[arg(long, conflicts_with_all = ["estimate", "every_task", "tissues"])]
+    pub predict: bool,
+    /// The data set of the plans: sub-*/ses-preop/anat/*_label-resection_mask.nii.gz, with the entities of the scan
+    /// [default: BIDS_DIR/derivatives/plans]
+    #[arg(long, value_name = "DIR", requires = "predict")]
+    pub plans: Option<PathBuf>,
+    /// Where a scan has several plans: take the one with this entity, such as desc-wide
+    #[arg(long, value_name = "ENTITY", requires = "predict")]
+    pub plan: Vec<String>,
     /// End with the first subject that cannot be done [default: go on and name them at the end]
     #[arg(long)]
     pub stop_on_first_crash: bool,
@@ -46,6 +58,11 @@ pub struct Args {
 }
 
 impl Args {
+    /// Where the plans lie.
+    pub fn plans(&self) -> PathBuf {
+        self.plans.clone().unwrap_or_else(|| self.bids_dir.join("derivatives/plans"))
+    }
+
     /// Below which the case folders lie.
     pub fn cases(&self) -> &Path {
         self.work_dir.as_deref().unwrap_or(&self.out)

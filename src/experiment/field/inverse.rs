@@ -34,6 +34,11 @@ pub fn inverse<F: Frame>(field: &Volume<[f32; 3], F>) -> Volume<[f32; 3], F> {
         // The voxel before is a good place to start from.
         let mut start = Vector3::zeros();
         for (i, out) in out.iter_mut().enumerate() {
+            if field.data[row * dims[0] + i] == [0.0; 3] {
+                // Nothing has moved there: it came from where it is.
+                start = Vector3::zeros();
+                continue;
+            }
             let y = Vector3::new(i as f64, j as f64, k as f64);
             let mut x = y + start;
             let mut best = (f64::INFINITY, x);

@@ -12,6 +12,11 @@ pub fn encode_f32<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
     encode(&volume.grid, 16, 32, volume.data.iter().flat_map(|x| x.to_le_bytes()))
 }
 
+/// The same packed in less time: maps of numbers that are like no other.
+pub fn encode_numbers<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
+    gzip::pack_fast(&plain(&volume.grid, 16, 32, volume.data.iter().flat_map(|x| x.to_le_bytes())))
+}
+
 /// Bytes (labels, small intensities) as `.nii.gz` bytes.
 pub fn encode_u8<F: Frame>(volume: &Volume<u8, F>) -> Vec<u8> {
     encode(&volume.grid, 2, 8, volume.data.iter().copied())
@@ -57,12 +62,16 @@ pub fn encode_vectors<F: Frame>(volume: &Volume<[f32; 3], F>) -> Vec<u8> {
 }
 
 fn encode<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16, data: impl Iterator<Item = u8>) -> Vec<u8> {
+    gzip::pack(&plain(grid, datatype, bits, data))
+}
+
+fn plain<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16, data: impl Iterator<Item = u8>) -> Vec<u8> {
     // NIfTI-1 stores sizes in 16 bits; everything reads it, so NIfTI-2 only where it must be.
     let large = grid.dims.iter().any(|&n| n > i16::MAX as usize);
     let mut bytes = if large { header_2(grid, datatype, bits) } else { header_1(grid, datatype, bits) };
     bytes.reserve_exact(grid.len() * bits as usize / 8);
     bytes.extend(data);
-    gzip::pack(&bytes)
+    bytes
 }
 
 /// What the orientation fields of a grid hold.

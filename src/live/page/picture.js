@@ -68,7 +68,8 @@ void main() {
   if (scanned > 0.) own = vec3(texture(scan, (q - scan_low) / scan_size).r);
   colour = vec4(light * mix(own, flat_colour.rgb, flat_colour.a), opacity);
 }`;
-let program, surface, cap, sphere;
+let program, surface, cap, sphere, places = {};
+const uniform = (name) => (places[name] ??= gl.getUniformLocation(program, name));
 const cut = { axis: -1, at: 0 };
 function shader(kind, text) {
   const made = gl.createShader(kind);
@@ -101,6 +102,7 @@ function prepare() {
   gl.attachShader(program, shader(gl.FRAGMENT_SHADER, FRAGMENT));
   gl.linkProgram(program);
   gl.useProgram(program);
+  places = {};
   [surface, cap, sphere] = [drawable(), drawable("seat"), drawable()];
   gl.enable(gl.DEPTH_TEST);
   mesh.normals = new Float32Array(3 * mesh.nodes);
@@ -114,7 +116,9 @@ function normalsOf(at, f, out) {
     const ex = at[b] - at[a], ey = at[b + 1] - at[a + 1], ez = at[b + 2] - at[a + 2];
     const gx = at[c] - at[a], gy = at[c + 1] - at[a + 1], gz = at[c + 2] - at[a + 2];
     const x = ey * gz - ez * gy, y = ez * gx - ex * gz, z = ex * gy - ey * gx;
-    for (const n of [a, b, c]) { out[n] += x; out[n + 1] += y; out[n + 2] += z; }
+    out[a] += x; out[a + 1] += y; out[a + 2] += z;
+    out[b] += x; out[b + 1] += y; out[b + 2] += z;
+    out[c] += x; out[c + 1] += y; out[c + 2] += z;
   }
   return out;
 }
@@ -151,20 +155,21 @@ function ballMesh({ centre, radius }) {
 }
 let scale = 1, shown = 0, drawn = 0, turned = true, sections = 0;
 function uploadFrame() {
+  socket.send('{"do":"ack"}');
   fill(surface, [frame.at, normalsOf(frame.at, mesh.facets, mesh.normals), frame.scalar]);
   let most = 1e-6;
-  for (const s of frame.scalar) most = Math.max(most, s);
+  for (let n = 0; n < frame.scalar.length; n += 1) if (frame.scalar[n] > most) most = frame.scalar[n];
   // The scale follows slowly, so that colours do not flicker.
   scale = most > scale ? most : Math.max(most, 0.98 * scale);
 }
-function draw() {
-  const ratio = Math.min(devicePixelRatio || 1, 2);
+function draw(fine = fineness.atRest) {
+  const ratio = Math.min((devicePixelRatio || 1) * fine, 2);
   const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   gl.viewport(0, 0, width, height);
   gl.clearColor(...ground, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  const set = (name) => gl.getUniformLocation(program, name), { eye } = axes();
+  const set = uniform, { eye } = axes();
   gl.uniformMatrix4fv(set("view"), false, matrix());
   gl.uniform3fv(set("eye"), eye);
   gl.uniform1f(set("top"), scale);
@@ -177,8 +182,11 @@ function draw() {
   gl.uniform3fv(set("scan_low"), scan.low);
   gl.uniform3fv(set("scan_size"), scan.size);
   const walls = $("show").value === "walls";
+  // The far side of a closed surface is never seen.
+  if (cut.axis < 0 && !walls) gl.enable(gl.CULL_FACE);
   gl.bindVertexArray(surface.array);
   gl.drawElements(gl.TRIANGLES, walls ? mesh.inside : mesh.facets.length, gl.UNSIGNED_INT, 0);
+  gl.disable(gl.CULL_FACE);
   sections = 0;
   if (cut.axis >= 0) {
     const arrays = section(frame.at, frame.scalar);
@@ -210,7 +218,19 @@ function readGround() {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readGround);
 addEventListener("resize", () => { turned = true; });
 const figure = (x, digits = 3) => (x === 0 ? "0" : Math.abs(x) < 1e-2 || Math.abs(x) >= 1e5 ? x.toExponential(1) : x.toPrecision(digits));
-let since = performance.now();
+let since = performance.now(), toldAt = 0;
+/// The figures are read by eyes: eight times a second is enough, and the last ones stay.
+function tell(now) {
+  if (now - toldAt < 120 && !frame.still && !frame.paused) return;
+  toldAt = now;
+  $("hz").textContent = frame.paused ? "paused" : frame.still ? "at rest" : `${frame.hz.toFixed(0)} Hz`;
+  $("residual").textContent = figure(frame.residual, 2);
+  $("maximum").textContent = `${frame.maximum.toFixed(2)} mm`;
+  $("energy").textContent = `${figure(frame.energy)} J`;
+  $("inverted").textContent = frame.inverted.toFixed(0);
+  $("force").textContent = `${frame.grip.toFixed(3)}, ${frame.ball.toFixed(3)} N`;
+  $("high").textContent = figure(scale);
+}
 function tick(now) {
   requestAnimationFrame(tick);
   if (now - since > 500) {
@@ -219,22 +239,21 @@ function tick(now) {
     if (sorted.length) $("latency").textContent = `${sorted[sorted.length >> 1].toFixed(0)} ms`;
     [since, drawn] = [now, 0];
   }
-  if (!frame || !mesh || !(fresh || turned)) return;
+  if (!frame || !mesh) return;
+  if (!(fresh || turned)) {
+    // Nothing has moved for a while.
+    if (fineness.coarse && now - fineness.last > 250) { draw(); fineness.coarse = false; }
+    return;
+  }
   if (fresh) { uploadFrame(); drawn += 1; shown += 1; }
-  draw();
+  const moves = turned || !frame.still;
+  draw(moves ? fineness.moving() : fineness.atRest);
+  fineness.coarse = moves && fineness.moving() !== fineness.atRest;
+  fineness.drawn(now);
   if (fresh && waiting && frame.taken >= waiting.number) {
     latencies.push(performance.now() - waiting.at);
     waiting = null;
   }
-  if (fresh) {
-    $("hz").textContent = frame.paused ? "paused" : frame.still ? "at rest" : `${frame.hz.toFixed(0)} Hz`;
-    $("residual").textContent = figure(frame.residual, 2);
-    $("maximum").textContent = `${frame.maximum.toFixed(2)} mm`;
-    $("energy").textContent = `${figure(frame.energy)} J`;
-    $("inverted").textContent = frame.inverted.toFixed(0);
-    $("force").textContent = `${frame.grip.toFixed(3)}, ${frame.ball.toFixed(3)} N`;
-    $("high").textContent = figure(scale);
-    canvas.dataset.ready = "yes";
-  }
+  if (fresh) { tell(now); canvas.dataset.ready = "yes"; }
   fresh = turned = false;
 }

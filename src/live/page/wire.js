@@ -1,8 +1,7 @@
 "use strict";
-// Drawing never waits for the solver: a frame that comes is kept, the next picture takes the latest.
+// Drawing never waits for the solver: a frame that comes is kept until the next picture takes it, and only then the next is asked for.
 const $ = (id) => document.getElementById(id);
 const canvas = $("gl");
-const gl = canvas.getContext("webgl2", { antialias: true });
 const say = (text) => { $("said").textContent = text; };
 
 // --- The wire: text to the session, the mesh and frames from it.
@@ -26,7 +25,6 @@ socket.onmessage = (event) => {
   if (words[1] === 1) return takeMesh(event.data);
   if (words[1] === 3) return takeTarget(event.data, words);
   if (words[1] === 4) return takeScan(event.data, words);
-  socket.send('{"do":"ack"}');
   frame = takeFrame(event.data, words);
   if (mesh.removed !== frame.removed) resect(frame.removed);
   fresh = true;

@@ -6,6 +6,7 @@ use crate::image::resample::resample_together;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A smooth map of the points of a frame: an affine part that holds everywhere and a deformation kept on a grid (beyond
 /// the grid's border the deformation of the border holds).
@@ -26,9 +27,28 @@ struct Affine {
     shift: Vector3<f64>,
 }
 
+/// What a field is beside the deformation at its voxels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FieldFrame {
+    dims: [usize; 3],
+    /// Three rows of an affine map each, as the ones below.
+    mm_from_voxel: [[f64; 4]; 3],
+    to_voxel: [[f64; 4]; 3],
+    to_mm: [[f64; 4]; 3],
+}
+
 impl Affine {
     fn of(matrix: &Matrix4<f64>) -> Self {
         let (linear, shift) = (matrix.fixed_view::<3, 3>(0, 0).into(), matrix.fixed_view::<3, 1>(0, 3).into());
+        Self { linear, shift }
+    }
+
+    fn rows(&self) -> [[f64; 4]; 3] {
+        [0, 1, 2].map(|a| [0, 1, 2, 3].map(|b| if b < 3 { self.linear[(a, b)] } else { self.shift[a] }))
+    }
+
+    fn of_rows(rows: &[[f64; 4]; 3]) -> Self {
+        let (linear, shift) = (Matrix3::from_fn(|a, b| rows[a][b]), Vector3::from_fn(|a, _| rows[a][3]));
         Self { linear, shift }
     }
 
@@ -87,6 +107,28 @@ impl<F: Frame> DisplacementField<F> {
             [d.x, d.y, d.z].map(|x| ((x * 64.0).round() / 64.0) as f32)
         };
         Volume::from_data(self.grid, (0..self.grid.len()).into_par_iter().map(value).collect())
+    }
+
+    /// The field to the last digit: its frame, and the deformation in voxels.
+    pub fn parts(&self) -> (FieldFrame, Volume<[f32; 3], F>) {
+        let Self { grid, components: [x, y, z], to_voxel, to_mm } = self;
+        let mm_from_voxel = Affine::of(&grid.mm_from_voxel).rows();
+        let (to_voxel, to_mm) = (to_voxel.rows(), to_mm.rows());
+        let frame = FieldFrame { dims: grid.dims, mm_from_voxel, to_voxel, to_mm };
+        let vectors = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]);
+        (frame, Volume::from_data(*grid, vectors.collect()))
+    }
+
+    /// The field that [`Self::parts`] has told; `None` where the two are not one field's.
+    pub fn from_parts(frame: &FieldFrame, deformation: &[[f32; 3]]) -> Option<Self> {
+        let of_grid = Affine::of_rows(&frame.mm_from_voxel);
+        let mut mm_from_voxel = of_grid.linear.to_homogeneous();
+        mm_from_voxel.fixed_view_mut::<3, 1>(0, 3).copy_from(&of_grid.shift);
+        let grid = Grid::new(frame.dims, mm_from_voxel)?;
+        let components = [0, 1, 2].map(|a| deformation.iter().map(|d| d[a]).collect());
+        let field =
+            Self { grid, components, to_voxel: Affine::of_rows(&frame.to_voxel), to_mm: Affine::of_rows(&frame.to_mm) };
+        (deformation.len() == grid.len()).then_some(field)
     }
 
     /// The grid the deformation is kept on.

@@ -4,7 +4,7 @@ mod field;
 pub(super) mod force;
 mod velocity;
 
-pub use field::DisplacementField;
+pub use field::{DisplacementField, FieldFrame};
 
 use super::pyramid::{on_grid_of, reduced_to};
 use crate::geometry::{AffineTransform, Frame, Native, Position};

@@ -4,6 +4,8 @@ use crate::report::derivatives::RawScan;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
+/// What a plan's `label` is called.
+const PLANNED: &str = "resection";
 /// Sessions of the two scans.
 const SESSIONS: [&str; 2] = ["ses-preop", "ses-postop"];
 
@@ -25,6 +27,15 @@ pub struct ScanPair {
     pub post: RawScan,
 }
 
+/// A subject's scan before surgery, and what is to be taken.
+#[derive(Clone, Debug)]
+pub struct ScanAndPlan {
+    /// Before surgery.
+    pub pre: RawScan,
+    /// A mask in its grid.
+    pub plan: PathBuf,
+}
+
 /// Why a data set cannot be used, or one of its subjects.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
@@ -41,6 +52,13 @@ pub enum DatasetError {
     NoScan { folder: String, stem: String, entities: Vec<String> },
     #[error("{folder}: {} scans fit ({})", found.len(), found.join(", "))]
     SeveralScans { folder: String, found: Vec<String>, entity: String },
+    #[error(
+        "{}: no {stem}_label-{PLANNED}_mask.nii.gz{}; draw what is to be taken in the scan's grid, or leave the subject out",
+        folder.display(), with(entities)
+    )]
+    NoPlan { folder: PathBuf, stem: String, entities: Vec<String> },
+    #[error("{}: {} plans fit ({})", folder.display(), found.len(), found.join(", "))]
+    SeveralPlans { folder: PathBuf, found: Vec<String>, entity: String },
 }
 
 fn with(entities: &[String]) -> String {
@@ -75,6 +93,38 @@ impl Dataset {
     pub fn pair(&self, subject: &str, entities: &[String]) -> Result<ScanPair, DatasetError> {
         let [pre, post] = SESSIONS.map(|session| self.scan(subject, session, entities));
         Ok(ScanPair { pre: pre?, post: post? })
+    }
+
+    /// The scan before surgery, and the mask of what is to be taken in the data set `plans`: by BIDS derivatives' names the scan's
+    /// own entities, then `label-resection`, then `_mask`. `chosen` are entities that choose where there are several.
+    ///
+    /// # Errors
+    /// As [`Dataset::pair`]; also [`DatasetError::NoPlan`] and [`DatasetError::SeveralPlans`].
+    pub fn planned(
+        &self,
+        subject: &str,
+        entities: &[String],
+        (plans, chosen): (&Path, &[String]),
+    ) -> Result<ScanAndPlan, DatasetError> {
+        let pre = self.scan(subject, SESSIONS[0], entities)?;
+        let (inside, scan) = pre.0.rsplit_once('/').unwrap_or(("", &pre.0));
+        let (folder, stem) = (plans.join(inside), scan.split("_T1w.nii").next().unwrap_or(scan));
+        let (begin, label) = (format!("{stem}_"), format!("label-{PLANNED}"));
+        let mut found = names(&folder).unwrap_or_default();
+        found.retain(|name| {
+            let own = name.strip_prefix(&begin).map(|own| own.strip_suffix(".gz").unwrap_or(own));
+            let parts: Vec<&str> =
+                own.and_then(|own| own.strip_suffix("_mask.nii")).unwrap_or_default().split('_').collect();
+            parts.contains(&label.as_str()) && chosen.iter().all(|entity| parts.contains(&entity.as_str()))
+        });
+        match &found[..] {
+            [one] => Ok(ScanAndPlan { plan: folder.join(one), pre }),
+            [] => Err(DatasetError::NoPlan { folder, stem: stem.to_owned(), entities: chosen.to_vec() }),
+            several => {
+                let entity = distinguishing(several).trim_end_matches(".nii.gz").to_owned();
+                Err(DatasetError::SeveralPlans { folder, found: found.clone(), entity })
+            }
+        }
     }
 
     fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, DatasetError> {
@@ -160,6 +210,35 @@ mod tests {
         assert!(chosen.pre.0.ends_with("run-2_T1w.nii.gz"));
         let missing = dataset.pair("sub-02", &[]).unwrap_err().to_string();
         assert!(missing.contains("sub-02/ses-postop/anat") && missing.contains("leave the subject out"), "{missing}");
+    }
+
+    #[test]
+    fn a_plan_has_the_entities_of_its_scan_and_one_of_several_is_chosen() {
+        let (folder, dataset) = dataset(&[
+            "sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz",
+            "derivatives/plans/sub-01/ses-preop/anat/sub-01_ses-preop_run-1_label-resection_mask.nii.gz",
+            "derivatives/plans/sub-01/ses-preop/anat/sub-01_ses-preop_run-2_label-lesion_mask.nii.gz",
+            "derivatives/plans/sub-01/ses-preop/anat/sub-01_ses-preop_run-2_label-resection_desc-wide_mask.nii.gz",
+            "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii",
+            "derivatives/plans/sub-02/ses-preop/anat/sub-02_ses-preop_label-resection_desc-wide_mask.nii",
+            "derivatives/plans/sub-02/ses-preop/anat/sub-02_ses-preop_label-resection_mask.nii.gz",
+            "sub-03/ses-preop/anat/sub-03_ses-preop_T1w.nii.gz",
+        ]);
+        let plans = folder.path().join("derivatives/plans");
+        let planned = |subject: &str, chosen: &[&str]| {
+            let chosen: Vec<String> = chosen.iter().map(|&entity| entity.to_owned()).collect();
+            dataset.planned(subject, &[], (&plans, &chosen))
+        };
+        let found = planned("sub-01", &[]).unwrap();
+        assert!(found.plan.ends_with("sub-01_ses-preop_run-2_label-resection_desc-wide_mask.nii.gz"), "{found:?}");
+        let doubtful = planned("sub-02", &[]).unwrap_err();
+        assert!(matches!(&doubtful, DatasetError::SeveralPlans { entity, .. } if entity == "desc-wide"), "{doubtful}");
+        assert!(planned("sub-02", &["desc-wide"]).unwrap().plan.ends_with("desc-wide_mask.nii"));
+        let missing = planned("sub-03", &[]).unwrap_err().to_string();
+        assert!(
+            missing.contains("sub-03_ses-preop_label-resection_mask.nii.gz")
+                && missing.contains("leave the subject out")
+        );
     }
 
     #[test]

@@ -1,24 +1,27 @@
 //! A cohort: the subjects of a BIDS data set, each as one case, and all of them together.
 
 mod dataset;
+mod foretold;
 mod group_level;
 mod participant_level;
 mod population;
 
-pub use dataset::{Dataset, DatasetError, ScanPair};
+pub use dataset::{Dataset, DatasetError, ScanAndPlan, ScanPair};
+pub use foretold::{plan_folder, planned_subject};
 pub use group_level::{Group, group};
 pub use participant_level::{
-    Ended, Participants, Planned, SubjectError, participants, planned, planned_table, table, unwell,
+    Ended, Participants, Planned, SubjectError, Work, participants, planned, planned_table, table, unwell,
 };
 pub use population::{Learnt, POPULATION, learn, merge_populations, population_prior, read_population};
 
 use super::error::CohortError;
-use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError, run_to};
+use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError};
 use crate::artefact::{sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
+use foretold::with_prediction;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -71,10 +74,10 @@ pub fn subject(
     progress: &mut dyn Progress,
 ) -> Result<Case, WorkflowError> {
     let inputs = Inputs::pair(dataset.folder.join(&pair.pre.0), dataset.folder.join(&pair.post.0));
-    let case = run_to(goal, &inputs, place, settings, progress).or_else(|error| {
+    let name = pair.pre.0.split('/').next().unwrap_or_default();
+    let case = with_prediction(goal, &inputs, place, settings, progress).or_else(|error| {
         if error.answer().is_some() {
             // What the scans said has its page, too.
-            let name = pair.pre.0.split('/').next().unwrap_or_default();
             let page = Case::at(&place.folder).read(layout::PAGE)?;
             write_whole(&out.join(format!("{name}.html")), &page)?;
         }
@@ -83,6 +86,7 @@ pub fn subject(
     for (file, bytes) in subject_files(case.folder(), &pair.pre, &pair.post)? {
         write_whole(&out.join(file), &bytes)?;
     }
+    foretold::held_against(&case, (out, name), progress)?;
     Ok(case)
 }
 

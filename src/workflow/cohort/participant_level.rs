@@ -1,6 +1,6 @@
 //! The participant level: each subject through the whole job, then its files under BIDS names.
 
-use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, subject};
+use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
 use crate::report::cohort::Status;
 use crate::workflow::error::{ErrorKind, WorkflowError};
@@ -10,6 +10,20 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
+/// What is done with each subject.
+#[derive(Clone, Copy, Debug)]
+pub enum Work<'a> {
+    /// Its pair of scans, so far.
+    Pair(Goal),
+    /// A prediction, from its scan before surgery and the mask of what is to be taken.
+    Plan {
+        /// The data set of the masks.
+        plans: &'a Path,
+        /// What chooses among several masks of a subject.
+        chosen: &'a [String],
+    },
+}
+
 /// What is asked of the subjects.
 #[derive(Clone, Copy, Debug)]
 pub struct Participants<'a> {
@@ -17,14 +31,33 @@ pub struct Participants<'a> {
     pub dataset: &'a Dataset,
     /// What chooses among several scans of a session.
     pub entities: &'a [String],
-    /// How far each job goes.
-    pub goal: Goal,
+    /// What is done with each.
+    pub work: Work<'a>,
     /// Where the derivatives go.
     pub out: &'a Path,
     /// Below which the case folders lie.
     pub cases: &'a Place,
     /// Whether the first subject that cannot be done is the last.
     pub stop_on_first_crash: bool,
+}
+
+impl Participants<'_> {
+    /// What page and log of a subject are called.
+    fn called(&self, subject: &str) -> String {
+        match self.work {
+            Work::Pair(_) => subject.to_owned(),
+            Work::Plan { .. } => format!("{subject}_plan"),
+        }
+    }
+
+    /// Its case folder.
+    fn folder(&self, subject: &str) -> PathBuf {
+        let below = match self.work {
+            Work::Pair(_) => case_folder,
+            Work::Plan { .. } => plan_folder,
+        };
+        below(&self.cases.folder, subject)
+    }
 }
 
 /// Why a subject did not end well.
@@ -94,7 +127,8 @@ pub fn participants(
         // A defect of the program in one subject must not cost the others their night.
         let outcome = catch_unwind(AssertUnwindSafe(|| one(asked, name, settings, progress)));
         let outcome = outcome.unwrap_or(Err(SubjectError::Defect));
-        let file = log_file(asked.out, name);
+        let called = asked.called(name);
+        let file = log_file(asked.out, &called);
         let mut end = Ended {
             participant_id: name.clone(),
             status: outcome.as_ref().err().map_or(Status::Done, SubjectError::status),
@@ -118,7 +152,7 @@ pub fn participants(
             }
         }
         let failed = end.status == Status::Failed;
-        end.page = (!failed).then(|| asked.out.join(format!("{name}.html")));
+        end.page = (!failed).then(|| asked.out.join(format!("{called}.html")));
         done.push(end);
         if failed && asked.stop_on_first_crash {
             break;
@@ -133,9 +167,19 @@ fn one(
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<(), SubjectError> {
-    let pair = asked.dataset.pair(name, asked.entities).map_err(WorkflowError::from)?;
-    let place = Place { folder: case_folder(&asked.cases.folder, name), ..asked.cases.clone() };
-    let case = subject(asked.goal, (asked.dataset, &pair), (asked.out, &place), settings, progress)?;
+    let (dataset, entities) = (asked.dataset, asked.entities);
+    let place = Place { folder: asked.folder(name), ..asked.cases.clone() };
+    let out = (asked.out, &place);
+    let case = match asked.work {
+        Work::Pair(goal) => {
+            let pair = dataset.pair(name, entities).map_err(WorkflowError::from)?;
+            subject(goal, (dataset, &pair), out, settings, progress)?
+        }
+        Work::Plan { plans, chosen } => {
+            let planned = dataset.planned(name, entities, (plans, chosen)).map_err(WorkflowError::from)?;
+            planned_subject((dataset, &planned), out, settings, progress)?
+        }
+    };
     Ok(case.quality_gate()?)
 }
 
@@ -172,6 +216,8 @@ pub struct Planned {
     pub pre: Option<PathBuf>,
     /// The scan after it.
     pub post: Option<PathBuf>,
+    /// The mask of what is to be taken, for a prediction.
+    pub plan: Option<PathBuf>,
     /// The case folder.
     pub case: PathBuf,
     /// Why it cannot be done.
@@ -180,17 +226,25 @@ pub struct Planned {
 
 /// What would be done with every subject; `words` says why one cannot be.
 pub fn planned(asked: &Participants<'_>, words: &dyn Fn(DatasetError) -> String) -> Vec<Planned> {
-    let folder = &asked.dataset.folder;
+    let (dataset, entities) = (asked.dataset, asked.entities);
     let plan = |name: &String| {
-        let (pair, message) = match asked.dataset.pair(name, asked.entities) {
-            Ok(pair) => (Some(pair), None),
+        let found = match asked.work {
+            Work::Pair(_) => dataset.pair(name, entities).map(|pair| (pair.pre, Some(pair.post), None)),
+            Work::Plan { plans, chosen } => {
+                dataset.planned(name, entities, (plans, chosen)).map(|found| (found.pre, None, Some(found.plan)))
+            }
+        };
+        let (found, message) = match found {
+            Ok(found) => (Some(found), None),
             Err(error) => (None, Some(words(error))),
         };
+        let (pre, post, plan) = found.map_or((None, None, None), |(pre, post, plan)| (Some(pre), post, plan));
         Planned {
             participant_id: name.clone(),
-            pre: pair.as_ref().map(|pair| folder.join(&pair.pre.0)),
-            post: pair.as_ref().map(|pair| folder.join(&pair.post.0)),
-            case: case_folder(&asked.cases.folder, name),
+            pre: pre.map(|pre| dataset.folder.join(pre.0)),
+            post: post.map(|post| dataset.folder.join(post.0)),
+            plan,
+            case: asked.folder(name),
             message,
         }
     };

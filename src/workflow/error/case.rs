@@ -48,7 +48,7 @@ pub enum CaseError {
     NoField { folder: PathBuf, name: String },
 }
 
-fn in_words(reasons: &[Reason]) -> String {
+pub(super) fn in_words(reasons: &[Reason]) -> String {
     reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 

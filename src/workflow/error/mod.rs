@@ -9,6 +9,7 @@ mod landmarks;
 mod mesh_file;
 mod predict;
 mod simulation;
+mod taken_up;
 mod warp;
 
 pub use case::CaseError;
@@ -20,6 +21,7 @@ pub use landmarks::LandmarkError;
 pub use mesh_file::MeshFileError;
 pub use predict::PredictError;
 pub use simulation::SimulationError;
+pub use taken_up::TakenUpError;
 pub use warp::WarpError;
 
 use super::cohort::DatasetError;
@@ -153,6 +155,8 @@ pub enum WorkflowError {
     Warp(#[from] WarpError),
     #[error(transparent)]
     Predict(#[from] PredictError),
+    #[error(transparent)]
+    TakenUp(#[from] TakenUpError),
     #[error(transparent)]
     Landmark(#[from] LandmarkError),
     #[error(transparent)]

@@ -1,5 +1,6 @@
 //! Stage `anat`: both scans in MNI space, brain masks, labels, cavity, resected tissue.
 
+use super::earlier::Earlier;
 use super::reading::WithReading;
 use super::registration::transforms;
 use crate::artefact::{Produced, Stage};
@@ -108,6 +109,7 @@ pub(crate) fn anat(
     made: &mut Made,
     scans: &Scans,
     own: &OwnMasks,
+    earlier: Option<&Earlier>,
 ) -> Result<AnatFacts, WorkflowError> {
     let stage = anat_stage(work, made, &scans.sums);
     let stage = own.given().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
@@ -127,6 +129,7 @@ pub(crate) fn anat(
             ventricle: own.ventricle.as_ref().map(on_pre),
             cavity: own.cavity.as_ref().map(on_mni),
             resected: own.resected.as_ref().map(on_mni),
+            head: earlier.map(|earlier| earlier.head(&scans.pre)).transpose()?,
         };
         let step = |what: &'static str| {
             work.tell(|p| {
@@ -135,7 +138,14 @@ pub(crate) fn anat(
             });
         };
         let OperatedBrain {
-            pre: before, post: after, finding: found, template, sag, post_ventricle, post_brain, ..
+            pre: before,
+            post: after,
+            finding: found,
+            template_from_patient,
+            sag,
+            post_ventricle,
+            post_brain,
+            ..
         } = take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
 
         work.tell(|p| p.doing("writing"));
@@ -154,7 +164,7 @@ pub(crate) fn anat(
         write(RESECTED, encode_mask(&found.resected));
         write(POST_VENTRICLE, encode_mask(&post_ventricle));
         write(SAG, encode_vectors(&sag.subject_from_atlas.displacement_mm()));
-        write(TEMPLATE_DISPLACEMENT, encode_vectors(&template.atlas_from_subject.displacement_mm()));
+        write(TEMPLATE_DISPLACEMENT, encode_vectors(&template_from_patient.displacement_mm()));
         write(PRE_NATIVE_BRAIN, encode_mask(&before.brain));
         write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
         write(POST_NATIVE_BRAIN, encode_mask(&after.brain));
@@ -180,7 +190,7 @@ pub(crate) fn anat(
                 ventricle_before_cc: Some(before.volumes.ventricle_cc),
                 ventricle_after_cc: Some(post_ventricle.volume_cc()),
                 brain_cc: Some(before.volumes.brain_cc),
-                midline_shift_mm: midline_shift_mm(&sag.subject_from_atlas, &template.atlas_from_subject),
+                midline_shift_mm: midline_shift_mm(&sag.subject_from_atlas, &template_from_patient),
             },
             side: found.side,
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),

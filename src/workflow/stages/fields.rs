@@ -5,7 +5,7 @@ use crate::artefact::{Manifest, Produced};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
 use crate::geometry::{Frame, Position, Pre};
 use crate::image::nifti::{
-    self, ReadOptions, encode_displacement, encode_f32, encode_intensities, encode_mask, encode_u8,
+    self, ReadOptions, encode_displacement, encode_intensities, encode_mask, encode_numbers, encode_u8,
 };
 use crate::image::{Grid, Mask, Volume};
 use crate::layout::{
@@ -18,7 +18,7 @@ use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Point3;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const NAME: StageName = StageName::Fields;
 
 /// What the fields are made from.
@@ -93,8 +93,8 @@ fn files(state: &str, field: &ShiftField, case: &CaseShift<'_>, produced: &mut P
     write(POST_FROM_PRE_FIELD.of(state), encode_displacement(&field.whole, field.to_post(&case.post_from_pre)));
     let to_pre = field.to_pre(&case.post_grid, &case.post_from_pre.inverse());
     write(PRE_FROM_POST_FIELD.of(state), encode_displacement(&case.post_grid, to_pre));
-    write(SHIFT_SD.of(state), encode_f32(&field.on_whole(&field.sd_mm, 0.0)));
-    write(SHIFT_REACH.of(state), encode_f32(&field.on_whole(&field.reach95_mm, 0.0)));
+    write(SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
+    write(SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
     write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
 }
 

@@ -1,6 +1,7 @@
 //! Stage `mesh`: label map to undeformed mesh with its boundary sets.
 
 use super::anat::Anatomy;
+use super::earlier::Earlier;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::{MeshOutcome, SetOutcome};
 use crate::geometry::{Frame, Mni, Position};
@@ -14,9 +15,11 @@ use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
 use crate::segment::{SULCUS_MM, label, with_closed_sulci};
 use crate::tag::{Midline, TagReport, falx_sheet, tag_boundary_sets_with};
+use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
-use crate::workflow::stage_name::StageName;
+use crate::workflow::settings::Settings;
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
@@ -28,25 +31,36 @@ const LARGE_ISLAND_MM3: f64 = 500.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
-    let tag = &work.settings.tag;
-    let mut settings = MeshSettings { without: vec![label::CSF], ..work.settings.mesh.clone() };
+    mesh_stage_of((&work.case, work.subject), work.settings, made)
+}
+
+/// The same of any case.
+pub(crate) fn mesh_stage_of(of: (&Case, Subject), all: &Settings, made: &Made) -> (Stage, MeshSettings) {
+    let tag = &all.tag;
+    let mut settings = MeshSettings { without: vec![label::CSF], ..all.mesh.clone() };
     if tag.falx && settings.split.is_none() {
         settings.split = Some(falx_sheet());
     }
     let both = serde_json::json!({ "mesh": settings, "tag": tag });
-    (work.stage(made, &NAME, VERSION, &both).frame(Mni::NAME), settings)
+    (made.stage(of, &NAME, VERSION, &both).frame(Mni::NAME), settings)
 }
 
 /// Meshes a label map (grey, white, ventricle, resected), tags the sets, leaves only the tissue, writes the undeformed mesh.
-/// `template_from_labels` carries the landmarks of the template onto a patient; without it they are taken where they are.
+/// `template_from_labels` carries the landmarks of the template onto a patient; without it they are taken where they are. The
+/// mesh of an earlier prediction is taken where it was made of the same labels.
 pub(crate) fn mesh(
     work: &Work<'_>,
     made: &mut Made,
     labels: &LabelMap<Mni>,
     template_from_labels: Option<&DisplacementField<Mni>>,
+    earlier: Option<&Earlier>,
 ) -> Result<MeshFacts, WorkflowError> {
     let (stage, settings) = mesh_stage(work, made);
     work.run(made, &NAME, &stage, || {
+        if let Some(mesh) = earlier.map(|earlier| earlier.mesh(labels)).transpose()?.flatten() {
+            work.tell(|p| p.noted("the mesh is the prediction's: what was taken is what was planned, voxel for voxel"));
+            return Ok(mesh);
+        }
         let body = with_closed_sulci(labels, SULCUS_MM);
         let Tagged { rest, whole, record, tags } = tagged(work, &body, &settings, template_from_labels)?;
         let mut produced = Produced::default();

@@ -6,6 +6,7 @@
 mod anat;
 mod brain_shift;
 mod compare;
+mod earlier;
 mod estimate;
 mod fields;
 mod labels;
@@ -27,12 +28,13 @@ pub use registration::RegistrationFacts;
 pub(crate) use anat::{Anatomy, anat, anat_stage};
 pub(crate) use brain_shift::SeenShift;
 pub(crate) use compare::compare;
+pub(crate) use earlier::Earlier;
 pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
-pub(crate) use mesh::{coarser_mesh, mesh, mesh_before_resection, mesh_stage};
-pub(crate) use plan::{PlannedHead, plan};
-pub(crate) use pose::pose;
+pub(crate) use mesh::{coarser_mesh, mesh, mesh_before_resection, mesh_stage, mesh_stage_of};
+pub(crate) use plan::{PlanFacts, PlannedHead, plan, plan_stage};
+pub(crate) use pose::{PoseFacts, pose, pose_stage};
 pub(crate) use predict::{PredictInput, predict};
 pub(crate) use predicted_draws::{Predicted, read_draws, read_table};
 pub(crate) use reference::{
@@ -40,7 +42,7 @@ pub(crate) use reference::{
     reference_stage,
 };
 pub(crate) use registration::{
-    mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
+    OF_POSE, mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
 };
 pub(crate) use samples::{SampleMode, Sweep, lesions, present_samples, sample_stage, samples, with_held_tissues};
 pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, mask_of};

@@ -1,18 +1,21 @@
 //! Stage `plan`: labels of the pre-operative scan, and the tissue that is to be taken.
 
 use super::anat::{whole_numbers, without_resected};
+use super::earlier::HeadFacts;
 use super::reading::WithReading;
 use super::registration::pose;
-use crate::artefact::Produced;
+use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
 use crate::experiment::predict::{Planned, planned};
 use crate::geometry::{Frame, Mni};
-use crate::image::nifti::{self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
+use crate::image::nifti::{
+    self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_numbers, encode_u8, encode_vectors,
+};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask};
 use crate::layout::{
-    NATIVE_RESECTED, PRE_BRAIN, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED,
-    TEMPLATE_DISPLACEMENT,
+    NATIVE_RESECTED, PRE_BRAIN, PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1,
+    RESECTED, TEMPLATE_DISPLACEMENT, TEMPLATE_FIT,
 };
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, take_head_apart};
@@ -21,12 +24,13 @@ use crate::segment::native::mask_on;
 use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
-use crate::workflow::stage_name::StageName;
+use crate::workflow::settings::Settings;
+use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -36,6 +40,8 @@ const NOTED_OUTSIDE: f64 = 0.1;
 pub struct PlanFacts {
     /// Volumes, cc.
     pub volumes: ResectionVolumes,
+    /// The head without any plan, but for what the files hold.
+    pub head: HeadFacts,
     /// What is to be taken.
     pub plan: Planned,
 }
@@ -64,10 +70,15 @@ impl PlannedHead {
     }
 }
 
+/// The stage of the case of one scan, with its inputs but for the plan and the user's own masks.
+pub(crate) fn plan_stage(case: &Case, settings: &Settings, made: &Made, sum: &str) -> Stage {
+    let posed = WithReading { settings: &settings.anat, image: settings.image };
+    made.stage((case, Subject::Plan), &NAME, VERSION, &posed).input_sha256("pre", sum).frame(Mni::NAME)
+}
+
 /// Segments the scan as a pair's would be, and looks whether the plan can be followed.
 pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Result<PlanFacts, WorkflowError> {
-    let posed = WithReading { settings: &work.settings.anat, image: work.settings.image };
-    let stage = work.stage(made, &NAME, VERSION, &posed).input_sha256("pre", &scan.sum).frame(Mni::NAME);
+    let stage = plan_stage(&work.case, work.settings, made, &scan.sum);
     let stage = stage.input("resection", &encode_mask(&scan.resection));
     let stage = scan.given().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
     work.run(made, &NAME, &stage, || {
@@ -81,9 +92,8 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
             ventricle: scan.ventricle.as_ref().map(|(mask, _)| mask.clone()),
             ..GivenMasks::default()
         };
-        let (before, template) = once(&scan.shared.head, || {
-            let (before, template, _) = take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?;
-            Ok::<_, WorkflowError>((before, template))
+        let (before, template, scale) = once(&scan.shared.head, || {
+            Ok::<_, WorkflowError>(take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?)
         })?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
@@ -105,6 +115,9 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         write(PRE_LABELS, encode_u8(&before.labels_mni));
         write(RESECTED, encode_mask(&resected));
         write(TEMPLATE_DISPLACEMENT, encode_vectors(&template.atlas_from_subject.displacement_mm()));
+        let (fit, deformation) = template.atlas_from_subject.parts();
+        write(TEMPLATE_FIT, encode_vectors(&deformation));
+        write(PRE_EVEN_T1, encode_numbers(&before.t1_mni));
         write(PRE_NATIVE_BRAIN, encode_mask(&before.brain));
         write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
         write(NATIVE_RESECTED, encode_mask(&scan.resection));
@@ -118,6 +131,14 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
                 ventricle_after_cc: None,
                 brain_cc: Some(before.volumes.brain_cc),
                 midline_shift_mm: None,
+            },
+            head: HeadFacts {
+                tissue_means: before.tissue_means,
+                csf_grey_border: before.csf_grey_border,
+                volumes: before.volumes,
+                warnings: before.warnings.clone(),
+                scale: *scale,
+                fit,
             },
             plan: found,
         });

@@ -16,7 +16,7 @@ use crate::experiment::predict::{
 };
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
 use crate::image::morphology::dilate;
-use crate::image::nifti::{encode_displacement, encode_f32, encode_mask};
+use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
 use crate::layout::{
     NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
     SHIFT_MASK, SHIFT_PROBABILITY, SHIFT_REACH, SHIFT_REACH_50, SHIFT_SD,
@@ -31,7 +31,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -208,10 +208,10 @@ impl<'a> Patient<'a> {
         let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
         write(SHIFT.of(state), encode_displacement(&field.whole, |n| field.forward_at(n)));
         write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |n| field.inverse_at(n)));
-        write(SHIFT_SD.of(state), encode_f32(&field.on_whole(&field.sd_mm, 0.0)));
-        write(SHIFT_REACH_50.of(state), encode_f32(&field.on_whole(&part(0), 0.0)));
-        write(SHIFT_REACH.of(state), encode_f32(&field.on_whole(&field.reach95_mm, 0.0)));
-        write(SHIFT_PROBABILITY.of(state), encode_f32(&field.on_whole(&part(1), 0.0)));
+        write(SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
+        write(SHIFT_REACH_50.of(state), encode_numbers(&field.on_whole(&part(0), 0.0)));
+        write(SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
+        write(SHIFT_PROBABILITY.of(state), encode_numbers(&field.on_whole(&part(1), 0.0)));
         write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
         let modes = found.modes(mesh, self.settings.predict.threshold_mm);
         let mut points = vec![

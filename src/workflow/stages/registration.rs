@@ -1,5 +1,6 @@
 //! Stage `registration`: post to pre with the skull on, pre to MNI with the template's mask dilated.
 
+use super::earlier::Earlier;
 use super::reading::WithReading;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::RegistrationOutcome;
@@ -21,6 +22,8 @@ use serde::{Deserialize, Serialize};
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 2;
 const NAME: StageName = StageName::Registration;
+/// What the pose is called, and how what is odd about it begins.
+pub(crate) const OF_POSE: &str = "pre to MNI";
 
 /// What the report says of the two fits.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -44,6 +47,7 @@ pub(crate) fn registration(
     made: &mut Made,
     scans: &Scans,
     own: &OwnMasks,
+    earlier: Option<&Earlier>,
 ) -> Result<RegistrationFacts, WorkflowError> {
     let settings = &work.settings.register;
     let stage = registration_stage(work, &scans.sums);
@@ -55,17 +59,27 @@ pub(crate) fn registration(
         let pre_from_post = register_rigid(&scans.post, &scans.pre, RigidMasks::default(), settings)
             .map_err(refused("the post-operative scan (moving) onto the pre-operative one (fixed)"))?;
         work.tell(|p| p.step());
-        work.tell(|p| p.doing("pre to MNI"));
+        work.tell(|p| p.doing(OF_POSE));
         let mut produced = Produced::default();
         produced.warnings.extend(scans.warnings.iter().cloned());
         produced.warnings.extend(pre_from_post.warnings.iter().map(|w| format!("post to pre: {w}")));
         let given = (own.pose.as_ref().map(|(pose, _)| pose), own.labels.as_ref().map(|(labels, _)| labels));
-        let (mni_from_pre, fit) = pose_of(&scans.pre, given, &mut produced.warnings)?;
+        let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
+        let fit = if let Some(earlier) = earlier {
+            // As they stand: a number read and written again may differ in its last digit.
+            for name in [text, itk] {
+                produced.files.push((name.to_owned(), earlier.case.read(name)?));
+            }
+            produced.warnings.extend_from_slice(&earlier.fit.1);
+            earlier.fit.0.clone()
+        } else {
+            let (mni_from_pre, fit) = pose_of(&scans.pre, given, &mut produced.warnings)?;
+            write_transform(&mut produced, text, itk, &mni_from_pre);
+            fit
+        };
         work.tell(|p| p.end());
         let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
         write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
-        let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
-        write_transform(&mut produced, text, itk, &mni_from_pre);
         let fits = vec![outcome(&pre_from_post, &scans.post.grid), fit];
         produced.facts = facts(&RegistrationFacts { fits });
         Ok(produced)
@@ -88,7 +102,7 @@ pub(super) fn pose_of(
     };
     let what = "the pre-operative scan (moving) onto the MNI template (fixed)";
     let found = found.map_err(|source| WorkflowError::Registration { what, source })?;
-    warnings.extend(found.warnings.iter().map(|w| format!("pre to MNI: {w}")));
+    warnings.extend(found.warnings.iter().map(|w| format!("{OF_POSE}: {w}")));
     Ok((found.fixed_from_moving, outcome(&found, &pre.grid)))
 }
 
