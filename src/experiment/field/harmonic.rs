@@ -11,19 +11,16 @@ pub enum Place {
     Free,
 }
 
-/// Sweeps on the finest level, twice as many on every coarser one, where they cost an eighth, and on the coarsest, where they cost
-/// nothing, many more: cascadic multigrid wants it so. The continuation need be smooth, not exact.
-const FINEST_SWEEPS: usize = 8;
-const MOST_SWEEPS: usize = 64;
+/// Sweeps on every level; on the coarsest, where they cost nothing, many more. The continuation need be smooth, not
+/// exact.
+const SWEEPS: usize = 24;
 const COARSEST_SWEEPS: usize = 200;
 /// A level is not halved below this many voxels along an axis.
 const SMALLEST: usize = 6;
 /// Voxels that one thread does alone.
 const FEW: usize = 1 << 14;
-/// Over-relaxation of a sweep: where there are sweeps enough for it to settle, and where there are few.
+/// Over-relaxation of a sweep.
 const OVER: f32 = 1.9;
-const OVER_OF_FEW: f32 = 1.4;
-const MANY_SWEEPS: usize = 24;
 
 /// The values with those at free places replaced by a solution of Laplace's equation between the known ones (which
 /// stay as they are). Beyond the grid nothing flows. `spacing_mm` weighs the directions.
@@ -31,16 +28,6 @@ const MANY_SWEEPS: usize = 24;
 /// Solved from coarse to fine (cascadic multigrid: Bornemann and Deuflhard, Numerische Mathematik 75, 1996) by red-black
 /// sweeps, in a fixed order: the bytes do not depend on the number of threads.
 pub fn continued<const N: usize>(
-    dims: [usize; 3],
-    spacing_mm: [f64; 3],
-    place: &[Place],
-    values: Vec<[f32; N]>,
-) -> Vec<[f32; N]> {
-    on_level(FINEST_SWEEPS, dims, spacing_mm, place, values)
-}
-
-fn on_level<const N: usize>(
-    sweeps: usize,
     dims: [usize; 3],
     spacing_mm: [f64; 3],
     place: &[Place],
@@ -54,8 +41,7 @@ fn on_level<const N: usize>(
     let coarsest = dims.iter().any(|&n| n < 2 * SMALLEST);
     if !coarsest {
         let (coarse_place, coarse_values) = halved(dims, coarse_dims, place, &values);
-        let more = (2 * sweeps).min(MOST_SWEEPS);
-        let coarse = on_level(more, coarse_dims, spacing_mm.map(|h| 2.0 * h), &coarse_place, coarse_values);
+        let coarse = continued(coarse_dims, spacing_mm.map(|h| 2.0 * h), &coarse_place, coarse_values);
         fill(dims, coarse_dims, place, &coarse, &mut values);
     }
     let weight = spacing_mm.map(|h| (1.0 / (h * h)) as f32);
@@ -65,11 +51,10 @@ fn on_level<const N: usize>(
         let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
         colours[(v[0] + v[1] + v[2]) % 2].push(n as u32);
     }
-    let sweeps = if coarsest { COARSEST_SWEEPS } else { sweeps };
+    let sweeps = if coarsest { COARSEST_SWEEPS } else { SWEEPS };
     for sweep in 0..sweeps {
         // The last sweeps without over-relaxation leave no ripples.
-        let over = if sweeps >= MANY_SWEEPS { OVER } else { OVER_OF_FEW };
-        let over = if sweep + 4 < sweeps { over } else { 1.0 };
+        let over = if sweep + 4 < sweeps { OVER } else { 1.0 };
         for colour in &colours {
             let renew = |&n: &u32| -> [f32; N] {
                 let n = n as usize;

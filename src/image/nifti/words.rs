@@ -223,13 +223,17 @@ pub(super) fn deflate(block: &[u8], last: bool) -> Vec<u8> {
 fn put_codes(bits: &mut Bits, lengths: &[u8], far: &[u8]) {
     let told: Vec<u8> = lengths.iter().chain(far).copied().collect();
     let mut counts = [0u32; 19];
-    told.iter().for_each(|l| counts[usize::from(*l)] += 1);
+    for l in &told {
+        counts[usize::from(*l)] += 1;
+    }
     let own = code_lengths(&counts, 7);
     let codes = codes(&own);
     bits.put((SYMBOLS - 257) as u64, 5);
     bits.put((DISTANCES - 1) as u64, 5);
     bits.put((ORDER.len() - 4) as u64, 4);
-    ORDER.iter().for_each(|n| bits.put(u64::from(own[*n]), 3));
+    for n in ORDER {
+        bits.put(u64::from(own[n]), 3);
+    }
     for l in told {
         let (code, length) = codes[usize::from(l)];
         bits.put(u64::from(code), u32::from(length));
@@ -280,7 +284,9 @@ fn huffman(counts: &[u32]) -> Vec<u8> {
 fn codes(lengths: &[u8]) -> Vec<(u16, u8)> {
     let mut next = [0u16; LONGEST + 2];
     let mut of_length = [0u16; LONGEST + 1];
-    lengths.iter().for_each(|l| of_length[usize::from(*l)] += u16::from(*l > 0));
+    for l in lengths {
+        of_length[usize::from(*l)] += u16::from(*l > 0);
+    }
     for l in 1..=LONGEST {
         next[l + 1] = (next[l] + of_length[l]) << 1;
     }

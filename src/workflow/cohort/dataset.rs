@@ -233,7 +233,8 @@ mod tests {
         assert!(found.plan.ends_with("sub-01_ses-preop_run-2_label-resection_desc-wide_mask.nii.gz"), "{found:?}");
         let doubtful = planned("sub-02", &[]).unwrap_err();
         assert!(matches!(&doubtful, DatasetError::SeveralPlans { entity, .. } if entity == "desc-wide"), "{doubtful}");
-        assert!(planned("sub-02", &["desc-wide"]).unwrap().plan.ends_with("desc-wide_mask.nii"));
+        let chosen = planned("sub-02", &["desc-wide"]).unwrap().plan;
+        assert!(chosen.ends_with("sub-02_ses-preop_label-resection_desc-wide_mask.nii"), "{chosen:?}");
         let missing = planned("sub-03", &[]).unwrap_err().to_string();
         assert!(
             missing.contains("sub-03_ses-preop_label-resection_mask.nii.gz")
