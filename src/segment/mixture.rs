@@ -56,6 +56,11 @@ impl Mixture {
     pub fn csf_grey_border(&self) -> f64 {
         0.5 * (self.means[CSF] + self.means[GREY])
     }
+
+    /// Intensity of a voxel that is half grey and half white matter.
+    pub fn grey_white_border(&self) -> f64 {
+        0.5 * (self.means[GREY] + self.means[WHITE])
+    }
 }
 
 /// Fits the mixture to the voxels of `region`; `None` when there are fewer than 1000 or the classes collapse.

@@ -4,6 +4,7 @@ mod appearance;
 pub mod atlas;
 mod atlas_labels;
 mod bias;
+mod border;
 mod brain;
 mod carried;
 mod coil;

@@ -108,17 +108,22 @@ impl AtlasPriors {
         let outside = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM, 0.0];
         let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey] =
             resample_together(maps, &near, template_from_patient, outside);
-        let whole = |part: &Volume<f32, Mni>, value: f32| {
+        // Each part is let go as soon as it is in its place: all of them twice would be the peak of memory.
+        let whole = |part: Volume<f32, Mni>, value: f32| {
             let mut all = Volume::filled(*grid, value);
-            all.paste(part, &around);
+            all.paste(&part, &around);
             all
         };
         Self {
-            tissue: [csf, grey, white].map(|map| whole(&gaussian(&map, misfit_mm), 0.0)),
-            brain_mm: whole(&brain_mm, FAR_MM),
-            ventricle_mm: whole(&ventricle_mm, FAR_MM),
-            cistern_mm: whole(&cistern_mm, FAR_MM),
-            deep_grey: whole(&deep_grey, 0.0),
+            brain_mm: whole(brain_mm, FAR_MM),
+            ventricle_mm: whole(ventricle_mm, FAR_MM),
+            cistern_mm: whole(cistern_mm, FAR_MM),
+            deep_grey: whole(deep_grey, 0.0),
+            tissue: [csf, grey, white].map(|map| {
+                let blurred = gaussian(&map, misfit_mm);
+                drop(map);
+                whole(blurred, 0.0)
+            }),
         }
     }
 

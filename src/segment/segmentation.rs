@@ -1,13 +1,14 @@
 //! The whole way from a T1 image to its labels.
 
 use super::atlas;
+use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
 use super::coil::without_strong_gain;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
 use super::priors::AtlasPriors;
-use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall};
+use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{BlankSlices, Grid, LabelMap, Mask, Volume};
@@ -343,9 +344,10 @@ pub(super) fn labelled<F: Frame>(
     let mut labels_mni = most_probable(&model, priors);
     let csf = labels_mni.map(|l| l == label::CSF);
     let t1_mni = without_bias(&raw, &model, |_| true);
+    drop(raw);
     let ventricle = if let Some(mask) = overrides.ventricle {
         let given = mask_on(mask, &grid, &t1_from_mni);
-        at_each(&raw, |n| given.data[n] && brain.data[n])
+        at_each(&t1_mni, |n| given.data[n] && brain.data[n])
     } else {
         let plexus = enhanced_plexus(&t1_mni, model.means[2], priors);
         let found = ventricles(&csf, &plexus, &brain, priors, &settings.ventricle);
@@ -359,6 +361,7 @@ pub(super) fn labelled<F: Frame>(
             *l = label::VENTRICLE;
         }
     }
+    with_white_walls(&mut labels_mni, &ventricle, &priors.deep_grey);
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let volumes = TissueVolumes {
         brain_cc: found_cc,
@@ -368,6 +371,10 @@ pub(super) fn labelled<F: Frame>(
         ventricle_cc: volume(label::VENTRICLE),
     };
     let mut labels = labels_on(&labels_mni, &t1.grid, mni_from_t1);
+    // A strong coil's gain was taken out on the working grid alone.
+    if !warnings.iter().any(|w| matches!(w, SegmentWarning::StrongGain { .. })) {
+        labels = with_the_scans_border(labels, t1, mni_from_t1, &model, priors);
+    }
     if let Some(mask) = overrides.ventricle.filter(|m| m.grid.coincides(&t1.grid, 1e-3)) {
         // Voxel by voxel what the user drew, without the way there and back.
         for (l, &drawn) in labels.data.iter_mut().zip(&mask.data) {

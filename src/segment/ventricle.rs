@@ -1,13 +1,14 @@
 //! Lateral and third ventricles: CSF that is nearer, through CSF, to the template's ventricles than to its cisterns.
 
 use super::brain::at_each;
+use super::label::{GREY_MATTER, WHITE_MATTER};
 use super::mixture::Mixture;
 use super::priors::AtlasPriors;
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, fill_holes, without_islands};
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode};
-use crate::image::{Mask, Volume};
+use crate::image::{LabelMap, Mask, Volume};
 
 /// How the ventricles are told from the other CSF.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
@@ -132,4 +133,68 @@ pub(super) fn with_shared_wall(
     let mut out = ventricle.clone();
     out.paste(&wide, &around);
     out
+}
+
+/// White matter for the grey voxels of the ventricles' wall behind which white matter lies, in place.
+///
+/// A voxel less than half full of CSF, the rest white matter, looks like grey matter too, and the mixture lines the ventricles
+/// with a film of it that no brain has. Where nuclei or cortex do reach the wall, they lie behind it as well.
+pub(super) fn with_white_walls(labels: &mut LabelMap<Mni>, ventricle: &Mask<Mni>, deep_grey: &Volume<f32, Mni>) {
+    /// The wall is one voxel thick; what lies behind it is looked at around it, nearer voxels more.
+    const WALL_MM: f64 = 1.0;
+    const SIGMA_MM: f64 = 1.5;
+    /// White matter must clearly prevail, and be there at all.
+    const TIMES_GREY: f32 = 2.0;
+    const LEAST: f32 = 0.02;
+    let Some(found) = ventricle.bounding_box() else { return };
+    let around = found.grown(&ventricle.grid, 8.0);
+    let (part, deep) = (labels.cropped(&around), deep_grey.cropped(&around));
+    let wall = dilate(&ventricle.cropped(&around), WALL_MM);
+    let behind = |l: u8| {
+        let full = Volume::from_fn(part.grid, |n| f32::from(u8::from(!wall.data[n] && part.data[n] == l)));
+        gaussian(&full, SIGMA_MM)
+    };
+    let (grey, white) = (behind(GREY_MATTER), behind(WHITE_MATTER));
+    let turned = Volume::from_fn(part.grid, |n| {
+        let film = part.data[n] == GREY_MATTER && wall.data[n] && deep.data[n] <= 0.5;
+        if film && white.data[n] > LEAST.max(TIMES_GREY * grey.data[n]) { WHITE_MATTER } else { part.data[n] }
+    });
+    labels.paste(&turned, &around);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+    use crate::segment::label::VENTRICLE;
+
+    /// A ventricle between white matter on the left and a nucleus 6 mm thick on the right, lined by one voxel that looks grey.
+    fn lined(deep: f32) -> (LabelMap<Mni>, Mask<Mni>, Volume<f32, Mni>) {
+        let grid = Grid::<Mni>::axis_aligned([40, 24, 24], [1.0; 3], [0.0; 3]);
+        let labels = Volume::from_fn(grid, |n| match grid.voxel(n)[0] {
+            16..22 => VENTRICLE,
+            15 | 22..28 => GREY_MATTER,
+            _ => WHITE_MATTER,
+        });
+        (labels.clone(), labels.map(|l| l == VENTRICLE), Volume::filled(grid, deep))
+    }
+
+    #[test]
+    fn a_ventricle_is_not_lined_with_grey_matter_and_a_nucleus_at_its_wall_stays() {
+        let (mut labels, ventricle, deep) = lined(0.0);
+        with_white_walls(&mut labels, &ventricle, &deep);
+        assert_eq!(labels.at(15, 12, 12), WHITE_MATTER);
+        assert_eq!(labels.at(16, 12, 12), VENTRICLE);
+        for i in 22..28 {
+            assert_eq!(labels.at(i, 12, 12), GREY_MATTER, "{i}");
+        }
+    }
+
+    #[test]
+    fn what_the_template_knows_for_a_nucleus_is_no_film() {
+        let (mut labels, ventricle, deep) = lined(0.9);
+        let before = labels.clone();
+        with_white_walls(&mut labels, &ventricle, &deep);
+        assert_eq!(labels, before);
+    }
 }
