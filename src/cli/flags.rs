@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
 /// Headings of options in help and man pages.
-const MASKS: &str = "Masks";
+pub const MASKS: &str = "Masks";
 const MESH: &str = "Mesh";
 const MATERIAL: &str = "Material";
 
@@ -172,23 +172,27 @@ impl AnalysisOptions {
     }
 }
 
-/// Masks that win over the computed ones. Each may be in the grid of either scan.
+/// What is known of the pre-operative scan beside the scan: wins over what would be computed.
 #[derive(Clone, Debug, Default, clap::Args)]
-#[allow(clippy::struct_field_names, reason = "the options' names")]
-pub struct OwnMasks {
+pub struct OwnLabels {
     /// A label map of the pre-operative scan made by another tool (.nii.gz, .mgz): wins over the computed labels, and the
     /// scans may then have another contrast than T1
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
-    dseg: Option<PathBuf>,
+    pub dseg: Option<PathBuf>,
     /// Whose numbers the label map holds [default: found out from the numbers]
     #[arg(long, help_heading = MASKS, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
-    labels: Option<String>,
+    pub labels: Option<String>,
     /// The pose of the pre-operative scan by hand: a rigid transform to the MNI frame (4x4 text in RAS, or .tfm)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
-    pose: Option<PathBuf>,
+    pub pose: Option<PathBuf>,
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
-    brain_mask: Option<PathBuf>,
+    pub brain_mask: Option<PathBuf>,
+}
+
+/// Masks that win over the computed ones. Each may be in the grid of either scan.
+#[derive(Clone, Debug, Default, clap::Args)]
+struct OwnMasks {
     /// A mask of the lateral and third ventricles before the operation, in the grid of either scan (wins over the computed one)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
     ventricle_mask: Option<PathBuf>,
@@ -213,6 +217,8 @@ pub struct PairOptions {
     #[arg(short, long, value_name = "CASE", default_value = "case")]
     pub output: PathBuf,
     #[command(flatten)]
+    own: OwnLabels,
+    #[command(flatten)]
     masks: OwnMasks,
     #[command(flatten)]
     pub mesh: MeshOptions,
@@ -221,8 +227,8 @@ pub struct PairOptions {
 impl PairOptions {
     /// The files.
     pub fn inputs(&self) -> Inputs {
-        let OwnMasks { dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask } =
-            self.masks.clone();
+        let OwnLabels { dseg, labels, pose, brain_mask } = self.own.clone();
+        let OwnMasks { ventricle_mask, cavity_mask, resected_mask } = self.masks.clone();
         let (pre, post) = (self.pre.clone(), self.post.clone());
         let prediction = None;
         Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask, prediction }

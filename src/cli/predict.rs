@@ -1,6 +1,6 @@
 //! `hgm predict`: before the operation, how the brain will move.
 
-use super::flags::{MeshOptions, PopulationOption, PriorOptions};
+use super::flags::{MASKS, MeshOptions, OwnLabels, PopulationOption, PriorOptions};
 use super::{Failure, Session};
 use crate::layout::PLANS_PAGE;
 use crate::report::forecast_in_words::plans_table;
@@ -50,20 +50,10 @@ pub struct Args {
     /// 1: the whole brain one material; 2: grey and white matter apart [default: 2]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=2))]
     tissues: Option<u8>,
-    /// A label map of the scan made by another tool (.nii.gz, .mgz): wins over the computed labels
-    #[arg(long, value_name = "FILE")]
-    dseg: Option<PathBuf>,
-    /// Whose numbers the label map holds [default: found out from the numbers]
-    #[arg(long, value_name = "freesurfer|synthseg|charm|gif|muse|hgm|FILE.tsv", requires = "dseg")]
-    labels: Option<String>,
-    /// The pose of the scan by hand: a rigid transform to the MNI frame (4x4 text in RAS, or .tfm)
-    #[arg(long, value_name = "FILE")]
-    pose: Option<PathBuf>,
-    /// A brain mask of your own, in the scan's grid (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
-    brain_mask: Option<PathBuf>,
+    #[command(flatten)]
+    own: OwnLabels,
     /// A mask of the lateral and third ventricles, in the scan's grid (wins over the computed one)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = MASKS, value_name = "FILE")]
     ventricle_mask: Option<PathBuf>,
     #[command(flatten)]
     prior: PriorOptions,
@@ -86,16 +76,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("predict.tissues", args.tissues);
     let mut plans = PlannedResection::all(&args.resection, &args.resection_label, &args.resection_ellipsoid)?;
     let (settings, place) = (session.settings(flags)?, session.place(&args.output));
-    let inputs = PlanInputs {
-        pre: args.pre.clone(),
-        resection: plans.remove(0),
-        targets: args.targets.clone(),
-        dseg: args.dseg.clone(),
-        labels: args.labels.clone(),
-        pose: args.pose.clone(),
-        brain_mask: args.brain_mask.clone(),
-        ventricle_mask: args.ventricle_mask.clone(),
-    };
+    let OwnLabels { dseg, labels, pose, brain_mask } = args.own.clone();
+    let (pre, resection, targets) = (args.pre.clone(), plans.remove(0), args.targets.clone());
+    let ventricle_mask = args.ventricle_mask.clone();
+    let inputs = PlanInputs { pre, resection, targets, dseg, labels, pose, brain_mask, ventricle_mask };
     if plans.is_empty() {
         let (case, prediction) = predict(&inputs, &place, &settings, &mut *session.listener())?;
         session.emit(&prediction, &(prediction_table(&prediction) + &case.page().display().to_string()))?;
