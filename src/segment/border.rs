@@ -4,6 +4,7 @@
 //! way back labels outvote each other: thin blades of white matter and narrow folds of cortex are lost. Where grey and white
 //! matter meet, the scan's own voxel says which of the two fills more of it.
 
+use super::appearance::{GREY, WHITE};
 use super::label::{GREY_MATTER, WHITE_MATTER};
 use super::mixture::Mixture;
 use super::priors::AtlasPriors;
@@ -12,6 +13,9 @@ use crate::image::{LabelMap, Volume};
 use nalgebra::{Matrix4, Point3};
 use rayon::prelude::*;
 
+/// A voxel turns only where it lies beyond the border by this many standard deviations: less may be noise, and the label carried
+/// back knows the neighbours.
+const BEYOND: f64 = 0.5;
 /// Probability of a deep nucleus from which on intensity says nothing, as in the mixture.
 const NUCLEUS: f32 = 0.25;
 
@@ -30,6 +34,7 @@ pub(super) fn with_the_scans_border<F: Frame>(
         return labels;
     }
     let border = model.grey_white_border();
+    let doubtful = BEYOND * model.deviations[GREY].min(model.deviations[WHITE]);
     let [nx, ny, _] = grid.dims;
     let stride = [1, nx, nx * ny];
     let mut out = labels.clone();
@@ -58,7 +63,9 @@ pub(super) fn with_the_scans_border<F: Frame>(
                 continue;
             }
             let value = f64::from(t1.data[n]) * (-model.bias.at(at)).exp();
-            *label = if value > border { WHITE_MATTER } else { GREY_MATTER };
+            if (value - border).abs() > doubtful {
+                *label = if value > border { WHITE_MATTER } else { GREY_MATTER };
+            }
         }
     });
     out
@@ -74,14 +81,14 @@ mod tests {
     use crate::segment::native::labels_on;
     use nalgebra::Vector3;
 
-    const GREY: f32 = 100.0;
-    const WHITE: f32 = 160.0;
+    const DIM: f32 = 100.0;
+    const BRIGHT: f32 = 160.0;
 
     fn model(grid: &Grid<Mni>) -> Mixture {
         Mixture {
             voxels: Vec::new(),
             contents: Vec::new(),
-            means: [30.0, f64::from(GREY), f64::from(WHITE)],
+            means: [30.0, f64::from(DIM), f64::from(BRIGHT)],
             deviations: [8.0; 3],
             bias: LogBias::flat(grid.dims),
         }
@@ -113,7 +120,7 @@ mod tests {
             let phase = (0.9 * x + 0.35 * y + 0.25 * z).rem_euclid(4.8);
             (0.5 + phase.min(2.4 - phase).max(phase - 4.8)).clamp(0.0, 1.0) as f32
         };
-        let scan = Volume::from_fn(grid, |n| GREY + share(n) * (WHITE - GREY));
+        let scan = Volume::from_fn(grid, |n| DIM + share(n) * (BRIGHT - DIM));
         let truth = Volume::from_fn(grid, |n| if share(n) > 0.5 { WHITE_MATTER } else { GREY_MATTER });
         (scan, truth, pose)
     }
@@ -121,7 +128,7 @@ mod tests {
     /// The labels of a scan, found on the working grid by the same border and carried back.
     fn carried_back(scan: &Volume<f32, Pre>, pose: &RigidTransform<Pre, Mni>, grid: &Grid<Mni>) -> LabelMap<Pre> {
         let there = resample(scan, grid, &pose.inverse().to_affine(), Interpolation::CubicBSpline, 0.0).volume;
-        let border = 0.5 * (GREY + WHITE);
+        let border = 0.5 * (DIM + BRIGHT);
         labels_on(&there.map(|x| if x > border { WHITE_MATTER } else { GREY_MATTER }), &scan.grid, pose)
     }
 
@@ -132,8 +139,28 @@ mod tests {
         let carried = carried_back(&scan, &pose, &working);
         let found =
             with_the_scans_border(carried.clone(), &scan, &pose, &model(&working), &priors(&working, |_| false));
-        let wrong = |labels: &LabelMap<Pre>| labels.data.iter().zip(&truth.data).filter(|(a, b)| a != b).count();
+        // Voxels that are not half and half.
+        let clear = |n: usize| (scan.data[n] - 0.5 * (DIM + BRIGHT)).abs() > 5.0;
+        let wrong = |labels: &LabelMap<Pre>| {
+            (0..truth.data.len()).filter(|&n| clear(n) && labels.data[n] != truth.data[n]).count()
+        };
         assert!(wrong(&found) * 5 < wrong(&carried), "{} of {}", wrong(&found), wrong(&carried));
+    }
+
+    #[test]
+    fn half_a_deviation_of_noise_turns_no_voxel() {
+        let (scan, truth, pose) = folds();
+        let working = Grid::<Mni>::axis_aligned([80; 3], [1.0; 3], [-39.5; 3]);
+        let border = 0.5 * (DIM + BRIGHT);
+        let with =
+            |step: f32| {
+                let scan = Volume::from_fn(scan.grid, |n| {
+                    if truth.data[n] == WHITE_MATTER { border - step } else { border + step }
+                });
+                with_the_scans_border(truth.clone(), &scan, &pose, &model(&working), &priors(&working, |_| false))
+            };
+        assert_eq!(with(3.5), truth);
+        assert_ne!(with(4.5), truth);
     }
 
     #[test]
@@ -141,7 +168,7 @@ mod tests {
         let grid = Grid::<Pre>::axis_aligned([40; 3], [1.0; 3], [-19.5; 3]);
         let working = Grid::<Mni>::axis_aligned([40; 3], [1.0; 3], [-19.5; 3]);
         let pose = RigidTransform::about(Point3::origin(), Vector3::new(0.1, 0.0, 0.0), Vector3::zeros());
-        let scan = Volume::filled(grid, WHITE);
+        let scan = Volume::filled(grid, BRIGHT);
         let inside = |p: Position<Mni>| p.mm.coords.norm() < 10.0;
         let labels = Volume::from_fn(grid, |n| {
             let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
