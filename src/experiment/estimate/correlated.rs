@@ -271,7 +271,9 @@ impl Fit<'_, '_> {
     ) -> Result<Findings, ProblemError> {
         let rows = 3 * seen.len();
         let flat = |u: &dyn Fn(usize) -> [f64; 3]| DVector::from_fn(rows, |row, _| u(row / 3)[row % 3]);
-        let seen_mm = flat(&|n| seen[n].1);
+        // Model, any movement and none are held against the same: what was seen without the instrument's own error. As it was
+        // seen that error would speak for a movement, and only the model would have been spared it.
+        let seen_mm = flat(&|n| self.body.observed_nodes()[n].1);
         let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
         let [nothing, anything] = self.without_mechanics(&seen_mm, errors.noise)?;
         let model = evidence.log_evidence.max(exact.log_evidence);
@@ -312,8 +314,7 @@ impl Fit<'_, '_> {
         let remainder = &self.rigid.columns_mm * DVector::from_column_slice(&descent.log_parameters[self.own..]);
         let residuals = &descent.linearisation.residuals_mm;
         let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
-        // What was seen without the instrument's own error is what the model was held against.
-        let shifted = flat(&|n| self.body.observed_nodes()[n].1) - &remainder;
+        let shifted = &seen_mm - &remainder;
         let projection = self.projection(descent, &unexplained)?;
         Ok(Findings {
             white_jacobian: projection.whiten(&descent.linearisation.jacobian_mm),
