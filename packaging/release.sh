@@ -27,7 +27,8 @@ mkdir -p "$out.part"
 
 say "static program"
 # With --target the flag is the program's alone; procedural macros are libraries and cannot be static.
-RUSTFLAGS="-C target-feature=+crt-static" cargo build --release --locked --bin hgm --target "$target"
+CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER="$PWD/packaging/static-linker" RUSTFLAGS="-C target-feature=+crt-static" \
+  cargo build --release --locked --bin hgm --target "$target"
 program="$out.part/hgm-$version-x86_64-linux"
 # Without its tables of names, which nobody who runs it needs.
 strip -o "$program" "${CARGO_TARGET_DIR:-target}/$target/release/hgm"

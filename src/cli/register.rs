@@ -1,6 +1,6 @@
 //! `hgm register MOVING FIXED -o XFM`: the rigid motion from one T1 image to another, or to the template.
 
-use super::{Failure, Session};
+use super::{Failure, Session, session::warn};
 use crate::workflow::{Layer, Onto, RegisterFiles, WorkflowError, register_files};
 use anyhow::anyhow;
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let (moving, output) = (args.moving.clone(), args.output.clone());
     let found = register_files(&RegisterFiles { moving, onto: args.onto()?, output }, &settings)?;
-    session.warn(&found.warnings);
+    warn(&found.warnings);
     session.emit(&found, &format!("{}\n{}", found.transform.display(), found.itk_transform.display()))?;
     if found.refused.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(found.refused).into()) }
 }

@@ -29,7 +29,7 @@ fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
         HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_) => {
             Some("--brain-mask takes one")
         }
-        _ => None,
+        HeadError::Fit(_) => None,
     }
 }
 

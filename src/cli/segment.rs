@@ -1,6 +1,6 @@
 //! `hgm segment`: one T1 to a label map.
 
-use super::{Failure, Session};
+use super::{Failure, Session, session::warn};
 use crate::workflow::{Layer, SegmentFiles, results_in_words, segment_file};
 use anyhow::anyhow;
 use std::path::PathBuf;
@@ -38,6 +38,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let files = SegmentFiles { t1, output, brain_mask, write_brain_mask, in_mni };
     let found = segment_file(&files, &session.settings(Layer::default())?, &mut *session.listener())?;
-    session.warn(&found.warnings);
+    warn(&found.warnings);
     session.emit(&found, &results_in_words::segmented(&found))
 }

@@ -149,11 +149,6 @@ impl Session {
         self.caller.is_none() && !self.options.quiet && std::io::stderr().is_terminal()
     }
 
-    /// Log lines of what a reader must know of a result.
-    pub fn warn(&self, warnings: &[String]) {
-        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
-    }
-
     /// Prints the result: `value` with `--json`, else the text.
     pub fn emit(&self, value: &impl Serialize, text: &str) -> Result<(), Failure> {
         if let Some(caller) = &self.caller {
@@ -167,6 +162,13 @@ impl Session {
             print_line(text.trim_end())?;
         }
         Ok(())
+    }
+}
+
+/// Log lines of what a reader must know of a result.
+pub fn warn(warnings: &[String]) {
+    for warning in warnings {
+        tracing::warn!("{warning}");
     }
 }
 

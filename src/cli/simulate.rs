@@ -1,6 +1,6 @@
 //! `hgm simulate MESH SCENARIO.toml -o OUT.vtu`: one deformation, or one motion.
 
-use super::{Failure, Session};
+use super::{Failure, Session, session::warn};
 use crate::artefact::check_writable;
 use crate::workflow::{self, SimulationFiles, results_in_words, shown};
 use std::path::PathBuf;
@@ -36,6 +36,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_writable(&args.output)?;
     let (found, skipped) = workflow::simulate(&files, session.options.force, &mut *session.listener())?;
     tracing::info!("{}: {}", shown(&args.output), if skipped { "already there, skipped" } else { "done" });
-    session.warn(&found.warnings);
+    warn(&found.warnings);
     session.emit(&found, &results_in_words::simulated(&found, &args.output))
 }

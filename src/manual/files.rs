@@ -14,5 +14,6 @@ pub fn list() -> Vec<Value> {
 
 /// A line for each file.
 pub fn lines() -> String {
-    TABLE.iter().map(|file| format!("{:<55} {}\n", file.path, file.what)).collect()
+    let line = |file: &Entry| format!("{:<55} {}\n", file.path, file.what);
+    TABLE.iter().map(line).collect()
 }

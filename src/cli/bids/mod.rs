@@ -16,7 +16,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Level::Participant => participant::run(args, &dataset, session),
         Level::Group => {
             let found = group(&dataset, &args.out, args.cases())?;
-            let said: String = found.population.iter().map(|line| format!("{line}\n")).collect();
+            let said = found.population.iter().map(|line| line.clone() + "\n").collect::<String>();
             session.emit(&found.cohort, &format!("{}\n{said}{}", found.cohort.to_tsv(), found.page.display()))
         }
     }
