@@ -1,6 +1,6 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
-use super::overhang::{onto_the_brain, share_beyond};
+use super::overhang::{beyond, onto_the_brain, short};
 use super::segmentation::{FoundBrain, Seen, labelled};
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, atlas};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
@@ -194,8 +194,25 @@ impl<F: Frame> BrainSearch<'_, F> {
     fn with(&self, carried: Carried) -> Result<FittedBrain, SegmentError> {
         let priors = priors_of(&carried.fit);
         let found = self.seen.brain(self.mni_from_t1, &priors, self.given, self.settings)?;
-        let beyond = share_beyond(&found.brain, &self.seen.known, &priors);
+        let beyond = beyond(&found.brain, &self.seen.known, &priors).share;
         Ok(FittedBrain { carried, found, priors: Some(priors), beyond })
+    }
+
+    /// The template fitted again to the scan without a strong coil's gain, where there is one: what the first fit saw was
+    /// flattened without knowing where the brain lies, and what is left hides the contrast of its dim parts.
+    fn with_the_coil_known(
+        &self,
+        mut first: FittedBrain,
+        deformable: &DeformableSettings,
+    ) -> Result<FittedBrain, HeadError> {
+        if !first.found.warnings.iter().any(|warning| matches!(warning, SegmentWarning::StrongGain { .. })) {
+            return Ok(first);
+        }
+        let (flat, known) = (&first.found.raw, &self.seen.known);
+        let subject = Volume::from_fn(flat.grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
+        first.priors = None;
+        let again = Carried::from(subject, first.carried.start, deformable)?;
+        if again.correlation() > first.carried.correlation() { Ok(self.with(again)?) } else { Ok(first) }
     }
 
     /// The template made larger for as long as brain is found beyond it and that helps.
@@ -257,20 +274,28 @@ pub fn segment_head<F: Frame>(
     let seen = Seen::of(t1, mni_from_t1, &atlas::template().grid(), settings)?;
     let search = BrainSearch { seen, mni_from_t1, given: overrides.brain, settings };
     let mut best = search.with(carried)?;
+    best = search.with_the_coil_known(best, deformable)?;
     if deformable.affine && overrides.brain.is_none() {
         best = search.grown(best, deformable)?;
     }
     let priors = best.priors();
-    let FittedBrain { carried, found, beyond, .. } = best;
+    let FittedBrain { carried, found, .. } = best;
     let mut segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));
     }
-    if beyond > DOUBTFUL_SHARE {
-        segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent: 100.0 * beyond });
+    let known = &segmentation.known_mni;
+    let outside = beyond(&segmentation.brain_mni, known, &priors);
+    if outside.share > DOUBTFUL_SHARE || outside.worst.is_some() {
+        let (place, percent) = (outside.worst.map(|worst| worst.name), 100.0 * outside.share);
+        segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent, place });
     }
-    let known = &segmentation.known_mni.data;
+    if let Some(place) = short(&segmentation.brain_mni, known, &priors).worst {
+        let (place, percent) = (place.name, 100.0 * place.share);
+        segmentation.warnings.push(SegmentWarning::ShortOfTemplate { place, percent });
+    }
+    let known = &known.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());
     if !VOLUME_RATIO.contains(&(found_cc / expected_cc.max(1.0))) {

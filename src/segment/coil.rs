@@ -8,7 +8,7 @@ use super::priors::AtlasPriors;
 use crate::geometry::Mni;
 use crate::image::gaussian::gaussian;
 use crate::image::{Grid, Mask, Volume};
-use nalgebra::{Matrix4, Point3, Vector3};
+use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
 /// Brightness of CSF, grey and white matter on a T1-weighted scan, over white matter's. Differences between scanners are the
 /// same everywhere and average out.
@@ -21,6 +21,13 @@ const BLOCK: usize = 4;
 /// Standard deviation over the brain of the logarithm of the gain below which nothing is taken out: head coils and the
 /// template's own misfit stay below; the mixture finds that much by itself.
 const STRONG: f64 = 0.2;
+/// A neighbourhood's average holds half of what changes within its width, the next round half of the rest (twicing: Tukey
+/// 1977): coils that lie around the head make a bright shell hardly wider than the neighbourhood.
+const ROUNDS: usize = 3;
+/// Far outside the brain, where only the slope speaks, the gain stays within this and one over this of the usual one.
+const LEAST_GAIN: f64 = 0.2;
+/// Two coordinates of six, whose products make a moment.
+const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 /// The surface itself is left out: how much CSF lies there is the patient's.
 const DEPTH_MM: f32 = 2.0;
 
@@ -56,13 +63,71 @@ pub(super) fn without_strong_gain(
     if spread < STRONG {
         return None;
     }
-    let flat = Volume::from_fn(grid, |n| t1.data[n] * (mean as f32 - clamped(&log_gain, &grid, n)).exp());
+    let mut flat = t1.clone();
+    for _ in 0..ROUNDS {
+        let log_gain = sloping(&flat, &grid, usual, inside, expected);
+        flat = Volume::from_fn(grid, |n| flat.data[n] * (-clamped(&log_gain, &grid, n)).exp());
+    }
+    let flat = flat.map(|x| x * (mean as f32).exp());
     // One standard deviation to either side of a Gaussian leaves 16 % beyond each.
     Some((flat, (2.0 * spread).exp()))
 }
 
+/// The logarithm of the gain over the usual one, found at every point with its slope there.
+///
+/// An average over a neighbourhood that ends at the surface is the gain some millimetres inside. Just where a surface coil
+/// sees most, the rim then stays too bright, and fluid and dura pass for cortex. With the slope the gain is carried on to
+/// what lies around the brain (local linear regression: Cleveland 1979; Fan 1993).
+fn sloping(
+    t1: &Volume<f32, Mni>,
+    grid: &Grid<Mni>,
+    usual: f32,
+    inside: impl Fn(usize) -> bool + Sync,
+    expected: impl Fn(usize) -> f32 + Sync,
+) -> Volume<f32, Mni> {
+    /// What a slope is held to: the template's own misfit in so many independent places, and the reach of coils.
+    const RIDGE_MM2: f64 = 4.0;
+    /// Weight of the usual gain, over the largest weight of a neighbourhood.
+    const FLOOR: f64 = 1e-3;
+    let seen = in_blocks(grid, |n| if inside(n) { t1.data[n] / usual } else { 0.0 });
+    let wanted = in_blocks(grid, |n| if inside(n) { expected(n) } else { 0.0 });
+    let blocks = seen.grid;
+    let place = |n: usize| blocks.position(Point3::from(blocks.voxel(n).map(|v| v as f64))).mm.coords;
+    let sum = |value: &(dyn Fn(usize, &Vector3<f64>) -> f64 + Sync)| {
+        gaussian(&Volume::from_fn(blocks, |n| value(n, &place(n)) as f32), SIGMA_MM)
+    };
+    let (square, both) =
+        (|n: usize| f64::from(wanted.data[n]).powi(2), |n: usize| f64::from(wanted.data[n]) * f64::from(seen.data[n]));
+    let weight = sum(&|n, _| square(n));
+    let first = [0, 1, 2].map(|a| sum(&|n, p| square(n) * p[a]));
+    let second = PAIRS.map(|[a, b]| sum(&|n, p| square(n) * p[a] * p[b]));
+    let level = sum(&|n, _| both(n));
+    let sloped = [0, 1, 2].map(|a| sum(&|n, p| both(n) * p[a]));
+    let floor = FLOOR * f64::from(weight.data.iter().copied().fold(0.0, f32::max));
+    Volume::from_fn(blocks, |n| {
+        let (x, w, r) = (place(n), f64::from(weight.data[n]), f64::from(level.data[n]));
+        let about = Vector3::from_fn(|a, _| f64::from(first[a].data[n]) - x[a] * w);
+        let right = Vector3::from_fn(|a, _| f64::from(sloped[a].data[n]) - x[a] * r);
+        let mut normal = Matrix4::zeros();
+        normal[(0, 0)] = w + floor;
+        for (pair, [a, b]) in PAIRS.into_iter().enumerate() {
+            let moment = f64::from(second[pair].data[n]) - x[a] * f64::from(first[b].data[n]) - x[b] * about[a];
+            normal[(a + 1, b + 1)] = moment;
+            normal[(b + 1, a + 1)] = moment;
+        }
+        for a in 0..3 {
+            normal[(a + 1, a + 1)] += RIDGE_MM2 * w + floor;
+            normal[(0, a + 1)] = about[a];
+            normal[(a + 1, 0)] = about[a];
+        }
+        let right = Vector4::new(r + floor, right[0], right[1], right[2]);
+        let gain = normal.cholesky().map_or(1.0, |c| c.solve(&right)[0]);
+        gain.clamp(LEAST_GAIN, 1.0 / LEAST_GAIN).ln() as f32
+    })
+}
+
 /// Means of a function of the voxel over blocks.
-fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync) -> Volume<f32, Mni> {
+pub(super) fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync) -> Volume<f32, Mni> {
     let dims = grid.dims.map(|n| n.div_ceil(BLOCK));
     let half = 0.5 * (BLOCK as f64 - 1.0);
     let to_fine = Matrix4::new_translation(&Vector3::repeat(half)) * Matrix4::new_scaling(BLOCK as f64);
@@ -81,7 +146,7 @@ fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync) -> Volume<f3
 }
 
 /// The coarse volume at a voxel of the fine grid, linearly; its border is repeated outwards.
-fn clamped(coarse: &Volume<f32, Mni>, grid: &Grid<Mni>, n: usize) -> f32 {
+pub(super) fn clamped(coarse: &Volume<f32, Mni>, grid: &Grid<Mni>, n: usize) -> f32 {
     let voxel = coarse.grid.voxel_at(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))));
     let inside = Point3::from([0, 1, 2].map(|a| voxel[a].clamp(0.0, coarse.grid.dims[a] as f64 - 1.0)));
     coarse.trilinear(coarse.grid.position(inside)).unwrap_or(0.0)
@@ -116,5 +181,35 @@ mod tests {
         };
         let (above, below) = (ratio(55.0), ratio(-15.0));
         assert!((above / below - 1.0).abs() < 0.15, "{above} {below}");
+    }
+
+    #[test]
+    fn the_gain_is_known_at_the_surface_where_a_coil_sees_most_and_just_outside_it() {
+        let template = atlas::template().t1_f32();
+        let (grid, known) = (template.grid, template.map(|_| true));
+        let priors = AtlasPriors::rigid(&grid);
+        // e times as bright 50 mm above, and something of one brightness around the brain.
+        let gain = |n: usize| (grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.z / 50.0).exp() as f32;
+        let around = Volume::from_fn(grid, |n| if template.data[n] > 0.0 { template.data[n] } else { 100.0 });
+        let seen = Volume::from_fn(grid, |n| around.data[n] * gain(n));
+        let (flat, _) = without_strong_gain(&seen, &known, &priors).unwrap();
+        let left = |wanted: &dyn Fn(f32, f64) -> bool| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for n in 0..grid.len() {
+                let z = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.z;
+                if wanted(priors.brain_mm.data[n], z) {
+                    sum += f64::from(flat.data[n] / around.data[n]).ln();
+                    count += 1.0;
+                }
+            }
+            sum / count
+        };
+        let deep = left(&|mm, _| mm < -10.0);
+        for crown in
+            [left(&|mm, z| (-3.0..0.0).contains(&mm) && z > 55.0), left(&|mm, z| (2.0..5.0).contains(&mm) && z > 60.0)]
+        {
+            // The template's own fluid is not quite as dark as a scan's is expected to be.
+            assert!((crown - deep).abs() < 0.15, "{crown} {deep}");
+        }
     }
 }

@@ -12,6 +12,7 @@ mod import;
 mod labelled;
 mod mixture;
 pub mod native;
+mod noise;
 mod overhang;
 mod priors;
 mod segmentation;

@@ -23,18 +23,89 @@ const STRETCH: f64 = 0.1;
 const DISTANCE_MM: f64 = 2.0;
 const DISTANCES: f64 = 200.0;
 
-/// How much of the layer outside the carried surface was found to be brain under the vault, 0 to 1.
-pub(super) fn share_beyond(brain: &Mask<Mni>, known: &Mask<Mni>, priors: &AtlasPriors) -> f64 {
-    let (mut layer, mut found) = (0usize, 0usize);
+/// A part of the vault is told of when this much of its layer disagrees with the template: more than half of it.
+const MOST: f64 = 0.5;
+/// A part that has less of the layer than this says nothing.
+const LEAST_SHARE: f64 = 0.04;
+
+/// A part of the vault and how much of the layer looked at disagrees there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    pub name: &'static str,
+    pub share: f64,
+}
+
+/// A layer beside the carried surface under the vault, told against the brain found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer {
+    /// How much of it disagrees, 0 to 1.
+    pub share: f64,
+    /// The part where most of it does, when that is most of the part.
+    pub worst: Option<Place>,
+}
+
+/// How much of the layer outside the carried surface was found to be brain under the vault.
+pub(super) fn beyond(brain: &Mask<Mni>, known: &Mask<Mni>, priors: &AtlasPriors) -> Layer {
+    layer(brain, known, priors, |mm| LAYER_MM.contains(&mm), true)
+}
+
+/// How much of the layer as far inside the carried surface was not.
+pub(super) fn short(brain: &Mask<Mni>, known: &Mask<Mni>, priors: &AtlasPriors) -> Layer {
+    layer(brain, known, priors, |mm| LAYER_MM.contains(&-mm), false)
+}
+
+fn layer(
+    brain: &Mask<Mni>,
+    known: &Mask<Mni>,
+    priors: &AtlasPriors,
+    within: impl Fn(f32) -> bool,
+    told: bool,
+) -> Layer {
+    let mut parts = [[0usize; 2]; PARTS.len()];
     let grid = &brain.grid;
     for n in 0..brain.data.len() {
-        let in_layer = known.data[n] && LAYER_MM.contains(&priors.brain_mm.data[n]);
-        if in_layer && grid.position(grid.voxel(n).map(|v| v as f64).into()).mm.z > VAULT_MM {
-            layer += 1;
-            found += usize::from(brain.data[n]);
+        if !known.data[n] || !within(priors.brain_mm.data[n]) {
+            continue;
+        }
+        let p = grid.position(grid.voxel(n).map(|v| v as f64).into()).mm;
+        if p.z > VAULT_MM {
+            let [all, disagrees] = &mut parts[part(p.coords)];
+            *all += 1;
+            *disagrees += usize::from(brain.data[n] == told);
         }
     }
-    found as f64 / layer.max(1) as f64
+    let share = |[all, disagrees]: [usize; 2]| disagrees as f64 / all.max(1) as f64;
+    let whole = parts.iter().fold([0, 0], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    let large = |part: &[usize; 2]| part[0] as f64 >= LEAST_SHARE * whole[0] as f64;
+    let places = PARTS.into_iter().zip(parts).filter(|(_, part)| large(part));
+    let worst =
+        places.map(|(name, part)| Place { name, share: share(part) }).max_by(|a, b| a.share.total_cmp(&b.share));
+    Layer { share: share(whole), worst: worst.filter(|place| place.share > MOST) }
+}
+
+/// Parts of the vault in the template's frame, where the head lies rigidly: by planes, for naming.
+const PARTS: [&str; 8] = [
+    "left forehead",
+    "right forehead",
+    "left side",
+    "right side",
+    "left crown",
+    "right crown",
+    "left back",
+    "right back",
+];
+
+fn part(p: Vector3<f64>) -> usize {
+    const FOREHEAD_MM: f64 = 15.0;
+    const BACK_MM: f64 = -60.0;
+    const CROWN_MM: f64 = 45.0;
+    let which = match p {
+        p if p.y > FOREHEAD_MM => 0,
+        p if p.z > CROWN_MM => 4,
+        p if p.y < BACK_MM => 6,
+        _ => 2,
+    };
+    which + usize::from(p.x > 0.0)
 }
 
 /// The affine movement that takes the carried surface nearest to that of the brain found, along its normals.
@@ -108,7 +179,11 @@ mod tests {
         let (brain, _) = ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]);
         let (_, small) = ball([20.0; 3], [0.0; 3]);
         let everywhere = brain.map(|_| true);
-        assert!(share_beyond(&brain, &everywhere, &small) > 0.8);
+        let outside = beyond(&brain, &everywhere, &small);
+        assert!(outside.share > 0.8 && outside.worst.is_some_and(|w| w.share >= outside.share), "{outside:?}");
+        let shorn = Volume::from_fn(brain.grid, |n| brain.data[n] && brain.grid.voxel(n)[0] >= 24);
+        let cut = short(&shorn, &everywhere, &ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]).1);
+        assert!(cut.worst.is_some_and(|w| w.name == "left side") && cut.share < 0.5, "{cut:?}");
         let larger = onto_the_brain(&brain, &small);
         for (axis, radius, middle) in [(0, 24.0, 0.0), (1, 24.0, 0.0), (2, 26.0, 1.0)] {
             let [low, high] = [-1.0, 1.0].map(|sign| {
@@ -123,6 +198,8 @@ mod tests {
             );
         }
         let (same, fitting) = ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]);
-        assert!(share_beyond(&same, &everywhere, &fitting) < 0.05);
+        let (outside, inside) = (beyond(&same, &everywhere, &fitting), short(&same, &everywhere, &fitting));
+        assert!(outside.share < 0.05 && inside.share < 0.05, "{outside:?} {inside:?}");
+        assert_eq!((outside.worst, inside.worst), (None, None));
     }
 }

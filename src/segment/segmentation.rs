@@ -7,6 +7,7 @@ use super::coil::without_strong_gain;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
+use super::noise::calmed;
 use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
 use crate::geometry::{Frame, Mni, RigidTransform};
@@ -146,11 +147,25 @@ pub enum SegmentWarning {
     },
     /// Much of what lies just outside the fitted template under the vault looks like brain.
     #[error(
-        "{percent:.0} % of what lies 2 to 4.5 mm outside the fitted template under the vault looks like brain: the outline may cut \
-         the crown, or take in bone or dura there; look at it, and give a brain mask where it is wrong"
+        "{percent:.0} % of what lies 2 to 4.5 mm outside the fitted template under the vault{} looks like brain: the outline may \
+         cut the crown, or take in bone or dura there; look at it, and give a brain mask where it is wrong",
+        place.map(|place| format!(" (most of it at the {place})")).unwrap_or_default()
     )]
     BeyondTemplate {
         /// Share of that layer, in percent.
+        percent: f64,
+        /// The part of the vault where most of it does, if there is one.
+        place: Option<&'static str>,
+    },
+    /// Much of what lies just inside the fitted template does not look like brain.
+    #[error(
+        "at the {place} {percent:.0} % of what lies 2 to 4.5 mm inside the fitted template does not look like brain: a lesion or \
+         wide sulci, or the outline cuts the brain there; look at it, and give a brain mask where it is wrong"
+    )]
+    ShortOfTemplate {
+        /// The part of the vault.
+        place: &'static str,
+        /// Share of that layer there, in percent.
         percent: f64,
     },
     /// No ventricle was found.
@@ -248,10 +263,10 @@ pub(super) struct Seen {
 /// A brain found or given, and nothing looked at inside it.
 pub(super) struct FoundBrain {
     /// The image with a strong coil's gain taken out.
-    raw: Volume<f32, Mni>,
+    pub raw: Volume<f32, Mni>,
     known: Mask<Mni>,
     pub brain: Mask<Mni>,
-    warnings: Vec<SegmentWarning>,
+    pub warnings: Vec<SegmentWarning>,
 }
 
 impl Seen {
@@ -456,12 +471,15 @@ fn computed_brain(
     priors: &AtlasPriors,
     settings: &SegmentSettings,
 ) -> Result<Mask<Mni>, SegmentError> {
+    /// What is averaged at the edge of the reach.
+    const ROOM_MM: f32 = 4.0;
     let deep = at_each(raw, |n| known.data[n] && priors.brain_mm.data[n] < -4.0);
     let model =
         fit_mixture(raw, &deep, priors, &mixture_settings(settings, 2), None).ok_or(SegmentError::NoTissueContrast)?;
     let reach = settings.brain.reach_mm as f32;
-    let flat = without_bias(raw, &model, |n| known.data[n] && priors.brain_mm.data[n] < reach);
-    Ok(brain_mask(&flat, known, &model, priors, &settings.brain))
+    let flat = without_bias(raw, &model, |n| known.data[n] && priors.brain_mm.data[n] < reach + ROOM_MM);
+    let calm = calmed(&flat, known, priors, &model);
+    Ok(brain_mask(calm.as_ref().unwrap_or(&flat), known, &model, priors, &settings.brain))
 }
 
 /// The image with its bias taken out where it is `wanted`, 0 elsewhere.

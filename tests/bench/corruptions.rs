@@ -1,5 +1,8 @@
 //! Seeded mishaps of good heads: turned by up to 60 degrees, cropped, of another size, shaded, noisy, with slices missing, inverted,
 //! padded. The answer agrees with the one on the unhurt head, or there is none.
+//!
+//! `HGM_BENCH_MISHAPS` names others than the usual ones, heads with their seeds: `child3y:3,7 gap:20-39`. In the folder
+//! `HGM_BENCH_KEEP` the hurt scans and the labels found on them are kept to be looked at.
 
 use crate::bar::{Bar, data};
 use crate::heads::segmented;
@@ -25,21 +28,25 @@ pub fn bars() -> Vec<Bar> {
         println!("skipped: mishaps of real heads (heads/)");
         return Vec::new();
     };
-    let folder = tempfile::tempdir().unwrap();
+    let temporary = tempfile::tempdir().unwrap();
+    let kept = std::env::var_os("HGM_BENCH_KEEP").map(std::path::PathBuf::from);
+    let folder = kept.as_deref().unwrap_or(temporary.path());
     let (mut right, mut refused, mut wrong) = (0usize, 0usize, Vec::new());
-    for head in HEADS {
+    let wanted = wanted();
+    for (head, seeds) in &wanted {
         let path = heads.join(format!("{head}_t1.nii.gz"));
         let t1 = scan(&path);
-        let unhurt = segmented(&path, &folder.path().join("unhurt.nii.gz"));
+        let unhurt = segmented(&path, &folder.join(format!("{head}_dseg.nii.gz")));
         let Some(unhurt) = unhurt.labels else {
             wrong.push(format!("{head} itself refused"));
             continue;
         };
-        for seed in 0..EACH {
+        for &seed in seeds {
             let mishap = Mishap::drawn(&t1, seed);
-            let file = folder.path().join("hurt.nii.gz");
+            let name = if kept.is_some() { format!("{head}_{seed}") } else { "hurt".to_owned() };
+            let file = folder.join(format!("{name}.nii.gz"));
             std::fs::write(&file, encode_f32(&mishap.scan)).unwrap();
-            let found = segmented(&file, &folder.path().join("hurt_dseg.nii.gz"));
+            let found = segmented(&file, &folder.join(format!("{name}_dseg.nii.gz")));
             let said = if let Some(labels) = found.labels {
                 let dice = mishap.agreement(&labels, &unhurt);
                 if dice >= RIGHT {
@@ -55,10 +62,28 @@ pub fn bars() -> Vec<Bar> {
             println!("{head} {seed:<3} {said:<8} {}", mishap.words);
         }
     }
-    let all = HEADS.len() * EACH as usize;
+    let all: usize = wanted.iter().map(|(_, seeds)| seeds.len()).sum();
     let said = format!("{right} right, {refused} refused, {} wrong of {all} {wrong:?}", wrong.len());
     let met = wrong.len() as f64 <= TOLERATED * all as f64;
     vec![Bar::new("corruptions of good heads", "Dice >= .93 or refused; wrong <= 0.5 %", said, met)]
+}
+
+/// Heads and the seeds of their mishaps.
+fn wanted() -> Vec<(String, Vec<u64>)> {
+    let Ok(words) = std::env::var("HGM_BENCH_MISHAPS") else {
+        return HEADS.map(|head| (head.to_owned(), (0..EACH).collect())).to_vec();
+    };
+    let number =
+        |text: &str| text.parse::<u64>().unwrap_or_else(|_| panic!("`{text}` in HGM_BENCH_MISHAPS is no seed"));
+    let range = |text: &str| {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        number(first)..=number(last)
+    };
+    let of_head = |word: &str| {
+        let (head, seeds) = word.split_once(':').expect("HGM_BENCH_MISHAPS: HEAD:SEEDS");
+        (head.to_owned(), seeds.split(',').flat_map(range).collect())
+    };
+    words.split_whitespace().map(of_head).collect()
 }
 
 fn scan(path: &Path) -> Volume<f32, Native> {
