@@ -25,6 +25,7 @@ pub use brain::BrainSettings;
 pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};
 pub use import::{ImportError, ImportedLabels, import_labels};
 pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
+pub use overhang::VaultPart;
 pub use priors::AtlasPriors;
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,

@@ -8,6 +8,7 @@ use crate::geometry::{AffineTransform, Mni};
 use crate::image::distance::signed_distance_mm;
 use crate::image::{Mask, Volume};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// The layer outside the carried surface that is looked at, mm: beyond what a good fit misses, short of where brain is no
 /// longer looked for.
@@ -31,7 +32,7 @@ const LEAST_SHARE: f64 = 0.04;
 /// A part of the vault and how much of the layer looked at disagrees there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
-    pub name: &'static str,
+    pub name: VaultPart,
     pub share: f64,
 }
 
@@ -83,17 +84,46 @@ fn layer(
     Layer { share: share(whole), worst: worst.filter(|place| place.share > MOST) }
 }
 
-/// Parts of the vault in the template's frame, where the head lies rigidly: by planes, for naming.
-const PARTS: [&str; 8] = [
-    "left forehead",
-    "right forehead",
-    "left side",
-    "right side",
-    "left crown",
-    "right crown",
-    "left back",
-    "right back",
+/// A part of the vault, by planes of the template's frame, where the head lies rigidly: for naming.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs, reason = "their names")]
+pub enum VaultPart {
+    LeftForehead,
+    RightForehead,
+    LeftSide,
+    RightSide,
+    LeftCrown,
+    RightCrown,
+    LeftBack,
+    RightBack,
+}
+
+const PARTS: [VaultPart; 8] = [
+    VaultPart::LeftForehead,
+    VaultPart::RightForehead,
+    VaultPart::LeftSide,
+    VaultPart::RightSide,
+    VaultPart::LeftCrown,
+    VaultPart::RightCrown,
+    VaultPart::LeftBack,
+    VaultPart::RightBack,
 ];
+
+impl std::fmt::Display for VaultPart {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::LeftForehead => "left forehead",
+            Self::RightForehead => "right forehead",
+            Self::LeftSide => "left side",
+            Self::RightSide => "right side",
+            Self::LeftCrown => "left crown",
+            Self::RightCrown => "right crown",
+            Self::LeftBack => "left back",
+            Self::RightBack => "right back",
+        })
+    }
+}
 
 fn part(p: Vector3<f64>) -> usize {
     const FOREHEAD_MM: f64 = 15.0;
@@ -183,7 +213,7 @@ mod tests {
         assert!(outside.share > 0.8 && outside.worst.is_some_and(|w| w.share >= outside.share), "{outside:?}");
         let shorn = Volume::from_fn(brain.grid, |n| brain.data[n] && brain.grid.voxel(n)[0] >= 24);
         let cut = short(&shorn, &everywhere, &ball([24.0, 24.0, 26.0], [0.0, 0.0, 1.0]).1);
-        assert!(cut.worst.is_some_and(|w| w.name == "left side") && cut.share < 0.5, "{cut:?}");
+        assert!(cut.worst.is_some_and(|w| w.name == VaultPart::LeftSide) && cut.share < 0.5, "{cut:?}");
         let larger = onto_the_brain(&brain, &small);
         for (axis, radius, middle) in [(0, 24.0, 0.0), (1, 24.0, 0.0), (2, 26.0, 1.0)] {
             let [low, high] = [-1.0, 1.0].map(|sign| {

@@ -8,6 +8,7 @@ use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
 use super::noise::calmed;
+use super::overhang::VaultPart;
 use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
 use crate::geometry::{Frame, Mni, RigidTransform};
@@ -155,7 +156,7 @@ pub enum SegmentWarning {
         /// Share of that layer, in percent.
         percent: f64,
         /// The part of the vault where most of it does, if there is one.
-        place: Option<&'static str>,
+        place: Option<VaultPart>,
     },
     /// Much of what lies just inside the fitted template does not look like brain.
     #[error(
@@ -164,7 +165,7 @@ pub enum SegmentWarning {
     )]
     ShortOfTemplate {
         /// The part of the vault.
-        place: &'static str,
+        place: VaultPart,
         /// Share of that layer there, in percent.
         percent: f64,
     },

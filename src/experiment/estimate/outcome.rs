@@ -466,18 +466,28 @@ mod tests {
             [0, 1, 2].map(|a| u[a] + more[a])
         };
         let observed: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&u).map(moved).collect();
+        estimated(&mesh, &settings.scenario(), &observed, None)
+    }
+
+    /// What is seen of the nodes, told with errors that neighbours share.
+    fn estimated(
+        mesh: &TetMesh,
+        scenario: &Scenario,
+        observed: &[[f64; 3]],
+        instrument: Option<(&Instrument<'_>, usize)>,
+    ) -> Estimate {
         let known = |unknown: Unknown| {
             let prior = unknown.prior(1100f64.ln(), 0.4);
             (unknown, prior)
         };
         let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
-        let scenario = settings.scenario();
         let problem = Problem {
             unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
             errors: Errors::Correlated(CorrelatedErrors { noise, rigid_mm: 0.1, places: 150 }),
             start: Vec::new(),
             body_known: false,
-            ..problem(&mesh, &scenario, every_node(&observed))
+            instrument,
+            ..problem(mesh, scenario, every_node(observed))
         };
         solve_problem(problem, &EstimateSettings::default()).unwrap()
     }
@@ -514,6 +524,24 @@ mod tests {
         let state = whole.at_rest();
         assert!(state.state.displacement_mm.iter().all(|u| *u == [0.0; 3]) && reach_mm > 0.0);
         assert!(state.displacement_95_mm.iter().all(|reach| *reach == reach_mm));
+    }
+
+    #[test]
+    fn an_instruments_own_error_at_rest_is_no_shift() {
+        let (mesh, scenario) = (block(5), settings().scenario());
+        let own = |x: [f64; 3]| [0.05 * (0.2 * x[1]).sin(), 0.05 * (0.15 * x[2]).cos(), 0.05 * (0.25 * x[0]).sin()];
+        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> {
+            let seen = |(n, u): (usize, &[f64; 3])| {
+                let error = own(mesh.nodes_mm()[n]);
+                (n as u32, [0, 1, 2].map(|a| u[a] + error[a]))
+            };
+            Ok(u.iter().enumerate().map(seen).collect())
+        };
+        let at_rest = vec![[0.0; 3]; mesh.nodes_mm().len()];
+        let observed: Vec<[f64; 3]> = shown(&at_rest).unwrap().into_iter().map(|(_, u)| u).collect();
+        let found = estimated(&mesh, &scenario, &observed, Some((&shown, 2))).outcome;
+        assert!(found.taken_out_rms_mm.is_some_and(|mm| mm > 0.02), "{:?}", found.taken_out_rms_mm);
+        assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
     }
 
     #[test]
