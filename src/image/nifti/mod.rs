@@ -12,7 +12,6 @@ mod header;
 mod mgh;
 mod orientation;
 mod which;
-mod words;
 
 pub use displacement::{decode_displacement, encode_displacement};
 pub use encode::{encode_f32, encode_i16, encode_intensities, encode_mask, encode_numbers, encode_u8, encode_vectors};
