@@ -192,6 +192,7 @@ pub struct OwnLabels {
 
 /// Masks that win over the computed ones. Each may be in the grid of either scan.
 #[derive(Clone, Debug, Default, clap::Args)]
+#[allow(clippy::struct_field_names, reason = "the options' names")]
 struct OwnMasks {
     /// A mask of the lateral and third ventricles before the operation, in the grid of either scan (wins over the computed one)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
