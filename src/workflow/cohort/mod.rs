@@ -65,7 +65,7 @@ pub fn begin(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
 /// One subject from its scans to its files under BIDS names.
 ///
 /// # Errors
-/// As [`run_to`].
+/// As [`super::run_to`].
 pub fn subject(
     goal: Goal,
     (dataset, pair): (&Dataset, &ScanPair),
