@@ -118,9 +118,8 @@ impl Atlas {
 /// Iron and fibres make these nuclei nearly as bright as white matter, in many scans quite as bright: only their place tells
 /// them apart. The caudate nucleus, hippocampus and amygdala look like cortex and need no help.
 ///
-/// The ellipsoids are as large as makes the nuclei as large as label maps of adults have them: on either side thalamus 6 to
-/// 8.5 cc, putamen 4 to 5, pallidum 1.5 to 2, in a template half as large again as a head. What is drawn too small here, the
-/// mixture calls white matter.
+/// In a head's size the nuclei lie between what two label maps of other programs give theirs. What is drawn too small here,
+/// the mixture calls white matter.
 pub fn deep_grey() -> Mask<Mni> {
     /// Centre and radii in mm of the right side's ellipsoid; how far its axis moves outwards for each mm backwards;
     /// the template's intensities in it.
@@ -208,7 +207,7 @@ mod tests {
     fn the_deep_nuclei_have_their_volumes_and_leave_the_internal_capsule_out() {
         let deep = deep_grey();
         let natural = deep.volume_cc() * head_from_template().linear.determinant();
-        // Both sides; the least and the most of healthy adults.
+        // Both sides: between a small and a large head of label maps of other programs.
         assert!((2.0 * 11.5..2.0 * 15.0).contains(&natural), "{natural}");
         let at = |x, y, z| deep.nearest(Position::new(x, y, z)).unwrap_or(false);
         for (x, y, z) in [(14.0, -18.0, 8.0), (27.0, 2.0, 2.0), (20.0, -6.0, -1.0)] {
