@@ -119,9 +119,22 @@ pub struct EstimateOutcome {
     /// Whether anything has moved, and what would have been seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift: Option<Shift>,
+    /// Supports that are not believed in, beside the ones above.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_supports: Vec<OtherSupports>,
     /// Root mean square of the rigid registration's remainder over the observed nodes, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rigid_remainder_mm: Option<f64>,
+}
+
+/// Supports that are not believed in, held against what was seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OtherSupports {
+    /// Which, in words.
+    pub supports: String,
+    /// Logarithm of the odds of the supports believed in against them, on the coarse mesh.
+    pub log_odds: f64,
 }
 
 /// The estimate with the state behind it and how sure that state is.
@@ -256,6 +269,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         unexplained: correlated.as_ref().map(|c| c.unexplained),
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
+        other_supports: Vec::new(),
         rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
         shift: correlated.map(|c| c.shift),
         posterior,
@@ -483,7 +497,7 @@ mod tests {
         let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
         let problem = Problem {
             unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
-            errors: Errors::Correlated(CorrelatedErrors { noise, rigid_mm: 0.1, places: 150 }),
+            errors: Errors::Correlated(CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 }),
             start: Vec::new(),
             body_known: false,
             instrument,
