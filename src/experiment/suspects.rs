@@ -1,11 +1,10 @@
-//! Supports that an estimate does not believe in but that a brain may have had all the same: what they do is held beside what
-//! the supports believed in do, so that no stiffness is told where the two cannot be told apart.
+//! Supports that an estimate does not believe in but that a brain may have had all the same: where nothing is seen to move,
+//! stiffness is not the only reason for it, and a bound on the stiffness has to hold under these as well.
 
-use super::supports::{PIAL, with_sliding_sets};
 use super::skull::SkullSettings;
+use super::supports::{PIAL, with_sliding_sets};
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
-use crate::tag::FALX;
 use nalgebra::Vector3;
 
 /// Node set of the cortex that lies on the bone below it.
@@ -15,50 +14,17 @@ pub const LYING: &str = "lying";
 /// above it presses it there.
 const PRESSED_COSINE: f64 = 0.5;
 
-/// What may have held the brain otherwise than assumed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Suspect {
-    /// Cortex that faces down sticks to the skull.
-    LyingOnSkull,
-    /// The falx holds nothing.
-    FreeFalx,
-}
-
-impl Suspect {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::LyingOnSkull, Self::FreeFalx];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LyingOnSkull => "a cortex stuck to the skull where it faces down",
-            Self::FreeFalx => "a falx that holds nothing",
-        }
-    }
-
-    /// A scenario of held sets, as this has it.
-    #[must_use]
-    pub fn scenario(self, held: &Scenario) -> Scenario {
-        let mut scenario = held.clone();
-        match self {
-            Self::LyingOnSkull => scenario.fixed.push(LYING.to_owned()),
-            Self::FreeFalx => scenario.fixed.retain(|set| set != FALX),
-        }
-        scenario
-    }
-
-    /// A mesh at rest with the sets that this needs.
-    #[must_use]
-    pub fn mesh(self, mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
-        match self {
-            Self::LyingOnSkull => with_lying_set(mesh, skull, gravity_m_per_s2),
-            Self::FreeFalx => mesh,
-        }
-    }
+/// A scenario of held sets whose cortex sticks to the skull as well, where it faces down: for a mesh of [`with_lying_set`].
+#[must_use]
+pub fn lying(held: &Scenario) -> Scenario {
+    let mut scenario = held.clone();
+    scenario.fixed.push(LYING.to_owned());
+    scenario
 }
 
 /// The mesh with [`LYING`]: nodes of the cortex ([`PIAL`]) whose outward normal is within 60 degrees of gravity.
-fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
+#[must_use]
+pub fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
     let nodes = mesh.nodes_mm();
     let mut normals = vec![Vector3::zeros(); nodes.len()];
     let tagged = with_sliding_sets(&mesh, skull);
@@ -90,20 +56,10 @@ mod tests {
         for (axis, sign) in [(0, 1.0), (1, -1.0), (2, 1.0)] {
             let mut gravity = [0.0; 3];
             gravity[axis] = 9.81 * sign;
-            let lying = Suspect::LyingOnSkull.mesh(mesh.clone(), &skull, gravity).node_sets[LYING].clone();
+            let lying = with_lying_set(mesh.clone(), &skull, gravity).node_sets[LYING].clone();
             let end = |n: u32| sign * mesh.nodes_mm()[n as usize][axis];
             let farthest = (0..mesh.nodes_mm().len() as u32).map(end).fold(f64::NEG_INFINITY, f64::max);
             assert!(!lying.is_empty() && lying.iter().all(|&n| (end(n) - farthest).abs() < 1e-9));
         }
-    }
-
-    #[test]
-    fn a_suspect_changes_what_is_held_and_nothing_else() {
-        let held = Scenario { fixed: vec!["base".to_owned(), FALX.to_owned()], ..Scenario::default() };
-        let free = Suspect::FreeFalx.scenario(&held);
-        assert_eq!(free.fixed, ["base"]);
-        let lying = Suspect::LyingOnSkull.scenario(&held);
-        assert_eq!(lying.fixed, ["base", FALX, LYING]);
-        assert_eq!(Scenario { fixed: Vec::new(), ..lying }, Scenario { fixed: Vec::new(), ..held });
     }
 }

@@ -134,13 +134,6 @@ pub enum Reason {
         /// Logarithm of the odds between them.
         log_odds: f64,
     },
-    /// Supports that are not believed in explain the shift as well as those that are, or better.
-    OtherSupports {
-        /// Which, in words.
-        supports: String,
-        /// Logarithm of the odds of the model believed in against it.
-        log_odds: f64,
-    },
     /// The best state of a surface's set against rest.
     Surface {
         /// The set: `margin`.
@@ -238,9 +231,6 @@ impl Reason {
             }
             Self::AnotherModel { models: [a, b], log_odds } => {
                 format!("{a} and {b} explain the shift about as well (log odds {log_odds:.1})")
-            }
-            Self::OtherSupports { supports, log_odds } => {
-                format!("{supports} would explain what is seen as well (log odds {log_odds:.1})")
             }
             Self::Surface { set, rest_mm, deformed_mm, floor_mm } => format!(
                 "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
@@ -354,9 +344,6 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
     match finding {
         Finding::NoShift if bounds.is_empty() => format!("No shift seen: {first}. No stiffness is claimed."),
         Finding::NoShift => format!("No shift seen: {first}. With the load as assumed, {bounds}."),
-        Finding::Unexplained if matches!(reasons.first(), Some(Reason::OtherSupports { .. })) => format!(
-            "Cannot tell what holds the brain: {first}. The supports may not be as assumed; no stiffness is claimed."
-        ),
         Finding::Unexplained => format!(
             "The model does not explain the shift: {first}. The load or the supports may not be as assumed; no stiffness is \
              claimed."
@@ -424,14 +411,6 @@ mod tests {
             let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());
             assert!(finding.has_stiffness() && verdict.sentence.contains("rey matter 1,170 Pa (936 to 1,460)"));
         }
-    }
-
-    #[test]
-    fn supports_that_explain_as_much_leave_no_stiffness_and_are_named() {
-        let reason = Reason::OtherSupports { supports: "a falx that holds nothing".to_owned(), log_odds: -4.2 };
-        let verdict = Verdict::new(Finding::Unexplained, Some(0.71), vec![interval("grey_matter", 3110.0)], vec![reason]);
-        assert!(verdict.sentence.contains("a falx that holds nothing") && verdict.sentence.contains("log odds -4.2"));
-        assert!(verdict.sentence.starts_with("Cannot tell what holds the brain") && !verdict.sentence.contains("3,110"));
     }
 
     #[test]

@@ -19,7 +19,6 @@ use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
-use crate::experiment::suspects::Suspect;
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
 use crate::layout::REST_MESH;
@@ -272,13 +271,9 @@ impl<'w, 'a> Patient<'w, 'a> {
         };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let suspects = || -> Result<Vec<HeldBody>, WorkflowError> {
-            let held = self.held(Supports::Fixed)?;
-            Ok(Suspect::ALL.into_iter().map(|suspect| held.suspected(suspect)).collect())
-        };
-        let (shift, coarser, held, suspects) =
-            (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspects as _));
-        let input = EstimateInput { coarser, held, suspects, shift, ..self.asked(&tissues) };
+        let suspect = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.lying()) };
+        let (shift, coarser, held, suspect) = (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspect as _));
+        let input = EstimateInput { coarser, held, suspect, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }
 
@@ -293,7 +288,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
-        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, suspect: None })
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, lying: false })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -306,7 +301,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
-            suspects: None,
+            suspect: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
             rigid_error_mm: settings.resection.registration_error_mm,

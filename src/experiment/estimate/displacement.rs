@@ -23,7 +23,8 @@ pub struct DisplacementSettings {
     pub depth_mm: f64,
     /// Standard deviation of one component, mm.
     pub noise_mm: f64,
-    /// The same once the registration's own error is taken out; what the model leaves is held against this.
+    /// Standard deviation of one component once the registration's own error is taken out, mm: what the model leaves is held
+    /// against this.
     pub corrected_noise_mm: f64,
     /// Length over which errors are alike, mm: that of Matern's covariance of order 3/2.
     pub correlation_mm: f64,

@@ -29,7 +29,7 @@ pub use findings::{Odds, ProblemError, Shift};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
-pub use outcome::{Errors, Estimate, EstimateOutcome, OtherSupports, Problem, SEEN_AT, SEEN_DISPLACEMENT, solve_problem};
+pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, SEEN_AT, SEEN_DISPLACEMENT, solve_problem};
 pub use posterior::{
     Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace, prior_correlation,
 };

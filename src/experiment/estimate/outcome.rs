@@ -119,22 +119,9 @@ pub struct EstimateOutcome {
     /// Whether anything has moved, and what would have been seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift: Option<Shift>,
-    /// Supports that are not believed in, beside the ones above.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub other_supports: Vec<OtherSupports>,
     /// Root mean square of the rigid registration's remainder over the observed nodes, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rigid_remainder_mm: Option<f64>,
-}
-
-/// Supports that are not believed in, held against what was seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OtherSupports {
-    /// Which, in words.
-    pub supports: String,
-    /// Logarithm of the odds of the supports believed in against them, on the coarse mesh.
-    pub log_odds: f64,
 }
 
 /// The estimate with the state behind it and how sure that state is.
@@ -269,7 +256,6 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         unexplained: correlated.as_ref().map(|c| c.unexplained),
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
-        other_supports: Vec::new(),
         rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
         shift: correlated.map(|c| c.shift),
         posterior,

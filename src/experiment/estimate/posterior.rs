@@ -164,13 +164,6 @@ impl Posterior {
         self.marked(Knowledge::Withheld)
     }
 
-    /// With every figure withheld.
-    #[must_use]
-    pub fn all_withheld(mut self) -> Self {
-        self.identifiability.verdicts.fill(Knowledge::Withheld);
-        self
-    }
-
     fn marked(mut self, mark: Knowledge) -> Self {
         for verdict in self.identifiability.verdicts.iter_mut().filter(|v| **v == Knowledge::Identified) {
             *verdict = mark;

@@ -294,7 +294,6 @@ mod tests {
             measured_noise: None,
             odds: None,
             shift: None,
-            other_supports: Vec::new(),
             rigid_remainder_mm: None,
         }
     }

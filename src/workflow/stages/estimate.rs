@@ -2,18 +2,18 @@
 
 use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
-use crate::experiment::compare::{Comparison, compare};
+use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, OtherSupports, Problem, SEEN_AT,
-    SEEN_DISPLACEMENT, STRONG, Turn, Unknown, moved_by, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, SEEN_AT,
+    SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
-use crate::experiment::suspects::Suspect;
+use crate::experiment::suspects::{lying, with_lying_set};
 use crate::experiment::sweep::Reference;
-use crate::experiment::verdict::{Claim, Finding, Reason, Verdict};
+use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
@@ -86,8 +86,8 @@ pub(crate) struct HeldBody {
     pub mesh: TetMesh,
     /// What its state is compared with.
     pub reference: Reference,
-    /// What it is suspected of, where it is not believed in.
-    pub suspect: Option<Suspect>,
+    /// Whether its cortex lies stuck on the skull, which is not believed of it.
+    pub lying: bool,
 }
 
 impl HeldBody {
@@ -107,26 +107,22 @@ impl HeldBody {
         if slides { options.wall_log_sd } else { options.labels_log_sd }
     }
 
-    /// The same body as a suspect holds it.
-    pub fn suspected(&self, suspect: Suspect) -> Self {
-        let scenario = suspect.scenario(&self.scenario);
-        let gravity = scenario.loads.gravity_m_per_s2;
+    /// The same body with its cortex stuck to the skull where it faces down.
+    pub fn lying(&self) -> Self {
+        let gravity = self.scenario.loads.gravity_m_per_s2;
         let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
         Self {
             settings: self.settings.clone(),
-            mesh: suspect.mesh(self.mesh.clone(), &skull, gravity),
+            mesh: with_lying_set(self.mesh.clone(), &skull, gravity),
             reference: self.reference.clone(),
-            suspect: Some(suspect),
-            scenario,
+            lying: true,
+            scenario: lying(&self.scenario),
         }
     }
 
     /// What it assumes, in words.
     pub fn name(&self) -> String {
-        match self.suspect {
-            Some(suspect) => suspect.name().to_owned(),
-            None => self.settings.as_ref().map_or_else(String::new, |s| format!("supports {}", s.supports.name())),
-        }
+        self.settings.as_ref().map_or_else(String::new, |s| format!("supports {}", s.supports.name()))
     }
 }
 
@@ -146,8 +142,8 @@ pub(crate) struct EstimateInput<'a> {
     pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
     pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
-    /// The body as supports hold it that are not believed in, made when they are asked for.
-    pub suspects: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
+    /// The body as supports hold it that are not believed in, made when it is asked for.
+    pub suspect: Option<&'a dyn Fn() -> Result<HeldBody, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
@@ -225,9 +221,9 @@ pub(crate) fn estimate(
         let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
-        let outcome = EstimateOutcome { taught_by, ..found.outcome };
-        let outcome = bodies.beside_suspects(work, input, body, outcome)?;
-        let comparison = comparison.map(|c| Comparison { verdict: outcome.verdict.clone(), ..c });
+        let verdict = bodies.bounded(work, input, found.outcome.verdict.clone())?;
+        let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
+        let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
         let mut produced = produced(body, input, found, comparison)?;
         produced.warnings.extend(warnings);
@@ -270,7 +266,7 @@ impl Bodies {
             scenario: input.scenario.clone(),
             mesh: input.mesh.0.clone(),
             reference: input.reference.clone(),
-            suspect: None,
+            lying: false,
         };
         let list = if list.is_empty() { vec![as_posed()] } else { list };
         let coarser = match input.coarser {
@@ -306,12 +302,11 @@ impl Bodies {
 
     /// The coarser mesh as one of them is held.
     fn coarser_of(&self, body: &HeldBody) -> Result<Option<TetMesh>, WorkflowError> {
-        let supported = |coarse: &TetMesh| match (&body.settings, body.suspect) {
-            (Some(settings), Some(suspect)) => {
-                Ok(suspect.mesh(coarse.clone(), &settings.skull, body.scenario.loads.gravity_m_per_s2))
-            }
-            (Some(settings), None) => settings.supported_mesh(coarse.clone(), &body.scenario),
-            (None, _) => Ok(coarse.clone()),
+        let gravity = body.scenario.loads.gravity_m_per_s2;
+        let supported = |coarse: &TetMesh| match &body.settings {
+            Some(settings) if body.lying => Ok(with_lying_set(coarse.clone(), &settings.skull, gravity)),
+            Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
+            None => Ok(coarse.clone()),
         };
         Ok(self.coarser.as_ref().map(supported).transpose()?)
     }
@@ -394,34 +389,13 @@ impl Bodies {
         Ok(solve_problem(problem, &settings)?)
     }
 
-    /// What is told of the body believed in, beside supports that are not: nothing of the stiffness where any of those explains
-    /// what was seen as well. Both are held against it on the coarse mesh, in a fraction of the time, and without the
-    /// instrument's own error taken out of either.
-    fn beside_suspects(
-        &self,
-        work: &Work<'_>,
-        input: &EstimateInput<'_>,
-        body: &HeldBody,
-        mut outcome: EstimateOutcome,
-    ) -> Result<EstimateOutcome, WorkflowError> {
-        let Some(make) = input.suspects.filter(|_| outcome.verdict.finding.has_stiffness()) else { return Ok(outcome) };
-        let prior = &work.settings.prior;
-        let evidence = |body: &HeldBody| -> Result<Option<f64>, WorkflowError> {
-            let found = self.roughly(work, input, body, input.tissues, prior)?;
-            Ok(found.and_then(|found| found.outcome.odds).map(|odds| odds.log_evidence))
-        };
-        let Some(believed) = evidence(body)? else { return Ok(outcome) };
-        let mut reasons = Vec::new();
-        for suspect in make()? {
-            // Supports without an equilibrium explain nothing.
-            let Some(other) = evidence(&suspect)? else { continue };
-            let (supports, log_odds) = (suspect.name(), believed - other);
-            if log_odds < STRONG {
-                reasons.push(Reason::OtherSupports { supports: supports.clone(), log_odds });
-            }
-            outcome.other_supports.push(OtherSupports { supports, log_odds });
-        }
-        Ok(if reasons.is_empty() { outcome } else { without_stiffness(outcome, reasons) })
+    /// The verdict with bounds that hold for supports as well that are not believed in, on the coarse mesh. Others have none.
+    fn bounded(&self, work: &Work<'_>, input: &EstimateInput<'_>, verdict: Verdict) -> Result<Verdict, WorkflowError> {
+        let Some(make) = input.suspect.filter(|_| verdict.finding == Finding::NoShift) else { return Ok(verdict) };
+        let found = self.roughly(work, input, &make()?, input.tissues, &work.settings.prior)?;
+        // Supports without an equilibrium bound nothing.
+        let other = found.map(|found| found.outcome.verdict);
+        Ok(with_weakest_bounds(verdict.clone(), std::iter::once(&verdict).chain(&other)))
     }
 
     /// What is observed, how far it is believed, and the standard deviation of one observation in mm.
@@ -450,17 +424,6 @@ impl Bodies {
             }
         }
     }
-}
-
-/// An estimate of which no stiffness is told, for these reasons before its own.
-fn without_stiffness(mut outcome: EstimateOutcome, reasons: Vec<Reason>) -> EstimateOutcome {
-    let Verdict { explained_share, moduli, reasons: own, .. } = outcome.verdict;
-    let moduli = moduli.into_iter().map(|(tissue, _)| (tissue, Claim::Withheld)).collect();
-    let reasons = reasons.into_iter().chain(own).collect();
-    outcome.verdict = Verdict::new(Finding::Unexplained, explained_share, moduli, reasons);
-    outcome.limits = outcome.verdict.because();
-    outcome.posterior = outcome.posterior.all_withheld();
-    outcome
 }
 
 fn produced(
