@@ -8,7 +8,7 @@ use super::settings::Settings;
 use super::stages::mesh_outcome;
 use super::user_file::read_input;
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError, write_whole};
+use crate::artefact::{Produced, Stage, StageError, check_writable, write_whole};
 use crate::experiment::outcome::MeshOutcome;
 use crate::geometry::Native;
 use crate::image::{LabelMap, nifti};
@@ -77,6 +77,9 @@ pub fn mesh_file(
     let extension = files.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !FORMATS.contains(&extension.as_str()) {
         return Err(MeshFileError::Output { output: files.output.clone() }.into());
+    }
+    for file in [Some(&files.output), files.preview.as_ref()].into_iter().flatten() {
+        check_writable(file)?;
     }
     let name = files.labels.display().to_string();
     let bytes = read_input(&files.labels)?;

@@ -71,7 +71,7 @@ pub mod results_in_words;
 pub use bundled_pair::{demo, demo_pair_settings, demo_phantom_settings};
 pub use case::Case;
 pub use error::{
-    CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
+    AskedError, CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
     MeshFileError, PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
@@ -90,7 +90,7 @@ pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
 pub use planned_resection::PlannedResection;
 pub use planned_scan::PlanInputs;
-pub use posed::{Posed, Resection, posed_case, posed_mesh};
+pub use posed::{BodySource, Posed, Resection, posed_case, posed_mesh};
 pub use prediction::predict;
 pub use programs::{Finding, Known, Programs, known};
 pub use progress::{Progress, Shared, Silent, StageEnded};

@@ -1,6 +1,6 @@
 //! One image in a file registered rigidly to another, or to the template.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, InputError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::settings::Settings;
 use super::user_file::read_input;
@@ -28,6 +28,26 @@ pub enum Onto {
         /// Compare only inside this mask of the image that stays.
         fixed_mask: Option<PathBuf>,
     },
+}
+
+impl Onto {
+    /// What a word names: the template for `MNI`, unless a file is called so; an image for any other.
+    ///
+    /// # Errors
+    /// Masks beside the template.
+    pub fn named(
+        fixed: PathBuf,
+        moving_mask: Option<PathBuf>,
+        fixed_mask: Option<PathBuf>,
+    ) -> Result<Self, WorkflowError> {
+        if !fixed.as_os_str().eq_ignore_ascii_case("mni") || fixed.exists() {
+            return Ok(Self::Image { fixed, moving_mask, fixed_mask });
+        }
+        if moving_mask.is_some() || fixed_mask.is_some() {
+            return Err(AskedError::MasksOfTemplate.into());
+        }
+        Ok(Self::Template)
+    }
 }
 
 /// The files of a registration.
@@ -62,6 +82,9 @@ pub struct Registered {
 /// # Errors
 /// An image or mask that cannot be used, images that cannot be registered, the disk's.
 pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Registered, WorkflowError> {
+    if files.output.is_dir() {
+        return Err(InputError::Folder { path: files.output.clone() }.into());
+    }
     let transform = match files.output.extension() {
         Some(e) if e != "tfm" => files.output.clone(),
         _ => files.output.with_extension("txt"),

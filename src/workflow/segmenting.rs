@@ -1,6 +1,6 @@
 //! One T1 in a file to a label map.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::progress::Progress;
 use super::settings::Settings;
@@ -42,13 +42,16 @@ pub struct Segmented {
 /// Labels a scan.
 ///
 /// # Errors
-/// A scan or mask that cannot be used, a head that cannot be labelled, the disk's.
+/// A name for the labels that does not end in .nii.gz, a scan or mask that cannot be used, a head that cannot be labelled, the disk's.
 pub fn segment_file(
     files: &SegmentFiles,
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<Segmented, WorkflowError> {
     for path in [Some(&files.output), files.write_brain_mask.as_ref()].into_iter().flatten() {
+        if !path.to_string_lossy().ends_with(".nii.gz") {
+            return Err(AskedError::PackedNifti { output: path.clone() }.into());
+        }
         check_writable(path)?;
     }
     let name = files.t1.display().to_string();

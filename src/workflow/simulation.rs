@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::settings::in_words;
 use super::user_file::{read_input, read_text};
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError};
+use crate::artefact::{Produced, Stage, StageError, check_writable};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
     self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
@@ -79,6 +79,7 @@ pub fn simulate(
     progress: &mut dyn Progress,
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
+    check_writable(&files.output)?;
     let mesh_bytes = read_input(&files.mesh)?;
     let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {

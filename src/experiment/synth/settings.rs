@@ -196,6 +196,11 @@ pub enum SynthError {
 }
 
 impl SynthSettings {
+    /// How thick the post-operative slices are where the voxels get this size: as they are, and never thinner than those.
+    pub fn slices_of_voxels_mm(&self, spacing_mm: f64) -> f64 {
+        self.post_slice_mm.max(spacing_mm)
+    }
+
     /// Checks every range.
     ///
     /// # Errors

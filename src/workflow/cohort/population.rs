@@ -1,6 +1,7 @@
 //! What a cohort's estimates say of people: who teaches, the population, and each patient with what the others say.
 
 use super::case_folder;
+use crate::artefact::write_whole;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::population::{Literature, Moments, PopulationFile, PopulationPrior, merged};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
@@ -135,16 +136,18 @@ pub fn population_prior(path: &Path) -> Result<PopulationPrior, WorkflowError> {
     Ok(read_population(path)?.prior())
 }
 
-/// Several cohorts' files as one.
+/// Several cohorts' files as one, into `output`.
 ///
 /// # Errors
-/// A file that is no population; cohorts of different kinds, or one that was given twice.
-pub fn merge_populations(paths: &[PathBuf]) -> Result<PopulationFile, WorkflowError> {
+/// A file that is no population; cohorts of different kinds, or one that was given twice; the disk's.
+pub fn merge_populations(paths: &[PathBuf], output: &Path) -> Result<PopulationFile, WorkflowError> {
     let files = paths
         .iter()
         .map(|path| Ok((shown(path), read_population(path)?)))
         .collect::<Result<Vec<_>, WorkflowError>>()?;
-    Ok(merged(&files)?)
+    let all = merged(&files)?;
+    write_whole(output, all.to_toml().as_bytes())?;
+    Ok(all)
 }
 
 #[cfg(test)]

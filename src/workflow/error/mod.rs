@@ -1,5 +1,6 @@
 //! Why a job did not end well.
 
+mod asked;
 mod case;
 mod cohort;
 mod evaluate;
@@ -12,6 +13,7 @@ mod simulation;
 mod taken_up;
 mod warp;
 
+pub use asked::AskedError;
 pub use case::CaseError;
 pub use cohort::CohortError;
 pub use evaluate::EvaluateError;
@@ -71,6 +73,8 @@ pub enum ErrorKind {
 pub enum WorkflowError {
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    #[error(transparent)]
+    Asked(#[from] AskedError),
     #[error(transparent)]
     Input(#[from] InputError),
     #[error(transparent)]
