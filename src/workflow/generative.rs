@@ -297,3 +297,26 @@ where
         Err(StageError::Write(error)) => Err(error.into()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_level_means_the_papers_nine_and_one_beyond_six_sd_or_none_at_all_is_refused() {
+        assert_eq!(levels_asked(&[]).unwrap(), nine_levels());
+        assert_eq!(levels_asked(&[-6.0, 0.5, 6.0]).unwrap(), [-6.0, 0.5, 6.0]);
+        for bad in [6.1, -7.0, f64::NAN, f64::INFINITY] {
+            let said = levels_asked(&[0.0, bad]).unwrap_err().to_string();
+            assert!(said.contains(&bad.to_string()) && said.contains("-6 to 6"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_file_holds_one_to_a_million_random_materials() {
+        assert!(check_draws(1).is_ok() && check_draws(1_000_000).is_ok());
+        for count in [0, 1_000_001] {
+            assert_eq!(check_draws(count), Err(AskedError::Draws { count, most: 1_000_000 }));
+        }
+    }
+}

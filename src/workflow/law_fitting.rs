@@ -84,3 +84,19 @@ pub fn fit_laws(
     };
     laws.into_iter().map(fitted).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_that_no_material_has_is_refused_before_anything_is_fitted() {
+        // Points that no law could be fitted to.
+        let points = Rheometry { measured: Measured::Energy, stretches: Vec::new(), values_pa: Vec::new() };
+        let test = LawTest { name: "test.csv".to_owned(), points };
+        for poisson_ratio in [0.5, -0.1, f64::NAN] {
+            let refused = fit_laws(&test, &[], poisson_ratio, &MetaModelSettings::default()).unwrap_err();
+            assert!(matches!(refused, WorkflowError::Asked(AskedError::PoissonRatio { .. })), "{refused}");
+        }
+    }
+}

@@ -182,3 +182,25 @@ fn add_materials(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_a_case_a_file_a_mesh_and_neither_takes_what_is_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = folder.path().join("brain.vtu");
+        let scenario = || Some(PathBuf::from("s.toml"));
+        let at = |path: &Path, scenario, resection| BodySource::at(path, scenario, resection);
+        for resection in [Resection::Done, Resection::Undone] {
+            assert_eq!(at(folder.path(), None, resection).unwrap(), BodySource::Case(resection));
+            let refused = at(folder.path(), scenario(), resection).unwrap_err();
+            assert!(matches!(refused, WorkflowError::Asked(AskedError::ScenarioOfCase { .. })), "{refused}");
+        }
+        assert_eq!(at(&mesh, scenario(), Resection::Done).unwrap(), BodySource::Mesh(scenario()));
+        assert_eq!(at(&mesh, None, Resection::Done).unwrap(), BodySource::Mesh(None));
+        let refused = at(&mesh, None, Resection::Undone).unwrap_err().to_string();
+        assert!(refused.contains("brain.vtu") && refused.contains("label 5"), "{refused}");
+    }
+}
