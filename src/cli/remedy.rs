@@ -10,8 +10,8 @@ use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
-    AskedError, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError,
-    SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
+    AskedError, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
+    PredictError, SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -99,6 +99,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
+        WorkflowError::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",

@@ -133,7 +133,7 @@ fn make(
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
         match tag_boundary_sets(&mut mesh, tags) {
-            Ok(report) => (sets, refused) = (report.sets, report.warnings),
+            Ok(report) => (sets, refused) = (report.sets, report.warnings.iter().map(ToString::to_string).collect()),
             Err(error) => refused.push(error.to_string()),
         }
     }

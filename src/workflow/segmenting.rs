@@ -5,6 +5,7 @@ use super::inputs::read_mask_of;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::user_file::read_input;
+use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
@@ -36,7 +37,7 @@ pub struct Segmented {
     /// Mean brightness of CSF, grey and white matter.
     pub tissue_means: [f64; 3],
     /// What a reader must know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Labels a scan.
@@ -56,7 +57,8 @@ pub fn segment_file(
     }
     let name = files.t1.display().to_string();
     let read = nifti::decode(&read_input(&files.t1)?, &name, &settings.image)?;
-    let (t1, mut warnings) = (read.volume, read.warnings);
+    let t1 = read.volume;
+    let mut warnings: Vec<Warning> = read.warnings.into_iter().map(Warning::from).collect();
     let own = files.brain_mask.as_deref();
     let own = own.map(|path| read_mask_of(path, &t1.grid, &settings.image, &mut warnings)).transpose()?;
 
@@ -79,8 +81,8 @@ pub fn segment_file(
     if let Some(path) = &files.write_brain_mask {
         write_whole(path, &brain)?;
     }
-    warnings.extend(fit.warnings.iter().map(ToString::to_string));
-    warnings.extend(found.warnings.iter().map(ToString::to_string));
+    warnings.extend(fit.warnings.into_iter().map(Warning::from));
+    warnings.extend(found.warnings.into_iter().map(Warning::from));
     let labels = files.output.clone();
     Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, warnings })
 }

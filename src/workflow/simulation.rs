@@ -65,7 +65,7 @@ pub struct Simulation {
     /// The record of a motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
-    /// What a reader must know.
+    /// What a reader must know, in sentences.
     pub warnings: Vec<String>,
 }
 
@@ -231,7 +231,7 @@ fn produced(
         contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
-        warnings: outcome.warnings.clone(),
+        warnings: outcome.warnings.iter().map(ToString::to_string).collect(),
     };
     let bytes = vtu::encode(mesh, &points, &cells).map_err(refused(&output))?;
     files.push((output, bytes));
@@ -239,5 +239,6 @@ fn produced(
         let list: Vec<(f64, &str)> = series.iter().map(|(time, file)| (*time, file.as_str())).collect();
         files.push((name.clone(), pvd::encode(&list)));
     }
-    Ok(Produced { files, warnings: outcome.warnings, facts: facts(&summary) })
+    let facts = facts(&summary);
+    Ok(Produced { files, warnings: summary.warnings, facts })
 }

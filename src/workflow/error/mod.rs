@@ -37,6 +37,7 @@ use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
 use crate::experiment::synth::SynthError;
+use crate::fem::FemError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
@@ -111,7 +112,7 @@ pub enum WorkflowError {
     Studies { file: String, source: StudyError },
     #[error("{file}: {source}")]
     Hyperparameters { file: String, source: HyperparametersError },
-    #[error("{file}: {reason}; make it with hgm gp fit --model study-level")]
+    #[error("{file}: {reason}")]
     StudyLevelFile { file: String, reason: String },
     #[error(transparent)]
     StudyLevel(#[from] study_level::FitError),
@@ -135,7 +136,7 @@ pub enum WorkflowError {
         "the phantom's reference state has no equilibrium ({reason}); lower `one_tissue_force_n` or \
          `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings"
     )]
-    NoReferenceState { reason: String },
+    NoReferenceState { reason: FemError },
     #[error("table [resection]: {0}")]
     Supports(#[from] SupportsError),
     #[error(
