@@ -14,6 +14,7 @@ use crate::workflow::user_file::{read_text, shown};
 use crate::workflow::{Case, Settings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// The file of a cohort's population below the derivatives.
 pub const POPULATION: &str = "population.toml";
@@ -22,6 +23,19 @@ const OF_PEOPLE: [&str; 2] = ["shear_modulus_pa of ", "effective density_kg_per_
 
 /// A population, where somebody teaches, and what is told of it.
 pub type Learnt = (Option<PopulationFile>, CohortPopulation);
+
+/// Why an estimated patient does not teach; the file counts each by its words.
+#[derive(Clone, Debug, Error)]
+enum LeftOut {
+    #[error("{}", .0.short())]
+    Finding(Finding),
+    #[error("{}", .0.name())]
+    Status(Status),
+    #[error("another law or density than most")]
+    OtherKind,
+    #[error("figures that are no Gaussian")]
+    NoGaussian,
+}
 
 /// One patient whose figures are an answer.
 struct Teacher<'a> {
@@ -44,7 +58,7 @@ impl Teacher<'_> {
 /// A case whose settings cannot be read, a prior that does not exist, more parameters than can be inferred together.
 pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, WorkflowError> {
     let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
-    let mut leave = |why: &str| *left_out.entry(why.to_owned()).or_default() += 1;
+    let mut leave = |why: LeftOut| *left_out.entry(why.to_string()).or_default() += 1;
     let mut estimated = 0;
     let mut teachers = Vec::new();
     for member in members {
@@ -57,8 +71,8 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
                 let own = Case::at(&case_folder(cases, &member.participant_id)).settings()?;
                 teachers.push(Teacher { id: &member.participant_id, estimate, settings: Settings::resolve([&own])? });
             }
-            Status::Done => leave(finding.short()),
-            _ => leave(member.status.name()),
+            Status::Done => leave(LeftOut::Finding(finding)),
+            _ => leave(LeftOut::Status(member.status.clone())),
         }
     }
     let kinds = |t: &Teacher<'_>| teachers.iter().filter(|other| other.kind() == t.kind()).count();
@@ -68,7 +82,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     teachers.retain(|t| {
         let same = Some(t.kind()) == chosen;
         if !same {
-            leave("another law or density than most");
+            leave(LeftOut::OtherKind);
         }
         same
     });
@@ -80,7 +94,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     for teacher in teachers {
         match Moments::of_estimate(teacher.estimate, &names) {
             Some(moments) => taught.push((teacher, moments)),
-            None => leave("figures that are no Gaussian"),
+            None => leave(LeftOut::NoGaussian),
         }
     }
     let (Some((first, _)), Some(chosen)) = (taught.first(), chosen) else {
