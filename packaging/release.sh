@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes what a release consists of: packaging/release.sh [OUT]     (OUT: target/release-VERSION)
 #
-#   hgm-VERSION-x86_64-linux      the program, linked statically: runs on any Linux of this processor
+#   hgm-VERSION-x86_64-linux      the program, linked statically: runs on any Linux on a processor since 2009 (SSE4.2)
 #   hgm-VERSION-*.whl             the Python wheel
 #   hgm-VERSION-containers.tar.gz recipes of the containers and the Boutiques descriptor
 #   hgm-VERSION.cdx.json          what is inside and under which licence (CycloneDX)
@@ -27,7 +27,7 @@ mkdir -p "$out.part"
 
 say "static program"
 # With --target the flag is the program's alone; procedural macros are libraries and cannot be static.
-CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER="$PWD/packaging/static-linker" RUSTFLAGS="-C target-feature=+crt-static" \
+CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER="$PWD/packaging/static-linker" RUSTFLAGS="-C target-cpu=x86-64-v2 -C target-feature=+crt-static" \
   cargo build --release --locked --bin hgm --target "$target"
 program="$out.part/hgm-$version-x86_64-linux"
 # Without its tables of names, which nobody who runs it needs.

@@ -96,7 +96,7 @@ pub fn simulate<'py>(
         "convergence": outcome.convergence,
         "contact": outcome.contact,
         "motion": outcome.motion,
-        "warnings": outcome.warnings,
+        "warnings": outcome.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
     });
     found.set_item("record", record.to_string())?;
     Ok(found)

@@ -31,6 +31,13 @@ pub struct Produced {
     pub facts: Value,
 }
 
+impl Produced {
+    /// Adds what a reader must know: values of the rooms, kept as their sentences.
+    pub fn warn<W: ToString>(&mut self, warnings: impl IntoIterator<Item = W>) {
+        self.warnings.extend(warnings.into_iter().map(|warning| warning.to_string()));
+    }
+}
+
 /// How the stage ended.
 #[derive(Clone, Debug)]
 pub struct StageOutcome {

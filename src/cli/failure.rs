@@ -3,6 +3,7 @@
 use super::output::print_line;
 use super::remedy::remedy;
 use crate::experiment::outcome::Answer;
+use crate::live::{ReplayError, ServeError};
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{ErrorKind, InputError, SettingsError, WorkflowError};
 use anyhow::anyhow;
@@ -119,11 +120,10 @@ fn with_remedy(error: anyhow::Error) -> anyhow::Error {
 }
 
 fn kind(error: &anyhow::Error) -> ErrorKind {
-    if let Some(error) = error.downcast_ref::<WorkflowError>() {
-        return error.kind();
-    }
     let given = error.is::<InputError>() || error.is::<SettingsError>() || error.is::<DatasetError>();
-    if given { ErrorKind::Rejected } else { ErrorKind::Failed }
+    let of_job = error.downcast_ref().map(WorkflowError::kind);
+    let of_body = || error.downcast_ref().map(ReplayError::kind).or_else(|| error.downcast_ref().map(ServeError::kind));
+    of_job.or_else(of_body).unwrap_or(if given { ErrorKind::Rejected } else { ErrorKind::Failed })
 }
 
 /// Marks an error as the input's fault (exit code 3).

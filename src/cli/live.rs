@@ -1,13 +1,13 @@
 //! `hgm live CASE|MESH [SCENARIO]`: a body to pull at in the browser, or a recorded session again.
 
 use super::session::at_signal;
-use super::{Failure, Reject, Session};
+use super::{Failure, Session};
 use crate::artefact::{check_writable, write_whole};
-use crate::live::{LiveBody, Recording, ReplayError, ServeError, in_series, replay_to_files, serve};
-use crate::workflow::{Layer, Resection, posed_case, posed_mesh, read_text};
-use anyhow::{Context, anyhow};
+use crate::live::{LiveBody, replay_to_files, serve};
+use crate::workflow::{BodySource, Layer, Resection, posed_case, posed_mesh};
+use anyhow::anyhow;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// Pull at the brain in a browser while the solver runs
@@ -49,32 +49,27 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let body = body(args, session)?;
     match (&args.replay, &args.output) {
-        (Some(file), Some(output)) => replay(&body, file, (output, args.every), session),
+        (Some(file), Some(output)) => {
+            let replayed = replay_to_files(file, &body, (output, args.every), &mut *session.listener())?;
+            session.emit(&replayed, &replayed.in_words())
+        }
         _ => open(&body, args, session),
     }
 }
 
 fn body(args: &Args, session: &Session) -> Result<LiveBody, Failure> {
-    let folder = args.body.is_dir();
-    if folder && args.scenario.is_some() {
-        return Err(anyhow!("{}: a case brings its own scenario; leave SCENARIO out", args.body.display())).reject();
-    }
-    if args.before_resection && !folder {
-        return Err(anyhow!(
-            "{}: --before-resection is for the folder of a case; a mesh has its resected tissue where it has label 5",
-            args.body.display()
-        ))
-        .reject();
-    }
-    let (settings, posed) = if folder {
-        let settings = session.settings_of(&args.body, Layer::default())?;
-        let resection = if args.before_resection { Resection::Undone } else { Resection::Done };
-        let posed = posed_case(&session.place(&args.body), &settings, resection, &mut *session.listener())?;
-        (settings, posed)
-    } else {
-        let settings = session.settings(Layer::default())?;
-        let posed = posed_mesh(&args.body, args.scenario.as_deref(), &settings)?;
-        (settings, posed)
+    let resection = if args.before_resection { Resection::Undone } else { Resection::Done };
+    let (settings, posed) = match BodySource::at(&args.body, args.scenario.clone(), resection)? {
+        BodySource::Case(resection) => {
+            let settings = session.settings_of(&args.body, Layer::default())?;
+            let posed = posed_case(&session.place(&args.body), &settings, resection, &mut *session.listener())?;
+            (settings, posed)
+        }
+        BodySource::Mesh(scenario) => {
+            let settings = session.settings(Layer::default())?;
+            let posed = posed_mesh(&args.body, scenario.as_deref(), &settings)?;
+            (settings, posed)
+        }
     };
     Ok(LiveBody::of(posed, &settings.prior))
 }
@@ -83,12 +78,7 @@ fn open(body: &LiveBody, args: &Args, session: &Session) -> Result<(), Failure> 
     if let Some(file) = &args.record {
         check_writable(file)?;
     }
-    let server = match serve(body, args.port, args.record.is_some()) {
-        Ok(server) => server,
-        Err(ServeError::Fem(source)) => return Err(anyhow!("{}: {source}", args.body.display())).reject(),
-        Err(error @ ServeError::Port { .. }) => return Err(error).reject(),
-        Err(error) => return Err(anyhow!(error).into()),
-    };
+    let server = serve(body, args.port, args.record.is_some())?;
     at_signal(server.stopper());
     let address = server.address();
     session.emit(&json!({ "address": address }), &format!("{address}\nCtrl-C ends it"))?;
@@ -102,23 +92,4 @@ fn open(body: &LiveBody, args: &Args, session: &Session) -> Result<(), Failure> 
         write_whole(file, driven.recording.to_text().as_bytes())?;
     }
     Ok(())
-}
-
-fn replay(
-    body: &LiveBody,
-    file: &Path,
-    (output, every): (&Path, Option<u64>),
-    session: &Session,
-) -> Result<(), Failure> {
-    check_writable(output)?;
-    if every.is_some() && !in_series(output) {
-        return Err(anyhow!("{}: --every is for a series; name a .pvd file", output.display())).reject();
-    }
-    let name = || file.display().to_string();
-    let recording = Recording::from_text(&read_text(file)?).with_context(name).reject()?;
-    match replay_to_files(&recording, body, (output, every), &mut *session.listener()) {
-        Ok(replayed) => session.emit(&replayed, &replayed.in_words()),
-        Err(ReplayError::Recording(error)) => Err(error).with_context(name).reject(),
-        Err(error) => Err(error.into()),
-    }
 }

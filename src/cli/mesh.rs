@@ -2,7 +2,6 @@
 
 use super::flags::MeshOptions;
 use super::{Failure, Session};
-use crate::artefact::check_writable;
 use crate::workflow::{Layer, MeshFiles, WorkflowError, mesh_file, results_in_words};
 use std::path::PathBuf;
 
@@ -48,9 +47,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.mesh.over(&mut flags);
     flags.list("mesh.without", &args.without);
     flags.switch("tag.tentorium", args.tentorium);
-    for file in [Some(&args.output), args.preview.as_ref()].into_iter().flatten() {
-        check_writable(file)?;
-    }
     let files = MeshFiles {
         labels: args.dseg.clone(),
         numbers: args.labels.clone(),

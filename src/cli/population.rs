@@ -1,7 +1,6 @@
 //! `hgm population`: what cohorts say of people.
 
 use super::{Failure, Session};
-use crate::artefact::write_whole;
 use crate::report::cohort_population::file_in_words;
 use crate::workflow::cohort::{merge_populations, read_population};
 use std::path::PathBuf;
@@ -47,16 +46,13 @@ struct ShowArgs {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     match &args.command {
-        Command::Merge(args) => merge(args, session),
+        Command::Merge(MergeArgs { files, output }) => {
+            let file = merge_populations(files, output)?;
+            session.emit(&file, &(file_in_words(&file) + &output.display().to_string()))
+        }
         Command::Show(args) => {
             let file = read_population(&args.file)?;
             session.emit(&file, &file_in_words(&file))
         }
     }
-}
-
-fn merge(args: &MergeArgs, session: &Session) -> Result<(), Failure> {
-    let file = merge_populations(&args.files)?;
-    write_whole(&args.output, file.to_toml().as_bytes())?;
-    session.emit(&file, &(file_in_words(&file) + &args.output.display().to_string()))
 }

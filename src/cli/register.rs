@@ -2,7 +2,6 @@
 
 use super::{Failure, Session, session::warn};
 use crate::workflow::{Layer, Onto, RegisterFiles, WorkflowError, register_files};
-use anyhow::anyhow;
 use std::path::PathBuf;
 
 /// Find the rigid motion that takes the MOVING image onto the FIXED one
@@ -29,28 +28,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let settings = session.settings(Layer::default())?;
-    if args.output.is_dir() {
-        return Err(Failure::Rejected(anyhow!("{}: is a folder; name a file", args.output.display())));
-    }
-    let (moving, output) = (args.moving.clone(), args.output.clone());
-    let found = register_files(&RegisterFiles { moving, onto: args.onto()?, output }, &settings)?;
+    let Args { moving, fixed, output, moving_mask, fixed_mask } = args.clone();
+    let files = RegisterFiles { moving, onto: Onto::named(fixed, moving_mask, fixed_mask)?, output };
+    let found = register_files(&files, &session.settings(Layer::default())?)?;
     warn(&found.warnings);
     session.emit(&found, &format!("{}\n{}", found.transform.display(), found.itk_transform.display()))?;
     if found.refused.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(found.refused).into()) }
-}
-
-impl Args {
-    fn onto(&self) -> Result<Onto, Failure> {
-        let Self { fixed, moving_mask, fixed_mask, .. } = self.clone();
-        if !fixed.as_os_str().eq_ignore_ascii_case("mni") || fixed.exists() {
-            return Ok(Onto::Image { fixed, moving_mask, fixed_mask });
-        }
-        if moving_mask.is_some() || fixed_mask.is_some() {
-            return Err(Failure::Rejected(anyhow!(
-                "--moving-mask and --fixed-mask do not go with MNI: the template's own brain is used; leave them out"
-            )));
-        }
-        Ok(Onto::Template)
-    }
 }

@@ -4,13 +4,14 @@ use crate::anatomy::LabelError;
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
+use crate::live::ReplayError;
 use crate::mesh::engine::EngineError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
-    CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError, PredictError,
-    SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
+    AskedError, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
+    PredictError, SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
 };
 
 /// What to add to the message; nothing where the message says it all.
@@ -24,6 +25,9 @@ pub fn remedy(error: &anyhow::Error) -> Option<String> {
 fn of_rooms(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     if let Some(NiftiError { problem, .. }) = cause.downcast_ref() {
         return of_image(problem);
+    }
+    if let Some(ReplayError::NotASeries { .. }) = cause.downcast_ref() {
+        return Some("name it so (-o), or leave --every out");
     }
     match cause.downcast_ref()? {
         HeadError::PoorFit { .. } | HeadError::UnlikeTemplate { .. } | HeadError::Segment(_) => {
@@ -56,6 +60,7 @@ fn of_engine(error: &EngineError) -> &'static str {
 
 fn of_workflow(error: &WorkflowError) -> Option<String> {
     let said = match error {
+        WorkflowError::Asked(error) => of_asking(error),
         WorkflowError::Case(error) => return of_case(error),
         WorkflowError::Dataset(error) => return of_dataset(error),
         WorkflowError::Cohort(CohortError::NobodyRun { .. }) => "run `hgm bids BIDS_DIR OUT participant` first",
@@ -94,6 +99,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
         WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
+        WorkflowError::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
@@ -111,6 +117,18 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         _ => return None,
     };
     Some(said.to_owned())
+}
+
+fn of_asking(error: &AskedError) -> &'static str {
+    match error {
+        AskedError::Level { .. } => "see --levels",
+        AskedError::Draws { .. } => "see --draws",
+        AskedError::PoissonRatio { .. } => "see --poisson-ratio",
+        AskedError::ScenarioOfCase { .. } => "leave SCENARIO out",
+        AskedError::MeshBeforeResection { .. } => "leave --before-resection out",
+        AskedError::PackedNifti { .. } => "see -o and --write-brain-mask",
+        AskedError::MasksOfTemplate => "leave --moving-mask and --fixed-mask out",
+    }
 }
 
 fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {

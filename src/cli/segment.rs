@@ -2,7 +2,6 @@
 
 use super::{Failure, Session, session::warn};
 use crate::workflow::{Layer, SegmentFiles, results_in_words, segment_file};
-use anyhow::anyhow;
 use std::path::PathBuf;
 
 /// A T1 to labels in its own grid: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle
@@ -28,14 +27,6 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Args { t1, output, brain_mask, write_brain_mask, mni: in_mni } = args.clone();
-    for path in [Some(&output), write_brain_mask.as_ref()].into_iter().flatten() {
-        if !path.to_string_lossy().ends_with(".nii.gz") {
-            return Err(Failure::Rejected(anyhow!(
-                "{}: label maps and masks are written as .nii.gz; end the name (-o, --write-brain-mask) in .nii.gz",
-                path.display()
-            )));
-        }
-    }
     let files = SegmentFiles { t1, output, brain_mask, write_brain_mask, in_mni };
     let found = segment_file(&files, &session.settings(Layer::default())?, &mut *session.listener())?;
     warn(&found.warnings);

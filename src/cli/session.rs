@@ -166,7 +166,7 @@ impl Session {
 }
 
 /// Log lines of what a reader must know of a result.
-pub fn warn(warnings: &[String]) {
+pub fn warn<W: std::fmt::Display>(warnings: &[W]) {
     for warning in warnings {
         tracing::warn!("{warning}");
     }

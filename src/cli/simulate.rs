@@ -1,7 +1,6 @@
 //! `hgm simulate MESH SCENARIO.toml -o OUT.vtu`: one deformation, or one motion.
 
 use super::{Failure, Session, session::warn};
-use crate::artefact::check_writable;
 use crate::workflow::{self, SimulationFiles, results_in_words, shown};
 use std::path::PathBuf;
 
@@ -33,7 +32,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Args { mesh, scenario, output, start, reference } = args;
     let (mesh, scenario, output) = (mesh.clone(), scenario.clone(), output.clone());
     let files = SimulationFiles { mesh, scenario, output, start: start.clone(), reference: reference.clone() };
-    check_writable(&args.output)?;
     let (found, skipped) = workflow::simulate(&files, session.options.force, &mut *session.listener())?;
     tracing::info!("{}: {}", shown(&args.output), if skipped { "already there, skipped" } else { "done" });
     warn(&found.warnings);

@@ -71,9 +71,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.switch("synth.air", args.air);
     flags.set("synth.contrast", args.contrast);
     flags.set("synth.spacing_mm", args.spacing_mm);
-    // Slices are never thinner than the voxels asked for.
-    let slices = session.settings(Layer::default())?.synth.post_slice_mm;
-    flags.set("synth.post_slice_mm", args.slice_mm.or(args.spacing_mm.map(|spacing| slices.max(spacing))));
+    let below = session.settings(Layer::default())?.synth;
+    let slices = args.spacing_mm.map(|spacing| below.slices_of_voxels_mm(spacing));
+    flags.set("synth.post_slice_mm", args.slice_mm.or(slices));
     let settings = session.settings(flags)?;
     let files = SyntheticFiles {
         output: args.output.clone(),

@@ -2,7 +2,6 @@
 
 use super::flags::word;
 use super::{Failure, Session};
-use crate::artefact::check_writable;
 use crate::report::in_words::warped;
 use crate::workflow::{Layer, Through, Warp, WarpTo, warp};
 use anyhow::anyhow;
@@ -44,7 +43,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         (_, None) => return Err(Failure::Rejected(anyhow!("name the case and the file"))),
     };
-    check_writable(&args.output)?;
     let reading = session.settings(Layer::default())?.image;
     let asked = Warp { file: file.clone(), output: args.output.clone(), through, labels: args.labels, reading };
     let done = warp(&asked)?;

@@ -32,14 +32,12 @@ pub struct StateErrors {
 }
 
 /// One simulated sample.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SolvedSample {
     /// Its line in the outcome.
     pub record: SampleOutcome,
-    /// The deformed state with its errors; absent when no equilibrium was found.
-    pub state: Option<(Outcome, StateErrors)>,
-    /// Why there is no state.
-    pub reason: Option<String>,
+    /// The deformed state with its errors, or why no equilibrium was found.
+    pub state: Result<(Outcome, StateErrors), FemError>,
 }
 
 /// Why a sweep cannot go on (a sample without equilibrium is recorded, not an error).
@@ -143,7 +141,7 @@ pub fn solve_sample(
     let outcome = match simulate(mesh, &scenario, progress) {
         Ok(outcome) => outcome,
         Err(error @ FemError::NoEquilibrium { .. }) => {
-            return Ok(SolvedSample { record, state: None, reason: Some(error.to_string()) });
+            return Ok(SolvedSample { record, state: Err(error) });
         }
         Err(error) => return Err(error.into()),
     };
@@ -154,7 +152,7 @@ pub fn solve_sample(
     record.newton_iterations = outcome.convergence.iterations.len();
     record.relative_residuals = outcome.convergence.iterations.iter().map(|i| i.relative_residual).collect();
     record.displacement_max_mm = Some(largest_norm(&outcome.displacement_mm));
-    Ok(SolvedSample { record, state: Some((outcome, errors)), reason: None })
+    Ok(SolvedSample { record, state: Ok((outcome, errors)) })
 }
 
 fn largest_norm(vectors: &[[f64; 3]]) -> f64 {

@@ -16,7 +16,7 @@ use super::outcome::worst;
 use super::scenario::Materials;
 use super::solver;
 use super::units::METRES_PER_MM;
-use super::{ConvergenceRecord, FemError, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
+use super::{ConvergenceRecord, FemError, FemWarning, Frame, Motion, NewtonIteration, Outcome, Progress, reduce};
 
 /// Most Newton iterations of a step that is to be solved to the residual asked for.
 const MOST_NEWTON: usize = 30;
@@ -82,10 +82,8 @@ impl Model {
         record.relative_residual = if scale > 0.0 { size / scale } else { size };
         let mut outcome = self.outcome(&body.u, &forces, &body.laws, record);
         if !motion.rested {
-            outcome.warnings.push(format!(
-                "the body still moves after {} steps ({:.3} s), up to {:.3e} mm/s: raise `dynamics.steps` or the damping",
-                motion.steps, motion.time_s, motion.fastest_mm_per_s
-            ));
+            let Motion { steps, time_s, fastest_mm_per_s, .. } = motion;
+            outcome.warnings.push(FemWarning::StillMoves { steps, time_s, fastest_mm_per_s });
         }
         outcome.motion = Some(motion);
         Ok(outcome)

@@ -28,6 +28,7 @@ mod sparse;
 mod state;
 mod stiffness;
 pub mod units;
+mod warning;
 
 pub use contact::{Contact, ContactOutcome, Support, Tether, Wall};
 pub use element::ElementKind;
@@ -42,6 +43,7 @@ pub use scenario::{
 pub use sensitivity::By;
 pub use state::State;
 pub use stiffness::Stiffness;
+pub use warning::FemWarning;
 
 use crate::mesh::TetMesh;
 

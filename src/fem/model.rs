@@ -12,7 +12,7 @@ use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sharing::Sharing;
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::units::{metres, millimetres};
-use super::{FemError, State};
+use super::{FemError, FemWarning, State};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use std::sync::{Arc, OnceLock};
@@ -48,7 +48,7 @@ pub struct Model {
     pub(super) corners: usize,
     /// Ends of the mid-edge nodes, in mesh numbering.
     pub(super) edges: Vec<[u32; 2]>,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<FemWarning>,
     /// Elimination order of the direct solver, found when first needed.
     symbolic: OnceLock<Option<Arc<Symbolic>>>,
 }
@@ -177,13 +177,9 @@ impl Model {
         let partition = body.partition(&row_of, &pattern);
         let mut warnings = unstable_laws(&scenario.materials);
         if let Some(limit) = element.locks_above() {
-            let stiffest = scenario.materials.values().map(Material::poisson_ratio).fold(0.0, f64::max);
-            if stiffest > limit {
-                warnings.push(format!(
-                    "{} locks at Poisson's ratio {stiffest}: displacements come out too small; \
-                     `element = \"tet4-nodal\"` does not",
-                    element.name()
-                ));
+            let poisson_ratio = scenario.materials.values().map(Material::poisson_ratio).fold(0.0, f64::max);
+            if poisson_ratio > limit {
+                warnings.push(FemWarning::Locks { element: scenario.solver.element, poisson_ratio });
             }
         }
         Ok(Self {
@@ -359,18 +355,14 @@ impl Model {
     }
 }
 
-/// A sentence for every law that is unstable where it was measured.
-fn unstable_laws(materials: &Materials) -> Vec<String> {
+/// Every law that is unstable where it was measured.
+fn unstable_laws(materials: &Materials) -> Vec<FemWarning> {
     let mut warnings = Vec::new();
     for (name, material) in materials {
         let Some(([low, high], stability)) = material.measured() else { continue };
-        let broken = stability.broken();
+        let broken: Vec<String> = stability.broken().into_iter().map(str::to_owned).collect();
         if !broken.is_empty() {
-            warnings.push(format!(
-                "`[materials.{name}]` is not stable at the stretches it was measured at ({low} to {high}): {}; there may be \
-                 no equilibrium, or several",
-                broken.join(", ")
-            ));
+            warnings.push(FemWarning::Unstable { material: name.clone(), low, high, broken });
         }
     }
     warnings

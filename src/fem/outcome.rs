@@ -3,6 +3,7 @@
 use super::contact::ContactOutcome;
 use super::element::Laws;
 use super::model::Model;
+use super::warning::FemWarning;
 use serde::{Deserialize, Serialize};
 
 /// A deformed state; nodes and cells numbered as in the mesh.
@@ -28,7 +29,7 @@ pub struct Outcome {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
     /// What the reader should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<FemWarning>,
 }
 
 /// A motion from rest.
@@ -129,14 +130,11 @@ impl Model {
         let mut warnings = self.warnings.clone();
         let inverted = state.iter().filter(|s| s[1] <= 0.0).count();
         if inverted > 0 {
-            warnings.push(format!(
-                "{inverted} cells are inside out, among them cell {worst_cell}: lower the load or raise the modulus"
-            ));
+            warnings.push(FemWarning::InsideOut { cells: inverted, worst: worst_cell });
         }
         let crushed = state.iter().filter(|s| (0.0..0.1).contains(&s[1])).count();
         if crushed > 0 {
-            warnings
-                .push(format!("{crushed} cells are squeezed below a tenth of their volume: treat stresses with care"));
+            warnings.push(FemWarning::Squeezed { cells: crushed });
         }
         let (contact, pressure) = self.supports.outcome(u, &self.nodes_m);
         let of_node = |n: usize| pressure[self.number[n] as usize];

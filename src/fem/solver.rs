@@ -4,9 +4,8 @@ use super::linear::{Direct, LinearSolver, Pcg, Rows};
 use super::model::Model;
 use super::scenario::LinearMethod;
 
-/// Poisson's ratio from which a factor is cheaper than conjugate gradients with a Jacobi preconditioner. Measured on
-/// brain5k (tet4, CPU-s by factor and by iteration): .23 and .11 at nu = .45, .29 and .35 at .499; Cook's membrane of
-/// n = 16 (averaged element): .6 and 18 at .4999.
+/// Poisson's ratio from which a factor is cheaper than conjugate gradients with a Jacobi preconditioner
+/// (docs/evidence/choices.md).
 const STIFF_RATIO: f64 = 0.4985;
 
 /// Most free nodes for which that holds: a factor's work grows with the square of their number, an iteration's with

@@ -6,10 +6,10 @@ use super::export::Export;
 use super::recording::{Recording, RecordingError};
 use super::series::Series;
 use super::session::Session;
-use crate::artefact::{WriteError, write_whole};
-use crate::workflow::Progress;
+use crate::artefact::{WriteError, check_writable, write_whole};
+use crate::workflow::{ErrorKind, InputError, Progress, read_text};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Steps from one file of a series to the next: two or three files a second of a body of five thousand nodes.
@@ -19,12 +19,26 @@ const EVERY: u64 = 30;
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ReplayError {
+    #[error("{}: a file every so many steps makes a series, whose name ends in .pvd", output.display())]
+    NotASeries { output: PathBuf },
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    Input(#[from] InputError),
+    #[error("{}: {source}", file.display())]
+    Recording { file: PathBuf, source: RecordingError },
     #[error("{0}")]
     State(String),
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl ReplayError {
+    /// Who is to do something about it.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::NotASeries { .. } | Self::Input(_) | Self::Recording { .. } => ErrorKind::Rejected,
+            Self::State(_) | Self::Write(_) => ErrorKind::Failed,
+        }
+    }
 }
 
 /// What a replay has left.
@@ -44,22 +58,25 @@ pub struct Replayed {
     pub at_rest: bool,
 }
 
-/// Whether the name asks for a series (.pvd, its files beside it) and not for one state.
-pub fn in_series(output: &Path) -> bool {
-    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"))
-}
-
-/// Repeats a recording and writes the state at its end, or a series with one every so many steps.
+/// Repeats the recording in a file and writes the state at its end, or, where the name ends in .pvd, a series with one every
+/// so many steps.
 ///
 /// # Errors
-/// [`ReplayError`]: a recording of another body or with a command that is refused, a state that cannot be written.
+/// [`ReplayError`]: steps between files of one state, a file that is no recording or one of another body or with a command
+/// that is refused, a state that cannot be written.
 pub fn replay_to_files(
-    recording: &Recording,
+    file: &Path,
     body: &LiveBody,
     (output, every): (&Path, Option<u64>),
     progress: &mut dyn Progress,
 ) -> Result<Replayed, ReplayError> {
-    let in_series = in_series(output);
+    check_writable(output)?;
+    let in_series = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"));
+    if every.is_some() && !in_series {
+        return Err(ReplayError::NotASeries { output: output.to_path_buf() });
+    }
+    let refused = |source| ReplayError::Recording { file: file.to_path_buf(), source };
+    let recording = Recording::from_text(&read_text(file)?).map_err(refused)?;
     let stem = output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let mut series = Series::new(&stem, every.unwrap_or(EVERY));
     let mut colours = None;
@@ -78,7 +95,7 @@ pub fn replay_to_files(
         }
     });
     progress.end();
-    let replayed = replayed?;
+    let replayed = replayed.map_err(refused)?;
     if let Some(error) = failed {
         return Err(error);
     }

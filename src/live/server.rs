@@ -8,6 +8,7 @@ use super::pace::{Driven, Driver};
 use super::page::page;
 use super::session::Session;
 use crate::fem::FemError;
+use crate::workflow;
 use std::fmt::Write as _;
 use std::io::{ErrorKind, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -38,8 +39,18 @@ pub enum ServeError {
     Port { port: u16, source: std::io::Error },
     #[error("the system gives no random numbers for the address: {0}")]
     Random(getrandom::Error),
-    #[error(transparent)]
-    Fem(#[from] FemError),
+    #[error("{body}: {source}")]
+    Body { body: String, source: FemError },
+}
+
+impl ServeError {
+    /// Who is to do something about it.
+    pub fn kind(&self) -> workflow::ErrorKind {
+        match self {
+            Self::Port { .. } | Self::Body { .. } => workflow::ErrorKind::Rejected,
+            Self::Random(_) => workflow::ErrorKind::Failed,
+        }
+    }
 }
 
 /// A server that runs until it is stopped.
@@ -75,7 +86,7 @@ pub fn serve(body: &LiveBody, port: u16, recorded: bool) -> Result<Server, Serve
     listener.set_nonblocking(true).map_err(taken)?;
     let token = random_word().map_err(ServeError::Random)?;
     // The session is opened here: what is wrong with it is said before there is an address.
-    let session = Session::open(body)?;
+    let session = Session::open(body).map_err(|source| ServeError::Body { body: body.name.clone(), source })?;
     let sights = &body.sights;
     let mut scene: Vec<Vec<u8>> = sights.scan.iter().map(scan_bytes).collect();
     scene.extend(sights.targets.iter().rev().map(|(name, surface)| target_bytes(name, surface)));

@@ -8,9 +8,10 @@ use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
 use crate::experiment::verdict::Claim;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
+use thiserror::Error;
 
 /// How a subject of a cohort ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -89,10 +90,25 @@ pub struct Cohort {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<TaskRanks>,
     /// What a reader must know before comparing the subjects.
-    pub warnings: Vec<String>,
+    #[schemars(with = "Vec<String>")]
+    pub warnings: Vec<CohortWarning>,
     /// What the subjects say of people, where they were estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub population: Option<CohortPopulation>,
+}
+
+/// What a reader must know before comparing subjects.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum CohortWarning {
+    #[error("the subjects were run with {different} different settings; compare their settings.toml or run them again")]
+    OtherSettings { different: usize },
+}
+
+impl Serialize for CohortWarning {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
 }
 
 /// Iglewicz and Hoaglin (How to detect and handle outliers, 1993): apart is what lies more than 3.5 robust standard
@@ -131,10 +147,7 @@ impl Cohort {
         let settings: BTreeSet<&String> = members.iter().filter_map(|m| m.settings_sha256.as_ref()).collect();
         let mut warnings = Vec::new();
         if settings.len() > 1 {
-            warnings.push(format!(
-                "the subjects were run with {} different settings; compare their settings.toml or run them again",
-                settings.len()
-            ));
+            warnings.push(CohortWarning::OtherSettings { different: settings.len() });
         }
         let outcomes: Vec<&ExperimentOutcome> = members.iter().filter_map(|m| m.outcome.as_ref()).collect();
         let (median_samples, tasks) = (median_samples(&outcomes), compare_tasks(&outcomes));
@@ -354,6 +367,10 @@ mod tests {
             ..member(name, Status::Done, Some(1.0))
         };
         assert!(Cohort::new(&[settings("sub-1", "a"), settings("sub-2", "a")]).warnings.is_empty());
-        assert!(Cohort::new(&[settings("sub-1", "a"), settings("sub-2", "b")]).warnings[0].contains("2 different"));
+        assert!(
+            Cohort::new(&[settings("sub-1", "a"), settings("sub-2", "b")]).warnings[0]
+                .to_string()
+                .contains("2 different")
+        );
     }
 }

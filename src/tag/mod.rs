@@ -131,8 +131,8 @@ pub struct TagReport {
     pub sets: Vec<SetReport>,
     /// Median edge length of the mesh, mm.
     pub median_edge_mm: f64,
-    /// One sentence per set that is not to be believed: reason enough for the quality gate to refuse.
-    pub warnings: Vec<String>,
+    /// Each set that is not to be believed: reason enough for the quality gate to refuse.
+    pub warnings: Vec<TagWarning>,
 }
 
 impl TagReport {
@@ -140,6 +140,18 @@ impl TagReport {
     pub fn set(&self, name: &str) -> Option<&SetReport> {
         self.sets.iter().find(|set| set.name == name)
     }
+}
+
+/// Why a set is not to be believed.
+#[derive(Clone, Debug, Error, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum TagWarning {
+    #[error(
+        "boundary set `{set}` has {area_mm2:.0} mm2; adult brains have {low_mm2:.0} to {high_mm2:.0}: check the registration to \
+         MNI and the segmentation around it before believing the simulation"
+    )]
+    Area { set: String, area_mm2: f64, low_mm2: f64, high_mm2: f64 },
 }
 
 /// Why a mesh cannot be tagged.
@@ -214,11 +226,8 @@ pub fn tag_boundary_sets_with(
         let Some(&[low, high]) = settings.plausible_area_mm2.get(&set.name) else { continue };
         set.plausible = (low..=high).contains(&set.area_mm2);
         if !set.plausible {
-            warnings.push(format!(
-                "boundary set `{}` has {:.0} mm2; adult brains have {low:.0} to {high:.0}: check the registration to \
-                 MNI and the segmentation around it before believing the simulation",
-                set.name, set.area_mm2
-            ));
+            let (set, area_mm2) = (set.name.clone(), set.area_mm2);
+            warnings.push(TagWarning::Area { set, area_mm2, low_mm2: low, high_mm2: high });
         }
     }
     Ok(TagReport { sets, median_edge_mm, warnings })

@@ -177,7 +177,7 @@ fn an_area_out_of_range_is_a_warning_and_an_empty_set_an_error() {
     ranges.plausible_area_mm2.retain(|name, _| name == SUPERIOR);
     let report = tag_boundary_sets(&mut mesh, &ranges).unwrap();
     assert!(!report.set(SUPERIOR).unwrap().plausible && report.set(BASE).unwrap().plausible);
-    assert!(report.warnings.len() == 1 && report.warnings[0].contains("`superior`"));
+    assert!(report.warnings.len() == 1 && report.warnings[0].to_string().contains("`superior`"));
 
     let high = mesh.nodes_mm().iter().map(|p| [p[0] + 300.0, p[1], p[2] + 300.0]).collect();
     let mut elsewhere = TetMesh::new(high, mesh.tets().to_vec(), mesh.labels().to_vec()).unwrap();

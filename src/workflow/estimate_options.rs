@@ -30,21 +30,20 @@ pub struct EstimateOptions {
     pub displacement: DisplacementSettings,
     /// Errors of a segmented surface are alike over this distance, mm: nodes nearer to each other count as one.
     pub correlation_mm: f64,
-    /// The element of a patient's body. Plain linear tetrahedra lock: with them grey matter came out a quarter softer.
+    /// The element of a patient's body. Plain linear tetrahedra lock: with them grey matter comes out too soft
+    /// (docs/evidence/estimate.md).
     #[schemars(with = "String")]
     pub element: ElementKind,
-    /// Standard deviation of ln(modulus) that a patient's model adds. Measured on a synthetic patient: from 60,000 to
-    /// 160,000 tetrahedra of one engine the moduli of grey and white matter moved by +14 and -13 %; another engine's mesh of
-    /// 60,000 lay within 7 % of the finer one.
+    /// Standard deviation of ln(modulus) that a patient's mesh and element add, where two meshes do not tell it
+    /// (docs/evidence/choices.md).
     pub model_log_sd: f64,
     /// Solve for a patient in a mesh of a quarter of the tetrahedra as well: what the mesh adds to the moduli is found from
     /// the difference instead of taken from `model_log_sd`.
     pub two_meshes: bool,
-    /// Standard deviation of ln(modulus) that labels and outline of the body add, whatever the mesh (sulci are closed, grey and
-    /// white matter part where the segmentation says): the moduli of patients made by another program, held as assumed, came
-    /// out 1 to 12 % from the truth.
+    /// Standard deviation of ln(modulus) that labels and outline of the body add, whatever the mesh: sulci are closed, grey and
+    /// white matter part where the segmentation says (docs/evidence/choices.md).
     pub labels_log_sd: f64,
-    /// The same where the body slides on a wall, which is not everywhere where it is taken to be: 11 and 27 % on such a patient.
+    /// The same where the body slides on a wall, which is not everywhere where it is taken to be (docs/evidence/estimate.md).
     pub wall_log_sd: f64,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,

@@ -1,6 +1,6 @@
 //! The generative model of brain tissue, from a table of studies to files: fitted, sampled, shown.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, WorkflowError};
 use super::user_file::{read_input, read_text};
 use crate::artefact::{Produced, Stage, StageError, StageOutcome};
 use crate::material::Task;
@@ -24,6 +24,12 @@ use std::path::{Path, PathBuf};
 const VERSION: u32 = 1;
 /// Points over a window: the published table's and, for the tests between laws, the published tests'.
 const TABLE_STRETCHES: usize = 501;
+/// Literature models of the paper's Fig. 3.
+pub(super) const FIGURE_3: [u32; 4] = [44, 52, 60, 62];
+/// Beyond these standard deviations an envelope is no material that anybody has.
+const LEVELS: [f64; 2] = [-6.0, 6.0];
+/// Random materials in one file.
+const MOST_DRAWS: u64 = 1_000_000;
 const TEST_STRETCHES: usize = 101;
 
 /// Studies and the bytes they came from.
@@ -111,6 +117,8 @@ pub fn fit_gp(
     folder: &Path,
     force: bool,
 ) -> Result<GenerativeFiles, WorkflowError> {
+    // Of fewer starts than finalists, all are searched to the end.
+    let settings = &FitSettings { finalists: settings.finalists.min(settings.starts.max(1)), ..*settings };
     let stage = Stage::new("gp-fit", VERSION, folder, &(settings, studies.curves)).seed(settings.seed);
     let outcome = studies.input(stage).run(force, || {
         let data = TrainingData::from_literature(&studies.models, studies.curves);
@@ -136,7 +144,7 @@ pub fn fit_gp(
 /// Which materials of a task are asked for.
 #[derive(Clone, Debug)]
 pub enum Wanted {
-    /// At standard deviations from the mean.
+    /// At standard deviations from the mean; at the paper's nine where none is named.
     Levels(Vec<f64>),
     /// Fitted to random curves.
     Draws {
@@ -149,10 +157,25 @@ pub enum Wanted {
     },
 }
 
+/// The levels that are named, or the paper's nine.
+pub(super) fn levels_asked(named: &[f64]) -> Result<Vec<f64>, AskedError> {
+    let [low, high] = LEVELS;
+    match named.iter().find(|level| !(low..=high).contains(*level)) {
+        Some(&level) => Err(AskedError::Level { level, low, high }),
+        None if named.is_empty() => Ok(nine_levels().to_vec()),
+        None => Ok(named.to_vec()),
+    }
+}
+
+/// Refuses a number of random materials that no file is made of.
+pub(super) fn check_draws(count: u64) -> Result<(), AskedError> {
+    if (1..=MOST_DRAWS).contains(&count) { Ok(()) } else { Err(AskedError::Draws { count, most: MOST_DRAWS }) }
+}
+
 /// Materials of one task and the posterior over the stretch, as CSV into `folder`. `seed` is that of the draws.
 ///
 /// # Errors
-/// A law that cannot be fitted; the disk's.
+/// A level or a number of draws out of range, a law that cannot be fitted; the disk's.
 pub fn sample_gp(
     studies: &Studies,
     task: Task,
@@ -162,9 +185,10 @@ pub fn sample_gp(
     (folder, force): (&Path, bool),
 ) -> Result<GenerativeFiles, WorkflowError> {
     let (how, levels, draws, spread, curves) = match wanted {
-        Wanted::Levels(levels) => ("samples", levels.clone(), None, Spread::Tissue, false),
+        Wanted::Levels(named) => ("samples", levels_asked(named)?, None, Spread::Tissue, false),
         Wanted::Draws { count, spread, curves } => ("draws", vec![], Some(*count), *spread, *curves),
     };
+    draws.map_or(Ok(()), check_draws)?;
     let used = json!({
         "task": task.to_string(), "law": settings.model, "search": settings.meta_model, "curves": studies.curves,
         "stretches": settings.stretches, "levels": levels, "draws": draws, "spread": spread, "write_curves": curves,
@@ -175,7 +199,7 @@ pub fn sample_gp(
     let outcome = studies.input(stage).run(force, || {
         let joint = joint_tissue_prior(task, &studies.models, settings);
         let sampled: Vec<Sampled> = match wanted {
-            Wanted::Levels(levels) => sample_prior(&joint.prior, levels, settings)?
+            Wanted::Levels(_) => sample_prior(&joint.prior, &levels, settings)?
                 .into_iter()
                 .map(|m| Sampled { sd_level: Some(m.sd_level), draw: None, fit: m.fit })
                 .collect(),
@@ -200,8 +224,8 @@ pub fn sample_gp(
     Ok(GenerativeFiles { files, settings: used, facts: facts(outcome)? })
 }
 
-/// The paper's figures, table and tests between the laws, into `folder`; `models` are those of the second figure. The
-/// facts' `text` is the table for a terminal.
+/// The paper's figures, table and tests between the laws, into `folder`; `models` are those of the second figure, the paper's
+/// four where none is named. The facts' `text` is the table for a terminal.
 ///
 /// # Errors
 /// A model that the studies do not hold, a law that cannot be fitted; the disk's.
@@ -212,6 +236,7 @@ pub fn show_gp(
     (folder, force): (&Path, bool),
 ) -> Result<GenerativeFiles, WorkflowError> {
     let settings = SampleSettings { stretches: TABLE_STRETCHES, ..settings.clone() };
+    let models = if models.is_empty() { &FIGURE_3 } else { models };
     let chosen = models.iter().map(|id| studies.model(*id)).collect::<Result<Vec<_>, _>>()?;
     let used = json!({
         "models": models, "curves": studies.curves, "search": settings.meta_model,
@@ -270,5 +295,28 @@ where
         Ok(outcome) => Ok(outcome.manifest.facts),
         Err(StageError::Compute(error)) => Err(error.into()),
         Err(StageError::Write(error)) => Err(error.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_level_means_the_papers_nine_and_one_beyond_six_sd_or_none_at_all_is_refused() {
+        assert_eq!(levels_asked(&[]).unwrap(), nine_levels());
+        assert_eq!(levels_asked(&[-6.0, 0.5, 6.0]).unwrap(), [-6.0, 0.5, 6.0]);
+        for bad in [6.1, -7.0, f64::NAN, f64::INFINITY] {
+            let said = levels_asked(&[0.0, bad]).unwrap_err().to_string();
+            assert!(said.contains(&bad.to_string()) && said.contains("-6 to 6"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_file_holds_one_to_a_million_random_materials() {
+        assert!(check_draws(1).is_ok() && check_draws(1_000_000).is_ok());
+        for count in [0, 1_000_001] {
+            assert_eq!(check_draws(count), Err(AskedError::Draws { count, most: 1_000_000 }));
+        }
     }
 }

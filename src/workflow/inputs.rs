@@ -3,6 +3,7 @@
 use super::error::{InputError, LabelMapError, MaskRole, WorkflowError};
 use super::labels::labels_of_tool;
 use super::user_file::{read_input, read_text, shown};
+use super::warning::{Warning, all_of};
 use super::work::Work;
 use crate::artefact::sha256_hex;
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
@@ -53,7 +54,7 @@ pub fn read_mask_of(
     path: &Path,
     grid: &Grid<Native>,
     options: &ReadOptions,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Mask<Native>, WorkflowError> {
     // What two programs may disagree about an origin.
     const TOLERANCE_MM: f64 = 0.1;
@@ -64,7 +65,7 @@ pub fn read_mask_of(
         return Err(InputError::ImageGrid { path, found, image }.into());
     }
     // Warnings are kept in the case, where no folder's name belongs.
-    warnings.extend(odd.into_iter().map(|w| format!("{}: {w}", shown(path))));
+    warnings.extend(all_of(&shown(path), &odd));
     Ok(mask)
 }
 
@@ -87,7 +88,7 @@ pub(crate) struct Scans {
     /// The post-operative scan.
     pub post: Volume<f32, Post>,
     /// What the reader noticed.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Scans {
@@ -103,8 +104,7 @@ impl Scans {
         if before.volume == after.volume {
             return Err(InputError::SameVoxels { pre: pre.clone(), post: post.clone() }.into());
         }
-        let mut warnings: Vec<String> = before.warnings.iter().map(|w| format!("pre: {w}")).collect();
-        warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
+        let warnings = all_of("pre", &before.warnings).chain(all_of("post", &after.warnings)).collect();
         let (pre, post) = (before.volume.relabelled(), after.volume.relabelled());
         let sums = ScanSums { pre: sha256_hex(&pre_bytes), post: sha256_hex(&post_bytes) };
         Ok(Self { sums, pre, post, warnings })
@@ -225,7 +225,7 @@ fn given_mask(
         return Err(InputError::MaskGrid { role, name, found, pre: pre.dims, post: post.dims }.into());
     };
     for warning in odd {
-        work.tell(|p| p.odd(&name, &warning));
+        work.tell(|p| p.odd(&name, &warning.to_string()));
     }
     Ok((given, bytes))
 }

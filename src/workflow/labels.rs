@@ -66,7 +66,7 @@ fn codes(
 ) -> Result<Volume<u32, Native>, WorkflowError> {
     let (codes, odd) = nifti::decode_codes(bytes, name, options)?;
     for warning in &odd {
-        progress.odd(name, warning);
+        progress.odd(name, &warning.to_string());
     }
     Ok(codes)
 }

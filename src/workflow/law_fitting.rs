@@ -1,6 +1,6 @@
 //! Laws fitted to a laboratory's test in a file, or to a literature model.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, WorkflowError};
 use super::generative::Studies;
 use super::user_file::read_input;
 use crate::material::law::Material;
@@ -63,13 +63,16 @@ pub struct FittedLaw {
 /// Each law fitted to a test, or every one where none is named; `poisson_ratio` is that of the materials.
 ///
 /// # Errors
-/// Points that cannot determine a law.
+/// A ratio out of range, points that cannot determine a law.
 pub fn fit_laws(
     test: &LawTest,
     laws: &[MetaModel],
     poisson_ratio: f64,
     settings: &MetaModelSettings,
 ) -> Result<Vec<FittedLaw>, WorkflowError> {
+    if !(0.0..0.5).contains(&poisson_ratio) {
+        return Err(AskedError::PoissonRatio { poisson_ratio }.into());
+    }
     let laws = if laws.is_empty() { MetaModel::all().collect() } else { laws.to_vec() };
     let fitted = |law: MetaModel| {
         let fit = fit_rheometry(law, &test.points, settings)
@@ -80,4 +83,20 @@ pub fn fit_laws(
         Ok(FittedLaw { fit, parameter_names, parameter_sd, stable_everywhere, material })
     };
     laws.into_iter().map(fitted).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_that_no_material_has_is_refused_before_anything_is_fitted() {
+        // Points that no law could be fitted to.
+        let points = Rheometry { measured: Measured::Energy, stretches: Vec::new(), values_pa: Vec::new() };
+        let test = LawTest { name: "test.csv".to_owned(), points };
+        for poisson_ratio in [0.5, -0.1, f64::NAN] {
+            let refused = fit_laws(&test, &[], poisson_ratio, &MetaModelSettings::default()).unwrap_err();
+            assert!(matches!(refused, WorkflowError::Asked(AskedError::PoissonRatio { .. })), "{refused}");
+        }
+    }
 }

@@ -8,7 +8,7 @@ use super::settings::Settings;
 use super::stages::mesh_outcome;
 use super::user_file::read_input;
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError, write_whole};
+use crate::artefact::{Produced, Stage, StageError, check_writable, write_whole};
 use crate::experiment::outcome::MeshOutcome;
 use crate::geometry::Native;
 use crate::image::{LabelMap, nifti};
@@ -78,6 +78,9 @@ pub fn mesh_file(
     if !FORMATS.contains(&extension.as_str()) {
         return Err(MeshFileError::Output { output: files.output.clone() }.into());
     }
+    for file in [Some(&files.output), files.preview.as_ref()].into_iter().flatten() {
+        check_writable(file)?;
+    }
     let name = files.labels.display().to_string();
     let bytes = read_input(&files.labels)?;
     let (mut posed, tags, programs) = (settings.mesh.clone(), &settings.tag, programs.engines());
@@ -130,7 +133,7 @@ fn make(
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
         match tag_boundary_sets(&mut mesh, tags) {
-            Ok(report) => (sets, refused) = (report.sets, report.warnings),
+            Ok(report) => (sets, refused) = (report.sets, report.warnings.iter().map(ToString::to_string).collect()),
             Err(error) => refused.push(error.to_string()),
         }
     }

@@ -61,6 +61,7 @@ mod stages;
 mod study_level;
 mod synthetic;
 mod user_file;
+mod warning;
 mod warp;
 mod why;
 mod work;
@@ -71,7 +72,7 @@ pub mod results_in_words;
 pub use bundled_pair::{demo, demo_pair_settings, demo_phantom_settings};
 pub use case::Case;
 pub use error::{
-    CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
+    AskedError, CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
     MeshFileError, PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
@@ -90,7 +91,7 @@ pub use patient::Shard;
 pub use plan::{Goal, Step, plan, samples, tissues};
 pub use planned_resection::PlannedResection;
 pub use planned_scan::PlanInputs;
-pub use posed::{Posed, Resection, posed_case, posed_mesh};
+pub use posed::{BodySource, Posed, Resection, posed_case, posed_mesh};
 pub use prediction::predict;
 pub use programs::{Finding, Known, Programs, known};
 pub use progress::{Progress, Shared, Silent, StageEnded};
@@ -106,6 +107,7 @@ pub use stages::{AnatFacts, RegistrationFacts, mesh_outcome};
 pub use study_level::{Expected, fit_study_level, sample_study_level, show_study_level, study_level_file};
 pub use synthetic::{SyntheticFiles, synthetic_patient};
 pub use user_file::{read_input, read_text, shown};
+pub use warning::Warning;
 pub use warp::{PointCounts, Through, Warp, Warped, warp, warp_points};
 pub use why::{Asked, Explained, why};
 pub use work::Place;

@@ -1,7 +1,7 @@
 //! The paper's figures and table in one go: literature, Gaussian process, laws, phantom.
 
 use super::error::WorkflowError;
-use super::generative::{GenerativeFiles, Studies, show_gp};
+use super::generative::{FIGURE_3, GenerativeFiles, Studies, show_gp};
 use super::progress::Progress;
 use super::settings::Settings;
 use super::work::Place;
@@ -16,8 +16,6 @@ use crate::material::statistics::{CostDigits, compare};
 use crate::report::paper::{ModulusBeside, TaskErrors, TestBeside, errors_csv, errors_figure, page, table_1_csv};
 use serde_json::json;
 
-/// Literature models of the paper's Fig. 3.
-const FIGURE_3: [u32; 4] = [44, 52, 60, 62];
 /// Points over a window of the published tests.
 const TEST_STRETCHES: usize = 101;
 /// Where the phantom's case lies.

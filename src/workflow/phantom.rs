@@ -7,6 +7,7 @@ use super::patient::is_present;
 use super::plan;
 use super::stage_name::StageName;
 use super::stages::{self, EstimateInput, SampleMode, Sweep};
+use super::warning::Warning;
 use super::work::{Made, Work};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, SampleOutcome};
@@ -132,7 +133,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
         let mut warnings: Vec<String> = manifests.iter().flat_map(|m| m.warnings.clone()).collect();
         let of_prior: Vec<Sample> = list.iter().filter(|s| s.id != truth.id).cloned().collect();
         if !samples.is_empty() && best != nearest_sample(&of_prior, &truth).map(|s| s.id.clone()) {
-            warnings.push("the best sample is not the one nearest to the reference's moduli".to_owned());
+            warnings.push(Warning::OtherSampleIsBest.to_string());
         }
         let rest = self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]);
         ExperimentOutcome {

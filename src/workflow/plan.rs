@@ -119,8 +119,7 @@ pub fn samples(settings: &Settings, subject: Subject, lesions: &[String]) -> Res
     Ok(list)
 }
 
-/// Tetrahedra of an estimate's mesh: from 60,000 (of the engine `cgal`) to this many the moduli of a synthetic patient moved by +14 and
-/// -13 %, towards what another engine's mesh gave.
+/// Tetrahedra of an estimate's mesh: fewer move the moduli (docs/evidence/choices.md).
 const ESTIMATE_CELLS: usize = 160_000;
 
 impl Goal {

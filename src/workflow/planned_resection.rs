@@ -3,6 +3,7 @@
 use super::error::{PredictError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::user_file::{read_input, shown};
+use super::warning::Warning;
 use crate::experiment::predict::{PlannedError, ellipsoid_mask};
 use crate::geometry::{Native, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
@@ -95,7 +96,7 @@ impl PlannedResection {
         grid: &Grid<Pre>,
         dseg: Option<&Path>,
         options: &ReadOptions,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<Mask<Pre>, WorkflowError> {
         let plan = self.to_string();
         let (mask, volume_mm3) = match self {
@@ -132,7 +133,7 @@ impl PlannedResection {
             if beside > MOST_BESIDE {
                 return Err(PredictError::BesideScan { plan, percent }.into());
             }
-            warnings.push(format!("{plan}: {percent:.0} % of it lie outside the scan and count for nothing"));
+            warnings.push(Warning::PlanBesideScan { plan, percent });
         }
         Ok(mask)
     }
@@ -212,7 +213,7 @@ mod tests {
         stl::encode(&TriMesh { nodes_mm: (0..8).map(node).collect(), triangles: triangles.collect() })
     }
 
-    fn mask_of(plan: &PlannedResection, dseg: Option<&Path>, warnings: &mut Vec<String>) -> Result<Mask<Pre>, String> {
+    fn mask_of(plan: &PlannedResection, dseg: Option<&Path>, warnings: &mut Vec<Warning>) -> Result<Mask<Pre>, String> {
         plan.mask(&grid(), dseg, &ReadOptions::default(), warnings).map_err(|e| e.to_string())
     }
 
@@ -289,6 +290,8 @@ mod tests {
         }
         let mut warnings = Vec::new();
         let partly = sphere(11.0, 13.0);
-        assert!(mask_of(&partly, None, &mut warnings).is_ok() && warnings[0].contains("count for nothing"));
+        assert!(
+            mask_of(&partly, None, &mut warnings).is_ok() && matches!(warnings[..], [Warning::PlanBesideScan { .. }])
+        );
     }
 }

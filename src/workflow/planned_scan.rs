@@ -4,6 +4,7 @@ use super::error::{MaskRole, WorkflowError};
 use super::inputs::{given_labels, given_pose, read_mask_of};
 use super::planned_resection::PlannedResection;
 use super::user_file::{read_input, shown};
+use super::warning::{Warning, all_of};
 use super::work::Work;
 use crate::artefact::sha256_hex;
 use crate::experiment::outcome::RegistrationOutcome;
@@ -48,9 +49,9 @@ pub(crate) struct PlannedScan {
     /// The scan.
     pub pre: Volume<f32, Pre>,
     /// What the reader noticed.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// What is odd about the plan.
-    pub plan_warnings: Vec<String>,
+    pub plan_warnings: Vec<Warning>,
     /// The plan's name for messages.
     pub plan: String,
     /// What is to be taken.
@@ -67,7 +68,7 @@ pub(crate) struct PlannedScan {
 #[derive(Debug, Default)]
 pub(crate) struct Shared {
     /// Where the scan lies, with what was noticed.
-    pub pose: OnceCell<(RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<String>)>,
+    pub pose: OnceCell<(RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<Warning>)>,
     /// Its tissue, and the template carried onto it.
     pub head: OnceCell<(Segmentation<Pre>, AtlasFit<Mni>, Scale)>,
 }
@@ -87,10 +88,10 @@ impl PlannedScan {
         let options = &work.settings.image;
         let bytes = read_input(&inputs.pre)?;
         let scan = nifti::decode(&bytes, &format!("pre-operative scan {}", shown(&inputs.pre)), options)?;
-        let mut warnings: Vec<String> = scan.warnings.iter().map(|w| format!("pre: {w}")).collect();
+        let mut warnings: Vec<Warning> = all_of("pre", &scan.warnings).collect();
         let pre: Volume<f32, Pre> = scan.volume.relabelled();
         let grid: Grid<Native> = pre.grid.relabelled();
-        let mask = |path: &Path, warnings: &mut Vec<String>| -> Result<Mask<Pre>, WorkflowError> {
+        let mask = |path: &Path, warnings: &mut Vec<Warning>| -> Result<Mask<Pre>, WorkflowError> {
             Ok(read_mask_of(path, &grid, options, warnings)?.relabelled())
         };
         let plan = inputs.resection.to_string();

@@ -1,7 +1,7 @@
 //! A body as a case, or a mesh in a file, poses it: what a session that is stepped by hand starts from.
 
 use super::case::Case;
-use super::error::{CaseError, SimulationError, WorkflowError};
+use super::error::{AskedError, CaseError, SimulationError, WorkflowError};
 use super::facts::EstimateFacts;
 use super::progress::Progress;
 use super::settings::{Settings, in_words};
@@ -19,7 +19,7 @@ use crate::layout;
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use nalgebra::UnitQuaternion;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Node sets that hold a mesh that comes without a scenario, where it has them.
 const HOLDING: [&str; 3] = ["base", "falx", "fixed"];
@@ -49,6 +49,34 @@ pub enum Resection {
     Done,
     /// It is still in, under a label of its own: a mesh made for the purpose, with other nodes than the case's.
     Undone,
+}
+
+/// What a body is taken from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BodySource {
+    /// The folder of a case, with or without the tissue that was taken.
+    Case(Resection),
+    /// A mesh in a file, with the scenario in another.
+    Mesh(Option<PathBuf>),
+}
+
+impl BodySource {
+    /// What lies at a path: a folder is a case, a file is a mesh.
+    ///
+    /// # Errors
+    /// A scenario beside a case, which brings its own; tissue to be put back into a mesh, which a case alone knows.
+    pub fn at(path: &Path, scenario: Option<PathBuf>, resection: Resection) -> Result<Self, WorkflowError> {
+        if path.is_dir() {
+            return match scenario {
+                None => Ok(Self::Case(resection)),
+                Some(_) => Err(AskedError::ScenarioOfCase { folder: path.to_path_buf() }.into()),
+            };
+        }
+        match resection {
+            Resection::Done => Ok(Self::Mesh(scenario)),
+            Resection::Undone => Err(AskedError::MeshBeforeResection { mesh: path.to_path_buf() }.into()),
+        }
+    }
 }
 
 /// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are the estimate's, or the
@@ -153,4 +181,26 @@ fn add_materials(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_a_case_a_file_a_mesh_and_neither_takes_what_is_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = folder.path().join("brain.vtu");
+        let scenario = || Some(PathBuf::from("s.toml"));
+        let at = |path: &Path, scenario, resection| BodySource::at(path, scenario, resection);
+        for resection in [Resection::Done, Resection::Undone] {
+            assert_eq!(at(folder.path(), None, resection).unwrap(), BodySource::Case(resection));
+            let refused = at(folder.path(), scenario(), resection).unwrap_err();
+            assert!(matches!(refused, WorkflowError::Asked(AskedError::ScenarioOfCase { .. })), "{refused}");
+        }
+        assert_eq!(at(&mesh, scenario(), Resection::Done).unwrap(), BodySource::Mesh(scenario()));
+        assert_eq!(at(&mesh, None, Resection::Done).unwrap(), BodySource::Mesh(None));
+        let refused = at(&mesh, None, Resection::Undone).unwrap_err().to_string();
+        assert!(refused.contains("brain.vtu") && refused.contains("label 5"), "{refused}");
+    }
 }

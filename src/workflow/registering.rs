@@ -1,9 +1,10 @@
 //! One image in a file registered rigidly to another, or to the template.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, InputError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::settings::Settings;
 use super::user_file::read_input;
+use super::warning::{Warning, all_of};
 use crate::artefact::{check_writable, write_whole};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
@@ -30,6 +31,26 @@ pub enum Onto {
     },
 }
 
+impl Onto {
+    /// What a word names: the template for `MNI`, unless a file is called so; an image for any other.
+    ///
+    /// # Errors
+    /// Masks beside the template.
+    pub fn named(
+        fixed: PathBuf,
+        moving_mask: Option<PathBuf>,
+        fixed_mask: Option<PathBuf>,
+    ) -> Result<Self, WorkflowError> {
+        if !fixed.as_os_str().eq_ignore_ascii_case("mni") || fixed.exists() {
+            return Ok(Self::Image { fixed, moving_mask, fixed_mask });
+        }
+        if moving_mask.is_some() || fixed_mask.is_some() {
+            return Err(AskedError::MasksOfTemplate.into());
+        }
+        Ok(Self::Template)
+    }
+}
+
 /// The files of a registration.
 #[derive(Clone, Debug)]
 pub struct RegisterFiles {
@@ -51,7 +72,7 @@ pub struct Registered {
     /// How well the images agree.
     pub quality: FitQuality,
     /// What a reader must know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Why the quality gate refuses it.
     #[serde(skip)]
     pub refused: Vec<String>,
@@ -62,6 +83,9 @@ pub struct Registered {
 /// # Errors
 /// An image or mask that cannot be used, images that cannot be registered, the disk's.
 pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Registered, WorkflowError> {
+    if files.output.is_dir() {
+        return Err(InputError::Folder { path: files.output.clone() }.into());
+    }
     let transform = match files.output.extension() {
         Some(e) if e != "tfm" => files.output.clone(),
         _ => files.output.with_extension("txt"),
@@ -79,20 +103,20 @@ pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Regi
     let (found, quality, doubts) = match &files.onto {
         Onto::Template => parts(pose_of_head(&moving).map_err(refused)?),
         Onto::Image { fixed, moving_mask, fixed_mask } => {
-            let mask = |path: &Option<PathBuf>, of: &Volume<f32, Native>, warnings: &mut Vec<String>| {
+            let mask = |path: &Option<PathBuf>, of: &Volume<f32, Native>, warnings: &mut Vec<Warning>| {
                 path.as_deref().map(|path| read_mask_of(path, &of.grid, &settings.image, warnings)).transpose()
             };
             let moving_mask = mask(moving_mask, &moving, &mut warnings)?;
             let (fixed, fixed_bytes) = image(fixed, settings, &mut warnings)?;
             if fixed_bytes == moving_bytes {
-                warnings.push("both files hold the same bytes: was one image given twice?".to_owned());
+                warnings.push(Warning::SameBytes);
             }
             let fixed_mask = mask(fixed_mask, &fixed, &mut warnings)?;
             let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
             parts(register_rigid(&moving, &fixed, masks, &settings.register).map_err(refused)?)
         }
     };
-    warnings.extend(doubts.iter().map(ToString::to_string));
+    warnings.extend(doubts.iter().cloned().map(Warning::from));
     write_whole(&transform, to_matrix_text(&found).as_bytes())?;
     write_whole(&itk_transform, to_itk_text(&found).as_bytes()).inspect_err(|_| {
         // Both or neither.
@@ -111,11 +135,29 @@ fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Nat
 fn image(
     path: &Path,
     settings: &Settings,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<(Volume<f32, Native>, Vec<u8>), WorkflowError> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
     let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &settings.image)?;
-    warnings.extend(odd.into_iter().map(|w| format!("{name}: {w}")));
+    warnings.extend(all_of(&name, &odd));
     Ok((volume, bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_word_mni_is_the_template_which_takes_no_masks_and_any_other_an_image() {
+        for word in ["MNI", "mni"] {
+            assert!(matches!(Onto::named(word.into(), None, None), Ok(Onto::Template)));
+            for masks in [(Some("m.nii".into()), None), (None, Some("m.nii".into()))] {
+                let refused = Onto::named(word.into(), masks.0, masks.1).unwrap_err();
+                assert!(matches!(refused, WorkflowError::Asked(AskedError::MasksOfTemplate)), "{refused}");
+            }
+        }
+        let masked = Onto::named("pre.nii".into(), None, Some("m.nii".into()));
+        assert!(matches!(masked, Ok(Onto::Image { fixed_mask: Some(_), .. })));
+    }
 }

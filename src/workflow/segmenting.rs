@@ -1,10 +1,11 @@
 //! One T1 in a file to a label map.
 
-use super::error::WorkflowError;
+use super::error::{AskedError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::user_file::read_input;
+use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
@@ -36,24 +37,28 @@ pub struct Segmented {
     /// Mean brightness of CSF, grey and white matter.
     pub tissue_means: [f64; 3],
     /// What a reader must know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Labels a scan.
 ///
 /// # Errors
-/// A scan or mask that cannot be used, a head that cannot be labelled, the disk's.
+/// A name for the labels that does not end in .nii.gz, a scan or mask that cannot be used, a head that cannot be labelled, the disk's.
 pub fn segment_file(
     files: &SegmentFiles,
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<Segmented, WorkflowError> {
     for path in [Some(&files.output), files.write_brain_mask.as_ref()].into_iter().flatten() {
+        if !path.to_string_lossy().ends_with(".nii.gz") {
+            return Err(AskedError::PackedNifti { output: path.clone() }.into());
+        }
         check_writable(path)?;
     }
     let name = files.t1.display().to_string();
     let read = nifti::decode(&read_input(&files.t1)?, &name, &settings.image)?;
-    let (t1, mut warnings) = (read.volume, read.warnings);
+    let t1 = read.volume;
+    let mut warnings: Vec<Warning> = read.warnings.into_iter().map(Warning::from).collect();
     let own = files.brain_mask.as_deref();
     let own = own.map(|path| read_mask_of(path, &t1.grid, &settings.image, &mut warnings)).transpose()?;
 
@@ -76,8 +81,8 @@ pub fn segment_file(
     if let Some(path) = &files.write_brain_mask {
         write_whole(path, &brain)?;
     }
-    warnings.extend(fit.warnings.iter().map(ToString::to_string));
-    warnings.extend(found.warnings.iter().map(ToString::to_string));
+    warnings.extend(fit.warnings.into_iter().map(Warning::from));
+    warnings.extend(found.warnings.into_iter().map(Warning::from));
     let labels = files.output.clone();
     Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, warnings })
 }

@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::settings::in_words;
 use super::user_file::{read_input, read_text};
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError};
+use crate::artefact::{Produced, Stage, StageError, check_writable};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
     self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
@@ -65,7 +65,7 @@ pub struct Simulation {
     /// The record of a motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
-    /// What a reader must know.
+    /// What a reader must know, in sentences.
     pub warnings: Vec<String>,
 }
 
@@ -79,6 +79,7 @@ pub fn simulate(
     progress: &mut dyn Progress,
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
+    check_writable(&files.output)?;
     let mesh_bytes = read_input(&files.mesh)?;
     let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
@@ -230,7 +231,7 @@ fn produced(
         contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
-        warnings: outcome.warnings.clone(),
+        warnings: outcome.warnings.iter().map(ToString::to_string).collect(),
     };
     let bytes = vtu::encode(mesh, &points, &cells).map_err(refused(&output))?;
     files.push((output, bytes));
@@ -238,5 +239,6 @@ fn produced(
         let list: Vec<(f64, &str)> = series.iter().map(|(time, file)| (*time, file.as_str())).collect();
         files.push((name.clone(), pvd::encode(&list)));
     }
-    Ok(Produced { files, warnings: outcome.warnings, facts: facts(&summary) })
+    let facts = facts(&summary);
+    Ok(Produced { files, warnings: summary.warnings, facts })
 }

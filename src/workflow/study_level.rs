@@ -1,7 +1,7 @@
 //! The study-level model of brain tissue, from a table of studies to files: fitted, sampled, shown.
 
 use super::error::WorkflowError;
-use super::generative::{GenerativeFiles, Studies, facts};
+use super::generative::{GenerativeFiles, Studies, check_draws, facts, levels_asked};
 use super::user_file::read_text;
 use crate::artefact::{Produced, Stage};
 use crate::material::Task;
@@ -98,7 +98,7 @@ fn person_moduli(evidence: &Evidence, spreads: &Spreads, seed: u64, curves: Curv
 /// Which materials of a task are asked of the study-level model.
 #[derive(Clone, Debug)]
 pub enum Expected {
-    /// At standard deviations from the mean.
+    /// At standard deviations from the mean; at the paper's nine where none is named.
     Levels(Vec<f64>),
     /// Fitted to random functions.
     Draws {
@@ -112,7 +112,7 @@ pub enum Expected {
 /// Materials of one task and the prediction over the stretch, as CSV into `folder`. `seed` is that of the draws.
 ///
 /// # Errors
-/// A law that cannot be fitted; the disk's.
+/// A level or a number of draws out of range, a law that cannot be fitted; the disk's.
 pub fn sample_study_level(
     studies: &Studies,
     (task, of): (Task, Of),
@@ -122,9 +122,10 @@ pub fn sample_study_level(
     (folder, force): (&Path, bool),
 ) -> Result<GenerativeFiles, WorkflowError> {
     let (how, levels, draws, curves) = match wanted {
-        Expected::Levels(levels) => ("levels", levels.clone(), None, false),
+        Expected::Levels(named) => ("levels", levels_asked(named)?, None, false),
         Expected::Draws { count, curves } => ("draws", vec![], Some(*count), *curves),
     };
+    draws.map_or(Ok(()), check_draws)?;
     let used = json!({
         "model": "study-level", "task": task.to_string(), "of": of, "law": settings.model,
         "search": settings.meta_model, "curves": studies.curves, "stretches": settings.stretches, "levels": levels,
@@ -136,7 +137,7 @@ pub fn sample_study_level(
         let (spreads, evidence) = model(&publications(studies), spreads)?;
         let prior = over_window(&evidence, &spreads, task, of, settings.stretches);
         let sampled: Vec<Sampled> = match wanted {
-            Expected::Levels(levels) => materials_at_levels(&prior, levels, settings)?
+            Expected::Levels(_) => materials_at_levels(&prior, &levels, settings)?
                 .into_iter()
                 .map(|m| Sampled { sd_level: Some(m.sd_level), draw: None, fit: m.fit })
                 .collect(),

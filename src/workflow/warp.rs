@@ -4,7 +4,7 @@ use super::case::Case;
 use super::error::{WarpError, WorkflowError};
 use super::maps::{Map, Part, WarpTo};
 use super::user_file::{read_input, shown};
-use crate::artefact::write_whole;
+use crate::artefact::{check_writable, write_whole};
 use crate::experiment::field::{Between, looks_like_labels, seen_through};
 use crate::geometry::{Native, Position};
 use crate::image::Volume;
@@ -103,6 +103,7 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
     if !output.to_ascii_lowercase().ends_with(ending) {
         return Err(WarpError::Ending { file: name, output, ending }.into());
     }
+    check_writable(&asked.output)?;
     let bytes = read_input(&asked.file)?;
     let part = if image { Part::Images } else { Part::Points };
     let map = || match &asked.through {

@@ -457,7 +457,9 @@ fn a_replay_gives_the_same_bytes_with_one_and_two_threads() {
     assert_eq!(written.point_field("displacement").unwrap().vectors().unwrap(), halfway);
     let words = ["live", "block.vtu", "s.toml", "--replay", "session.jsonl", "-o", "never.vtu", "--every", "25"];
     let ended = Process::new(program()).current_dir(folder.path()).args(words).output().unwrap();
-    assert_eq!((ended.status.code(), at("never.vtu").exists()), (Some(3), false));
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!((ended.status.code(), at("never.vtu").exists()), (Some(3), false), "{said}");
+    assert!(["never.vtu", ".pvd", "--every"].iter().all(|word| said.contains(word)), "{said}");
 
     // What is no recording, or of something else, is refused and writes nothing.
     let text = recording.to_text();

@@ -205,3 +205,23 @@ fn options_of_the_other_generative_model_are_refused_by_name() {
     }
     assert!(!Path::new(out).exists(), "nothing half-written");
 }
+
+#[test]
+fn values_out_of_range_are_refused_with_the_option_that_takes_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("gp");
+    let out = out.to_str().unwrap();
+    let study_level = ["--model", "study-level"];
+    for (arguments, words) in [
+        (&["gp", "sample", "-o", out, "--levels", "0,7"][..], ["7", "-6 to 6", "--levels"]),
+        (&["gp", "sample", "-o", out, "--draws", "0"], ["0", "1 to 1000000", "--draws"]),
+        (&[&["gp", "sample", "-o", out, "--levels=-9"], &study_level[..]].concat(), ["-9", "-6 to 6", "--levels"]),
+        (&[&["gp", "sample", "-o", out, "--draws", "0"], &study_level[..]].concat(), ["0", "1 to 1000000", "--draws"]),
+        (&["law", "fit", "--literature", "40", "--poisson-ratio", "0.5"], ["0.5", "below 0.5", "--poisson-ratio"]),
+    ] {
+        let (code, said) = refusal(arguments);
+        assert_eq!(code, Some(3), "{said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{said}");
+    }
+    assert!(!Path::new(out).exists(), "nothing half-written");
+}

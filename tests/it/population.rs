@@ -99,7 +99,7 @@ fn slow_a_cohort_is_the_prior_of_the_next_estimate_and_nothing_stale_is_used_aga
     // A population of another law is no prior of this one.
     let other = output(&["estimate", case.to_str().unwrap(), "--population", file, "--config", &ogden(folder.path())]);
     assert_eq!(other.status.code(), Some(3));
-    assert!(said(&other).contains("--law neo-hookean"), "{}", said(&other));
+    assert!(said(&other).contains("`law = \"neo-hookean\"` in the table [prior]"), "{}", said(&other));
 }
 
 fn ogden(folder: &Path) -> String {

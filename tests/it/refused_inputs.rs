@@ -214,3 +214,20 @@ fn folders_of_another_kind_are_named_for_what_they_are() {
     let message = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert!(ended.status.code() == Some(3) && message.contains("this is a phantom"), "{message}");
 }
+
+#[test]
+fn words_that_do_not_go_together_are_refused_with_the_option_to_leave_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (inside, out) = (folder.path().to_str().unwrap(), path("out"));
+    let scan = sample("pre.nii.gz").display().to_string();
+    for (arguments, words) in [
+        (&["live", inside, "s.toml"][..], &["own scenario", "SCENARIO"][..]),
+        (&["live", &path("brain.vtu"), "--before-resection"], &["brain.vtu", "label 5", "--before-resection"]),
+        (&["segment", &scan, "-o", &path("out")], &["out", ".nii.gz", "--write-brain-mask"]),
+        (&["register", &scan, "MNI", "--moving-mask", "m.nii.gz", "-o", &out], &["template", "--moving-mask"]),
+        (&["register", &scan, &scan, "-o", inside], &["is a folder", "name a file"]),
+    ] {
+        refuses(arguments, "", words, &out);
+    }
+}

@@ -37,13 +37,12 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut flags = Layer::default();
     flags.set("gp.rank", args.rank);
     flags.set("gp.starts", args.starts);
-    let mut settings = session.settings(flags)?.gp;
-    settings.finalists = settings.finalists.min(settings.starts.max(1));
+    let settings = session.settings(flags)?.gp;
     let studies = args.studies.read()?;
     let made = fit_gp(&studies, &settings, &args.output, session.options.force)?;
     let (facts, file) = (made.facts, made.files[0].display().to_string());
     let text = results_in_words::fitted_process(&facts, settings.rank) + &file;
-    session.emit(&json!({ "hyperparameters": file, "settings": settings, "fit": facts }), &text)
+    session.emit(&json!({ "hyperparameters": file, "settings": made.settings, "fit": facts }), &text)
 }
 
 fn study_level(args: &Args, session: &Session) -> Result<(), Failure> {

@@ -4,12 +4,11 @@ use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with
 use crate::cli::{Failure, Session};
 use crate::manual::help::laws;
 use crate::material::Task;
-use crate::material::generative::{GenerativeModel, SampleSettings, nine_levels};
+use crate::material::generative::{GenerativeModel, SampleSettings};
 use crate::material::gp::Spread;
 use crate::material::meta_model::MetaModel;
 use crate::material::study_level::Of;
 use crate::workflow::{Expected, GenerativeFiles, Wanted, results_in_words, sample_gp, sample_study_level};
-use anyhow::anyhow;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -58,13 +57,6 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
-    let levels = if args.levels.is_empty() { nine_levels().to_vec() } else { args.levels.clone() };
-    if let Some(bad) = levels.iter().find(|level| level.is_nan() || level.abs() > 6.0) {
-        return Err(Failure::Rejected(anyhow!("--levels {bad}: give standard deviations from -6 to 6")));
-    }
-    if let Some(draws) = args.draws.filter(|draws| *draws == 0 || *draws > 1_000_000) {
-        return Err(Failure::Rejected(anyhow!("--draws {draws}: give 1 to 1000000")));
-    }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
     if args.model.get() == GenerativeModel::StudyLevel {
@@ -72,7 +64,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let own = args.hyperparameters.study_level()?;
         let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };
         let wanted = match args.draws {
-            None => Expected::Levels(levels),
+            None => Expected::Levels(args.levels.clone()),
             Some(count) => Expected::Draws { count, curves: args.curves },
         };
         let what = (args.task, args.of.unwrap_or_default());
@@ -83,7 +75,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let hyperparameters = args.hyperparameters.read()?;
     let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };
     let wanted = match args.draws {
-        None => Wanted::Levels(levels),
+        None => Wanted::Levels(args.levels.clone()),
         Some(count) => Wanted::Draws { count, spread: args.spread.unwrap_or_default(), curves: args.curves },
     };
     emit(sample_gp(&studies, args.task, &wanted, &settings, seed, place)?, seed, session)

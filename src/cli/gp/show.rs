@@ -31,9 +31,6 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// The paper's Fig. 3.
-const MODELS: [u32; 4] = [44, 52, 60, 62];
-
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
     if args.model.get() == GenerativeModel::StudyLevel {
@@ -42,10 +39,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let made = show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?;
         return emit(made, session);
     }
-    let models = if args.models.is_empty() { &MODELS } else { args.models.as_slice() };
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters: args.hyperparameters.read()?, ..base };
-    let made = show_gp(&studies, models, &settings, (&args.output, session.options.force))?;
+    let made = show_gp(&studies, &args.models, &settings, (&args.output, session.options.force))?;
     emit(made, session)
 }
 

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 /// How far a displacement seen in the images is believed; the table `[estimate.displacement]` of the settings.
 ///
-/// Depth was chosen on synthetic patients of seeds 1 to 3 (`hgm synth --sag fem`), whose displacement is known. Noise and
-/// length are what the registration shows of a pair that has not moved, and what is left of the noise is what it shows of pairs
-/// whose displacement is known (docs/evidence/estimate.md).
+/// Depth was chosen on synthetic patients, whose displacement is known (docs/evidence/choices.md). Noise and length are what the
+/// registration shows of a pair that has not moved, and what is left of the noise what it shows of pairs whose displacement is known
+/// (docs/evidence/estimate.md).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisplacementSettings {

@@ -1,7 +1,7 @@
 //! What the rigid registration has left or taken up: a small turn and shift of everything, estimated along with the moduli.
 //!
-//! Rigid registration of whole heads takes up a part of the brain's shift (.06 to .13 mm of a shift of 2 to 5 mm on patients
-//! made by another program), and no later step takes that out.
+//! Rigid registration of whole heads takes up a part of the brain's shift (docs/evidence/choices.md), and no later step takes that
+//! out.
 
 use super::projection::Projection;
 use super::{Forward, Linearisation, LogPrior, Scale};

@@ -17,7 +17,7 @@ const SWEEPS: usize = 24;
 const COARSEST_SWEEPS: usize = 200;
 /// A level is not halved below this many voxels along an axis.
 const SMALLEST: usize = 6;
-/// Voxels that one thread does alone.
+/// Voxels that one thread does alone, and those of a chunk of memory.
 const FEW: usize = 1 << 14;
 /// Over-relaxation of a sweep.
 const OVER: f32 = 1.9;
@@ -44,50 +44,100 @@ pub fn continued<const N: usize>(
         let coarse = continued(coarse_dims, spacing_mm.map(|h| 2.0 * h), &coarse_place, coarse_values);
         fill(dims, coarse_dims, place, &coarse, &mut values);
     }
-    let weight = spacing_mm.map(|h| (1.0 / (h * h)) as f32);
-    let stride = [1, dims[0], dims[0] * dims[1]];
-    let mut colours: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
-    for (n, _) in place.iter().enumerate().filter(|(_, p)| **p == Place::Free) {
-        let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
-        colours[(v[0] + v[1] + v[2]) % 2].push(n as u32);
-    }
+    let lattice = Lattice::new(dims, spacing_mm);
+    let colours = lattice.colours(place);
+    let mut renewed = Vec::new();
     let sweeps = if coarsest { COARSEST_SWEEPS } else { SWEEPS };
     for sweep in 0..sweeps {
         // The last sweeps without over-relaxation leave no ripples.
         let over = if sweep + 4 < sweeps { OVER } else { 1.0 };
         for colour in &colours {
-            let renew = |&n: &u32| -> [f32; N] {
-                let n = n as usize;
-                let v = [n % dims[0], n / dims[0] % dims[1], n / stride[2]];
-                let (mut sum, mut total) = ([0f32; N], 0f32);
-                for a in 0..3 {
-                    let mut add = |m: usize| {
-                        for (s, x) in sum.iter_mut().zip(&values[m]) {
-                            *s += weight[a] * x;
-                        }
-                        total += weight[a];
-                    };
-                    if v[a] > 0 {
-                        add(n - stride[a]);
-                    }
-                    if v[a] + 1 < dims[a] {
-                        add(n + stride[a]);
-                    }
-                }
-                std::array::from_fn(|c| values[n][c] + over * (sum[c] / total - values[n][c]))
-            };
-            // Few are done before other threads have woken.
-            let renewed: Vec<[f32; N]> = if colour.len() < FEW {
-                colour.iter().map(renew).collect()
-            } else {
-                colour.par_iter().map(renew).collect()
-            };
-            for (&n, value) in colour.iter().zip(renewed) {
-                values[n as usize] = value;
-            }
+            lattice.relax(colour, over, &mut values, &mut renewed);
         }
     }
     values
+}
+
+/// A grid's neighbours and what each of them weighs.
+struct Lattice {
+    dims: [usize; 3],
+    stride: [usize; 3],
+    weight: [f32; 3],
+    /// The weights together, by which neighbours there are.
+    total: [f32; 64],
+}
+
+/// Free voxels no two of which are neighbours, in the order of memory.
+#[derive(Default)]
+struct Colour {
+    voxels: Vec<u32>,
+    /// Which of the six neighbours lie on the grid, a bit each: below and above along each axis.
+    neighbours: Vec<u8>,
+    /// Where the voxels of each chunk of memory begin.
+    begins: Vec<usize>,
+}
+
+impl Lattice {
+    fn new(dims: [usize; 3], spacing_mm: [f64; 3]) -> Self {
+        let weight = spacing_mm.map(|h| (1.0 / (h * h)) as f32);
+        let of = |neighbours: usize| (0..6).filter(|bit| neighbours >> bit & 1 == 1).map(|bit| weight[bit / 2]).sum();
+        Self { dims, stride: [1, dims[0], dims[0] * dims[1]], weight, total: std::array::from_fn(of) }
+    }
+
+    fn colours(&self, place: &[Place]) -> [Colour; 2] {
+        let mut colours = [Colour::default(), Colour::default()];
+        for (n, _) in place.iter().enumerate().filter(|(_, p)| **p == Place::Free) {
+            let v = [n % self.dims[0], n / self.dims[0] % self.dims[1], n / self.stride[2]];
+            let bits = |a: usize| u8::from(v[a] > 0) | u8::from(v[a] + 1 < self.dims[a]) << 1;
+            let colour = &mut colours[(v[0] + v[1] + v[2]) % 2];
+            colour.voxels.push(n as u32);
+            colour.neighbours.push(bits(0) | bits(1) << 2 | bits(2) << 4);
+        }
+        for colour in &mut colours {
+            let before = |first: usize| colour.voxels.partition_point(|&n| (n as usize) < first);
+            colour.begins = (0..=place.len().div_ceil(FEW)).map(|chunk| before(chunk * FEW)).collect();
+        }
+        colours
+    }
+
+    /// One sweep over a colour; `renewed` is its memory.
+    fn relax<const N: usize>(&self, colour: &Colour, over: f32, values: &mut [[f32; N]], renewed: &mut Vec<[f32; N]>) {
+        let renew = |(&n, &neighbours): (&u32, &u8)| -> [f32; N] {
+            let n = n as usize;
+            let mut sum = [0f32; N];
+            for a in 0..3 {
+                let mut add = |m: usize| {
+                    for (s, x) in sum.iter_mut().zip(&values[m]) {
+                        *s += self.weight[a] * x;
+                    }
+                };
+                if neighbours >> (2 * a) & 1 == 1 {
+                    add(n - self.stride[a]);
+                }
+                if neighbours >> (2 * a) & 2 == 2 {
+                    add(n + self.stride[a]);
+                }
+            }
+            let total = self.total[usize::from(neighbours)];
+            std::array::from_fn(|c| values[n][c] + over * (sum[c] / total - values[n][c]))
+        };
+        // Few are done before other threads have woken.
+        if colour.voxels.len() < FEW {
+            renewed.clear();
+            renewed.extend(colour.voxels.iter().zip(&colour.neighbours).map(renew));
+            for (&n, value) in colour.voxels.iter().zip(renewed.iter()) {
+                values[n as usize] = *value;
+            }
+            return;
+        }
+        colour.voxels.par_iter().zip(&colour.neighbours).map(renew).collect_into_vec(renewed);
+        values.par_chunks_mut(FEW).enumerate().for_each(|(chunk, values)| {
+            let those = colour.begins[chunk]..colour.begins[chunk + 1];
+            for (&n, value) in colour.voxels[those.clone()].iter().zip(&renewed[those]) {
+                values[n as usize - chunk * FEW] = *value;
+            }
+        });
+    }
 }
 
 /// The grid of half as many voxels: known where a known voxel lies within, with the mean of those.

@@ -10,6 +10,7 @@ use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix4, Point3, Vector3};
+use rayon::prelude::*;
 
 /// Steps of a vector's components, mm: far below what any of it is worth, so that files pack well.
 const STEP_MM: f64 = 1.0 / 512.0;
@@ -84,7 +85,6 @@ pub fn shift_field(
         .collect();
     let mut known = in_tetrahedra(state.tets, &nodes, &values, &grid);
     if let Some(seen) = seen {
-        use rayon::prelude::*;
         let mni_from_pre = pre_from_mni.inverse();
         known.par_iter_mut().enumerate().for_each(|(n, value)| {
             let Some(value) = value else { return };
@@ -111,29 +111,25 @@ fn from_tissue(
     let tissue = |n: usize| known[n].is_some() && !resected.data[n];
     let head = Mask::from_fn(grid, |n| brain.data[n] || known[n].is_some());
     let reached = dilate(&head, settings.fall_mm);
-    let place: Vec<Place> =
-        (0..grid.len()).map(|n| if tissue(n) || !reached.data[n] { Place::Known } else { Place::Free }).collect();
-    let values: Vec<[f32; 5]> =
-        (0..grid.len()).map(|n| if tissue(n) { known[n].unwrap_or_default() } else { [0.0; 5] }).collect();
+    let place_of = |n: usize| if tissue(n) || !reached.data[n] { Place::Known } else { Place::Free };
+    let place: Vec<Place> = (0..grid.len()).into_par_iter().map(place_of).collect();
+    let value_of = |n: usize| if tissue(n) { known[n].unwrap_or_default() } else { [0.0; 5] };
+    let values = (0..grid.len()).into_par_iter().map(value_of).collect();
     let values = continued(grid.dims, grid.spacing_mm(), &place, values);
-    let field = Volume::from_data(grid, values.iter().map(|v| [v[0], v[1], v[2]]).collect());
-    let mut mended = mended(field, settings.jacobian_least);
-    for v in &mut mended.field.data {
-        *v = v.map(rounded);
-    }
-    let changed = (0..grid.len()).filter(|&n| tissue(n) && mended.changed[n]).count();
-    let inside = |n: usize, v: f32| if resected.data[n] { 0.0 } else { rounded(v) };
+    let mut mended = mended(Volume::from_fn(grid, |n| [0, 1, 2].map(|c| values[n][c])), settings.jacobian_least);
+    mended.field.data.par_iter_mut().for_each(|v| *v = v.map(rounded));
+    let changed = (0..grid.len()).into_par_iter().filter(|&n| tissue(n) && mended.changed[n]).count();
+    let inside = |n: usize, v: f32| if resected.data[n] { 0.0 } else { rounded(v.max(0.0)) };
+    let component = |c: usize| values.par_iter().enumerate().map(|(n, v)| inside(n, v[c])).collect();
     let mut inverse = inverse(&mended.field);
-    for v in &mut inverse.data {
-        *v = v.map(rounded);
-    }
+    inverse.data.par_iter_mut().for_each(|v| *v = v.map(rounded));
     ShiftField {
         whole,
         first,
         inverse,
-        sd_mm: values.iter().enumerate().map(|(n, v)| inside(n, v[3].max(0.0))).collect(),
-        reach95_mm: values.iter().enumerate().map(|(n, v)| inside(n, v[4].max(0.0))).collect(),
-        believed: (0..grid.len()).map(|n| tissue(n) && !mended.changed[n]).collect(),
+        sd_mm: component(3),
+        reach95_mm: component(4),
+        believed: (0..grid.len()).into_par_iter().map(|n| tissue(n) && !mended.changed[n]).collect(),
         jacobian_min: mended.jacobian_min,
         changed,
         forward: mended.field,

@@ -69,7 +69,8 @@ impl PopulationPrior {
         }
         if self.law != law {
             return Err(format!(
-                "`population` was learnt with the law {}, and this job's is {law}: give --law {}, or leave the population out",
+                "`population` was learnt with the law {}, and this job's is {law}: give `law = \"{}\"` in the table [prior], or leave \
+                 the population out",
                 self.law, self.law
             ));
         }

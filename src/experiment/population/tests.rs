@@ -234,7 +234,7 @@ fn the_same_patients_give_the_same_bytes_in_any_order_and_on_one_thread() {
 fn a_prior_learnt_under_another_law_or_density_is_refused() {
     let prior = file(moments(&cohort(40, 4))).prior();
     assert_eq!(prior.check(MetaModel::NEO_HOOKEAN, 100.0), Ok(()));
-    assert!(prior.check(MetaModel::OGDEN, 100.0).unwrap_err().contains("--law neo-hookean"));
+    assert!(prior.check(MetaModel::OGDEN, 100.0).unwrap_err().contains("`law = \"neo-hookean\"` in the table [prior]"));
     assert!(prior.check(MetaModel::NEO_HOOKEAN, 200.0).unwrap_err().contains("200"));
     assert_eq!(PopulationPrior::none().check(MetaModel::OGDEN, 1.0), Ok(()));
 }

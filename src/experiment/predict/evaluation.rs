@@ -3,6 +3,7 @@
 use super::score::Scores;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A prediction against what was seen. Lengths in mm, displacements in the pre-operative scanner's frame, RAS+.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -88,42 +89,68 @@ impl TakenAgainstPlan {
     }
 }
 
+/// What the figures of an evaluation do not say by themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum EvaluationLimit {
+    /// One patient was compared, however many places.
+    #[error(
+        "The places of one brain move together: one patient says little about how often the reach holds. Many patients do."
+    )]
+    OnePatient,
+    /// Nothing can be told from so little.
+    #[error(
+        "What was seen ({seen_mm:.2} mm) is smaller than its own error ({error_mm:.2} mm): this operation moved too little, or was \
+         seen too poorly, to judge the forecast by."
+    )]
+    WithinError {
+        /// Root mean square of what was seen.
+        seen_mm: f64,
+        /// Median of its standard deviation.
+        error_mm: f64,
+    },
+    /// The operation was not the one that was planned.
+    #[error(
+        "Other tissue was taken ({:.1} cc) than was planned ({:.1} cc; they agree to {:.2} of 1): part of the difference is the \
+         plan's.",
+        .0.taken_cc, .0.planned_cc, .0.dice
+    )]
+    OtherOperation(TakenAgainstPlan),
+    /// What is taken for true holds a model itself.
+    #[error(
+        "The fused state holds a model of the same kind as the prediction: where the images say little the two agree by \
+         construction. The observed state is of the images alone."
+    )]
+    FusedTruth,
+    /// Landmarks have an error of their own, which is not known.
+    #[error("Landmarks are taken to be without error.")]
+    LandmarksAreTrue,
+}
+
 impl PredictionEvaluation {
     /// Says what the figures do not.
     #[must_use]
     pub fn with_limits(mut self) -> Self {
-        if self.heads.iter().any(|head| head.field.is_some()) {
-            self.limits.push(
-                "The places of one brain move together: one patient says little about how often the reach holds. Many \
-                 patients do."
-                    .to_owned(),
-            );
-        }
-        if let Some(scores) = self.heads.iter().filter_map(|head| head.field).find(Scores::is_within_error) {
-            self.limits.push(format!(
-                "What was seen ({:.2} mm) is smaller than its own error ({:.2} mm): this operation moved too little, or was seen \
-                 too poorly, to judge the forecast by.",
-                scores.seen_rms_mm, scores.seen_sd_median_mm
-            ));
-        }
-        if let Some(taken) = self.taken.filter(TakenAgainstPlan::is_other) {
-            self.limits.push(format!(
-                "Other tissue was taken ({:.1} cc) than was planned ({:.1} cc; they agree to {:.2} of 1): part of the \
-                 difference is the plan's.",
-                taken.taken_cc, taken.planned_cc, taken.dice
-            ));
-        }
-        if self.against.iter().any(|state| state == "fused") {
-            self.limits.push(
-                "The fused state holds a model of the same kind as the prediction: where the images say little the two \
-                 agree by construction. The observed state is of the images alone."
-                    .to_owned(),
-            );
-        }
-        if self.heads.iter().any(|head| head.landmarks.is_some()) {
-            self.limits.push("Landmarks are taken to be without error.".to_owned());
-        }
+        self.limits = self.found_limits().iter().map(ToString::to_string).collect();
         self
+    }
+
+    /// What the figures do not say.
+    pub fn found_limits(&self) -> Vec<EvaluationLimit> {
+        let fields = || self.heads.iter().filter_map(|head| head.field);
+        let within = fields().find(Scores::is_within_error);
+        let within = within.map(|scores| (scores.seen_rms_mm, scores.seen_sd_median_mm));
+        let fused = self.against.iter().any(|state| state == "fused");
+        let landmarks = self.heads.iter().any(|head| head.landmarks.is_some());
+        [
+            fields().next().map(|_| EvaluationLimit::OnePatient),
+            within.map(|(seen_mm, error_mm)| EvaluationLimit::WithinError { seen_mm, error_mm }),
+            self.taken.filter(TakenAgainstPlan::is_other).map(EvaluationLimit::OtherOperation),
+            fused.then_some(EvaluationLimit::FusedTruth),
+            landmarks.then_some(EvaluationLimit::LandmarksAreTrue),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 }
 
@@ -141,8 +168,11 @@ mod tests {
         };
         let other = of(5.0, "fused");
         assert!((other.taken.unwrap().dice - 0.2).abs() < 1e-12);
-        assert!(other.limits.len() == 3 && other.limits[1].contains("Other tissue"), "{:?}", other.limits);
-        assert_eq!(of(18.0, "observed").limits.len(), 1);
+        let said = "Other tissue was taken (30.0 cc) than was planned (20.0 cc; they agree to 0.20 of 1): part of the difference \
+                    is the plan's.";
+        assert!(other.limits.len() == 3 && other.limits[1] == said, "{:?}", other.limits);
+        assert!(other.found_limits().contains(&EvaluationLimit::FusedTruth));
+        assert_eq!(of(18.0, "observed").found_limits(), [EvaluationLimit::OnePatient]);
     }
 
     #[test]

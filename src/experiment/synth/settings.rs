@@ -196,6 +196,11 @@ pub enum SynthError {
 }
 
 impl SynthSettings {
+    /// How thick the post-operative slices are where the voxels get this size: as they are, and never thinner than those.
+    pub fn slices_of_voxels_mm(&self, spacing_mm: f64) -> f64 {
+        self.post_slice_mm.max(spacing_mm)
+    }
+
     /// Checks every range.
     ///
     /// # Errors
@@ -222,6 +227,22 @@ impl SynthSettings {
         match ranges.into_iter().find(|&(_, value, low, high)| !(low..=high).contains(&value)) {
             Some((name, value, low, high)) => Err(SynthError::Setting { name, value, low, high }),
             None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_of_other_voxels_are_never_thinner_than_they_and_thick_ones_stay() {
+        let thick = SynthSettings { post_slice_mm: 4.0, ..SynthSettings::default() };
+        assert_eq!([1.0, 4.0].map(|mm| thick.slices_of_voxels_mm(mm)), [4.0; 2]);
+        for spacing_mm in [0.5, 1.0, 3.0] {
+            let own = SynthSettings::default();
+            let post_slice_mm = own.slices_of_voxels_mm(spacing_mm);
+            assert!(SynthSettings { spacing_mm, post_slice_mm, ..own }.check().is_ok(), "{spacing_mm}");
         }
     }
 }

@@ -12,9 +12,9 @@
 //! barrier against inversion and leaves no mode without energy). Averages do not cross a tissue boundary, where the
 //! pressure jumps. Constant strain is reproduced exactly.
 //!
-//! Chosen by measuring: on brain5k at nu = .49 under gravity quadratic tetrahedra give 4.20 mm rms and linear ones
-//! 2.88; averaging only the volume ratio (Bonet and Burton, 1998) gives 3.76, with half of Psi_0 averaged too 4.13.
-//! Smoothing over edges instead comes as close but has seven nodes per point and three times the matrix.
+//! Chosen by measuring (docs/evidence/choices.md): averaging only the volume ratio (Bonet and Burton, 1998) stays farther from
+//! quadratic tetrahedra than with a part of Psi_0 averaged too. Smoothing over edges instead comes as close but has seven nodes
+//! per point and three times the matrix.
 //!
 //! Forces are the elements' own plus the mean stress of their four corners; the tangent is that of the elements plus
 //! sum_a B_a^T V_a C_a B_a, which is never multiplied out: B_a does not change, C_a is 9 x 9.

@@ -15,8 +15,7 @@ use super::system::Tangent;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Rows of a piece: smaller ones save iterations, larger ones make each cheaper. Measured on 224,000 nodes (one thread, CPU-s and
-/// iterations under gravity): 18.0 and 284 with 110, 16.7 and 327 with 220, 17.3 and 374 with 440.
+/// Rows of a piece: smaller ones save iterations, larger ones make each cheaper (docs/evidence/choices.md).
 const PIECE: usize = 220;
 
 /// What the correction needs to know of the rows.

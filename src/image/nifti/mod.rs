@@ -11,11 +11,13 @@ mod gzip;
 mod header;
 mod mgh;
 mod orientation;
+mod warning;
 mod which;
 
 pub use displacement::{decode_displacement, encode_displacement};
 pub use encode::{encode_f32, encode_i16, encode_intensities, encode_mask, encode_numbers, encode_u8, encode_vectors};
 pub use error::{NiftiError, NiftiProblem};
+pub use warning::NiftiWarning;
 pub use which::Orientation;
 
 use super::volume::{LabelMap, Mask, Volume};
@@ -42,7 +44,7 @@ pub struct NiftiImage {
     /// The scaled intensities on the file's own grid, all finite.
     pub volume: Volume<f32, Native>,
     /// What was odd and read all the same; without the file's name.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<NiftiWarning>,
     /// Voxels that were NaN or infinite and are 0 now.
     pub nonfinite_voxels: usize,
     /// Which affine the grid comes from.
@@ -78,7 +80,7 @@ pub fn decode_labels(
     bytes: &[u8],
     name: &str,
     options: &ReadOptions,
-) -> Result<(LabelMap<Native>, Vec<String>), NiftiError> {
+) -> Result<(LabelMap<Native>, Vec<NiftiWarning>), NiftiError> {
     let image = read(bytes, name, options)?;
     // Scaling in 32 bits leaves 2.9999998 for 3.
     let is_label = |x: f32| (x - x.round()).abs() < 1e-3 && (-0.5..255.5).contains(&x);
@@ -98,7 +100,7 @@ pub fn decode_codes(
     bytes: &[u8],
     name: &str,
     options: &ReadOptions,
-) -> Result<(Volume<u32, Native>, Vec<String>), NiftiError> {
+) -> Result<(Volume<u32, Native>, Vec<NiftiWarning>), NiftiError> {
     let image = read(bytes, name, options)?;
     // Beyond this, 32-bit floats skip whole numbers.
     const LARGEST: f32 = 16_777_216.0;
@@ -115,12 +117,16 @@ pub fn decode_codes(
 ///
 /// # Errors
 /// [`NiftiError`], also for a mask without a voxel inside and for a label map.
-pub fn decode_mask(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<(Mask<Native>, Vec<String>), NiftiError> {
+pub fn decode_mask(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+) -> Result<(Mask<Native>, Vec<NiftiWarning>), NiftiError> {
     let NiftiImage { volume, mut warnings, .. } = read(bytes, name, options)?;
     let soft = volume.data.iter().any(|x| (x - x.round()).abs() > 1e-3);
     let mask = if soft {
         let half = 0.5 * volume.data.iter().copied().fold(0f32, f32::max);
-        warnings.push(format!("the mask holds fractions; voxels above {half} are inside"));
+        warnings.push(NiftiWarning::SoftMask { half });
         volume.map(|x| x > half)
     } else {
         let mut numbers: Vec<i64> = Vec::new();
@@ -224,13 +230,9 @@ fn read_checked(bytes: &[u8], mgh: bool, options: &ReadOptions) -> Result<NiftiI
     let (slope, intercept) = header.scaling()?;
     let mut warnings = Vec::new();
     let (grid, orientation) = orientation::grid(&header, layout.dims, options.prefer.filter(|_| !mgh), &mut warnings)?;
-    if header.bitpix as usize != 8 * layout.kind.size_of() {
-        warnings.push(format!(
-            "bitpix is {}, datatype {} has {}; datatype is believed",
-            header.bitpix,
-            header.datatype,
-            8 * layout.kind.size_of()
-        ));
+    let of_datatype = 8 * layout.kind.size_of();
+    if header.bitpix as usize != of_datatype {
+        warnings.push(NiftiWarning::Bits { bitpix: header.bitpix, datatype: header.datatype, of_datatype });
     }
     let raw = if packed {
         gzip::part(bytes, layout.first, layout.bytes, layout.end)?
@@ -248,7 +250,7 @@ fn read_checked(bytes: &[u8], mgh: bool, options: &ReadOptions) -> Result<NiftiI
         nonfinite_voxels += 1;
     }
     if nonfinite_voxels > 0 {
-        warnings.push(format!("{nonfinite_voxels} voxels are NaN or infinite and were set to 0"));
+        warnings.push(NiftiWarning::NotFinite { voxels: nonfinite_voxels });
     }
     Ok(NiftiImage { volume: Volume::from_data(grid, data), warnings, nonfinite_voxels, orientation })
 }

@@ -2,6 +2,7 @@
 
 use super::error::NiftiProblem;
 use super::header::Header;
+use super::warning::NiftiWarning;
 use super::which::Orientation;
 use crate::geometry::Native;
 use crate::image::Grid;
@@ -15,7 +16,7 @@ pub(super) fn grid(
     header: &Header,
     dims: [usize; 3],
     prefer: Option<Orientation>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<NiftiWarning>,
 ) -> Result<(Grid<Native>, Orientation), NiftiProblem> {
     let (has_sform, has_qform) = (header.sform_code > 0, header.qform_code > 0);
     if !has_sform && !has_qform {
@@ -29,12 +30,12 @@ pub(super) fn grid(
     for (n, axis) in ['i', 'j', 'k'].into_iter().enumerate() {
         check_spacing("pixdim", axis, header.pixdim[n + 1].abs())?;
         if header.pixdim[n + 1] < 0.0 {
-            warnings.push(format!("pixdim[{}] is negative; its absolute value is taken", n + 1));
+            warnings.push(NiftiWarning::NegativeSpacing { field: n + 1 });
         }
     }
     match header.xyzt_units & 7 {
-        1 => warnings.push("xyzt_units says metre; the numbers are taken as millimetres".into()),
-        3 => warnings.push("xyzt_units says micrometre; the numbers are taken as millimetres".into()),
+        1 => warnings.push(NiftiWarning::Unit { unit: "metre" }),
+        3 => warnings.push(NiftiWarning::Unit { unit: "micrometre" }),
         _ => {}
     }
     // The one that is not used may be broken: that is only told.
@@ -46,30 +47,29 @@ pub(super) fn grid(
         let allowed_mm = 0.5 * chosen.spacing_mm().iter().copied().fold(f64::INFINITY, f64::min);
         match (other_grid, prefer) {
             (Err(problem), None) => return Err(problem),
-            (Err(problem), Some(_)) => warnings.push(format!("{used} is used as asked; {problem}")),
+            (Err(problem), Some(_)) => warnings.push(NiftiWarning::OtherIsBroken { used, problem }),
             (Ok(other_grid), _) => {
                 let difference_mm = largest_difference_mm(&chosen, &other_grid);
                 if prefer.is_none() && difference_mm > allowed_mm {
                     return Err(NiftiProblem::OrientationsDisagree { difference_mm, allowed_mm });
                 }
                 if difference_mm > ROUNDING_MM {
-                    let why = if prefer.is_some() { "used as asked" } else { "used" };
-                    warnings.push(format!("sform and qform differ by up to {difference_mm:.3} mm; {used} is {why}"));
+                    let asked = prefer.is_some();
+                    warnings.push(NiftiWarning::OrientationsDiffer { difference_mm, used, asked });
                 }
             }
         }
     }
     for (n, size_mm) in chosen.spacing_mm().into_iter().enumerate() {
-        let stated = header.pixdim[n + 1].abs();
-        if (stated - size_mm).abs() > 0.01 * size_mm {
-            warnings.push(format!("pixdim[{}] is {stated} mm, {used} says {size_mm:.4} mm; {used} is used", n + 1));
+        let stated_mm = header.pixdim[n + 1].abs();
+        if (stated_mm - size_mm).abs() > 0.01 * size_mm {
+            warnings.push(NiftiWarning::Spacing { field: n + 1, stated_mm, size_mm, used });
         }
     }
     let linear: Matrix3<f64> = chosen.mm_from_voxel.fixed_view::<3, 3>(0, 0).into_owned();
     let shear = shear(&linear);
     if shear > 0.01 {
-        warnings
-            .push(format!("{used}: the voxel axes are {:.2} degrees from perpendicular", shear.asin().to_degrees()));
+        warnings.push(NiftiWarning::Skewed { used, skew_deg: shear.asin().to_degrees() });
     }
     Ok((chosen, used))
 }

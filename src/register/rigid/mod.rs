@@ -53,9 +53,8 @@ pub struct RigidFit<M: Frame, F: Frame> {
 /// thicker than the other image's voxels that image is averaged over the slice's thickness. Outside its field of view an
 /// image is unknown. The result is the same on any number of threads.
 ///
-/// Stripped scans have no second fit without the cavity's side: on eight synthetic patients whose whole brain sags (2.1 to
-/// 2.4 mm on average, which the fit follows), leaving out 5 mm around the cavity or sampling fewer points within 20 or 40 mm
-/// of it changed the error by at most 1.2 %, leaving out the fifth of windows that correlate least by -4 to +3 %.
+/// Stripped scans have no second fit without the cavity's side: where the whole brain sags it is no better
+/// (docs/evidence/choices.md).
 ///
 /// # Errors
 /// [`RegisterError`] when an image holds no information or the settings are out of range.

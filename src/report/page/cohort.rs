@@ -76,7 +76,8 @@ impl Cohort {
             (!columns.is_empty()).then(|| format!("{} lies apart in {}", row.participant_id, columns.join(", ")))
         };
         let all = self.subjects.iter();
-        all.clone().filter_map(unwell).chain(all.filter_map(apart)).chain(self.warnings.iter().cloned()).collect()
+        let odd = self.warnings.iter().map(ToString::to_string);
+        all.clone().filter_map(unwell).chain(all.filter_map(apart)).chain(odd).collect()
     }
 
     /// RMSE undeformed and of the best sample, subject by subject and in the median.

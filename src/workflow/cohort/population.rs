@@ -1,6 +1,7 @@
 //! What a cohort's estimates say of people: who teaches, the population, and each patient with what the others say.
 
 use super::case_folder;
+use crate::artefact::write_whole;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::population::{Literature, Moments, PopulationFile, PopulationPrior, merged};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
@@ -13,6 +14,7 @@ use crate::workflow::user_file::{read_text, shown};
 use crate::workflow::{Case, Settings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// The file of a cohort's population below the derivatives.
 pub const POPULATION: &str = "population.toml";
@@ -21,6 +23,19 @@ const OF_PEOPLE: [&str; 2] = ["shear_modulus_pa of ", "effective density_kg_per_
 
 /// A population, where somebody teaches, and what is told of it.
 pub type Learnt = (Option<PopulationFile>, CohortPopulation);
+
+/// Why an estimated patient does not teach; the file counts each by its words.
+#[derive(Clone, Debug, Error)]
+enum LeftOut {
+    #[error("{}", .0.short())]
+    Finding(Finding),
+    #[error("{}", .0.name())]
+    Status(Status),
+    #[error("another law or density than most")]
+    OtherKind,
+    #[error("figures that are no Gaussian")]
+    NoGaussian,
+}
 
 /// One patient whose figures are an answer.
 struct Teacher<'a> {
@@ -43,7 +58,7 @@ impl Teacher<'_> {
 /// A case whose settings cannot be read, a prior that does not exist, more parameters than can be inferred together.
 pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, WorkflowError> {
     let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
-    let mut leave = |why: &str| *left_out.entry(why.to_owned()).or_default() += 1;
+    let mut leave = |why: LeftOut| *left_out.entry(why.to_string()).or_default() += 1;
     let mut estimated = 0;
     let mut teachers = Vec::new();
     for member in members {
@@ -56,8 +71,8 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
                 let own = Case::at(&case_folder(cases, &member.participant_id)).settings()?;
                 teachers.push(Teacher { id: &member.participant_id, estimate, settings: Settings::resolve([&own])? });
             }
-            Status::Done => leave(finding.short()),
-            _ => leave(member.status.name()),
+            Status::Done => leave(LeftOut::Finding(finding)),
+            _ => leave(LeftOut::Status(member.status.clone())),
         }
     }
     let kinds = |t: &Teacher<'_>| teachers.iter().filter(|other| other.kind() == t.kind()).count();
@@ -67,7 +82,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     teachers.retain(|t| {
         let same = Some(t.kind()) == chosen;
         if !same {
-            leave("another law or density than most");
+            leave(LeftOut::OtherKind);
         }
         same
     });
@@ -79,7 +94,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     for teacher in teachers {
         match Moments::of_estimate(teacher.estimate, &names) {
             Some(moments) => taught.push((teacher, moments)),
-            None => leave("figures that are no Gaussian"),
+            None => leave(LeftOut::NoGaussian),
         }
     }
     let (Some((first, _)), Some(chosen)) = (taught.first(), chosen) else {
@@ -135,16 +150,18 @@ pub fn population_prior(path: &Path) -> Result<PopulationPrior, WorkflowError> {
     Ok(read_population(path)?.prior())
 }
 
-/// Several cohorts' files as one.
+/// Several cohorts' files as one, into `output`.
 ///
 /// # Errors
-/// A file that is no population; cohorts of different kinds, or one that was given twice.
-pub fn merge_populations(paths: &[PathBuf]) -> Result<PopulationFile, WorkflowError> {
+/// A file that is no population; cohorts of different kinds, or one that was given twice; the disk's.
+pub fn merge_populations(paths: &[PathBuf], output: &Path) -> Result<PopulationFile, WorkflowError> {
     let files = paths
         .iter()
         .map(|path| Ok((shown(path), read_population(path)?)))
         .collect::<Result<Vec<_>, WorkflowError>>()?;
-    Ok(merged(&files)?)
+    let all = merged(&files)?;
+    write_whole(output, all.to_toml().as_bytes())?;
+    Ok(all)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Why a job did not end well.
 
+mod asked;
 mod case;
 mod cohort;
 mod evaluate;
@@ -12,6 +13,7 @@ mod simulation;
 mod taken_up;
 mod warp;
 
+pub use asked::AskedError;
 pub use case::CaseError;
 pub use cohort::CohortError;
 pub use evaluate::EvaluateError;
@@ -35,6 +37,7 @@ use crate::experiment::prior::PriorError;
 use crate::experiment::supports::SupportsError;
 use crate::experiment::sweep::SweepError;
 use crate::experiment::synth::SynthError;
+use crate::fem::FemError;
 use crate::image::nifti::NiftiError;
 use crate::layout;
 use crate::material::gp::{FitRefusal, HyperparametersError};
@@ -72,6 +75,8 @@ pub enum WorkflowError {
     #[error(transparent)]
     Settings(#[from] SettingsError),
     #[error(transparent)]
+    Asked(#[from] AskedError),
+    #[error(transparent)]
     Input(#[from] InputError),
     #[error(transparent)]
     Labels(#[from] LabelMapError),
@@ -107,7 +112,7 @@ pub enum WorkflowError {
     Studies { file: String, source: StudyError },
     #[error("{file}: {source}")]
     Hyperparameters { file: String, source: HyperparametersError },
-    #[error("{file}: {reason}; make it with hgm gp fit --model study-level")]
+    #[error("{file}: {reason}")]
     StudyLevelFile { file: String, reason: String },
     #[error(transparent)]
     StudyLevel(#[from] study_level::FitError),
@@ -131,7 +136,7 @@ pub enum WorkflowError {
         "the phantom's reference state has no equilibrium ({reason}); lower `one_tissue_force_n` or \
          `two_tissue_force_n`, or raise the shear modulus, in the table [phantom] of the settings"
     )]
-    NoReferenceState { reason: String },
+    NoReferenceState { reason: FemError },
     #[error("table [resection]: {0}")]
     Supports(#[from] SupportsError),
     #[error(

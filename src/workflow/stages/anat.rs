@@ -21,6 +21,7 @@ use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
 use crate::workflow::stage_name::StageName;
+use crate::workflow::warning::all_of;
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
@@ -180,8 +181,7 @@ pub(crate) fn anat(
         write(NATIVE_RESECTED, encode_mask(&native_resected));
         work.tell(|p| p.end());
 
-        produced.warnings.extend(before.warnings.iter().map(|w| format!("pre: {w}")));
-        produced.warnings.extend(after.warnings.iter().map(|w| format!("post: {w}")));
+        produced.warn(all_of("pre", &before.warnings).chain(all_of("post", &after.warnings)));
         let spacing = scans.pre.grid.spacing_mm().into_iter().chain(scans.post.grid.spacing_mm());
         produced.facts = facts(&AnatFacts {
             volumes: ResectionVolumes {

@@ -10,6 +10,7 @@ use crate::layout::COMPARISON;
 use crate::material::meta_model::MetaModel;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
@@ -34,7 +35,7 @@ pub(crate) fn compare(
         let families = [(1, Tissue::whole_brain()), (2, Tissue::grey_and_white())];
         let bodies = Bodies::of(work, input)?;
         work.tell(|p| p.begin("models", bodies.list.len() * families.len() * LAWS.len()));
-        let (mut models, mut warnings) = (Vec::new(), Vec::new());
+        let (mut models, mut produced) = (Vec::new(), Produced::default());
         for (n, body) in bodies.list.iter().enumerate() {
             for (count, tissues) in &families {
                 for law in LAWS {
@@ -46,7 +47,9 @@ pub(crate) fn compare(
                     match bodies.solved(work, input, n, tissues, &prior) {
                         Ok(found) => models.push((name, found.outcome)),
                         // A model that has no equilibrium explains nothing; the others are still compared.
-                        Err(error) => warnings.push(format!("{name}: left out: {error}")),
+                        Err(error) => {
+                            produced.warn([Warning::ModelLeftOut { model: name, reason: error.to_string() }]);
+                        }
                     }
                     work.tell(|p| p.step());
                 }
@@ -55,7 +58,8 @@ pub(crate) fn compare(
         work.tell(|p| p.end());
         let (comparison, _) = weigh(models).ok_or(WorkflowError::NoEvidence)?;
         let json = serde_json::to_string_pretty(&comparison).expect("figures are plain data") + "\n";
-        let files = vec![(COMPARISON.to_owned(), json.into_bytes())];
-        Ok(Produced { files, warnings, facts: facts(&comparison) })
+        produced.files.push((COMPARISON.to_owned(), json.into_bytes()));
+        produced.facts = facts(&comparison);
+        Ok(produced)
     })
 }

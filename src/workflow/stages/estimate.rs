@@ -24,6 +24,7 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::estimate_options::{EstimateOptions, Observed};
 use crate::workflow::facts::EstimateFacts;
 use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
@@ -205,7 +206,7 @@ pub(crate) fn estimate(
                 Ok(found) => models.push((body.name(), found)),
                 // Supports without an equilibrium explain nothing; the others are still tried.
                 Err(error) => {
-                    warnings.push(format!("{}: left out: {error}", body.name()));
+                    warnings.push(Warning::ModelLeftOut { model: body.name(), reason: error.to_string() });
                     refused.get_or_insert(error);
                 }
             }
@@ -226,7 +227,7 @@ pub(crate) fn estimate(
         let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
         let mut produced = produced(body, input, found, comparison)?;
-        produced.warnings.extend(warnings);
+        produced.warn(warnings);
         Ok(produced)
     })
 }

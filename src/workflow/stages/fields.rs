@@ -14,6 +14,7 @@ use crate::layout::{
 };
 use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Point3;
 
@@ -71,12 +72,9 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
             }
             work.tell(|p| p.step());
         }
-        for state in shift.states.iter().filter(|state| state.smoothed_voxels > 0) {
-            produced.warnings.push(format!(
-                "{}: tissue folds over at {} voxels; the displacement field is smoothed there and not believed",
-                state.state, state.smoothed_voxels
-            ));
-        }
+        let folded = shift.states.iter().filter(|state| state.smoothed_voxels > 0);
+        let folds = |s: &StateShift| Warning::Folds { state: s.state.clone(), voxels: s.smoothed_voxels };
+        produced.warn(folded.map(folds));
         let json = serde_json::to_string_pretty(&shift).expect("figures are plain data") + "\n";
         produced.files.push((SHIFT_JSON.to_owned(), json.into_bytes()));
         produced.facts = facts(&shift);

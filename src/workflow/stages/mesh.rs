@@ -20,6 +20,7 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
 use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
@@ -71,11 +72,11 @@ pub(crate) fn mesh(
             produced.files.push((REST_SURFACE.of(set), gifti::encode_surface(&surface, Space::Mni152, set)));
         }
         let large = record.islands.iter().filter(|island| island.volume_mm3 > LARGE_ISLAND_MM3);
-        produced.warnings.extend(large.map(|island| {
-            let name = label::name(island.label).unwrap_or("unknown");
-            format!("a part of {name} of {:.2} cc lay apart and was left out of the mesh", island.volume_mm3 / 1000.0)
+        produced.warn(large.map(|island| {
+            let tissue = label::name(island.label).unwrap_or("unknown");
+            Warning::Island { tissue, volume_mm3: island.volume_mm3 }
         }));
-        produced.warnings.extend(tags.warnings.iter().cloned());
+        produced.warn(&tags.warnings);
         let sets = tags.sets.iter().map(|set| SetOutcome {
             name: set.name.clone(),
             nodes: set.nodes,
@@ -85,7 +86,7 @@ pub(crate) fn mesh(
         let facts_of_mesh = MeshFacts {
             mesh: mesh_outcome(&rest, &whole, &body, &settings),
             sets: sets.collect(),
-            implausible: tags.warnings.clone(),
+            implausible: tags.warnings.iter().map(ToString::to_string).collect(),
         };
         produced.facts = facts(&facts_of_mesh);
         Ok(produced)

@@ -26,6 +26,7 @@ use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
 use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
@@ -99,13 +100,10 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
         let found = planned(&scan.plan, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
-        let mut produced = Produced { warnings: scan.plan_warnings.clone(), ..Produced::default() };
+        let mut produced = Produced::default();
+        produced.warn(&scan.plan_warnings);
         if found.outside > NOTED_OUTSIDE {
-            produced.warnings.push(format!(
-                "{}: {:.0} % of what is to be taken lies outside the brain and counts for nothing",
-                scan.plan,
-                100.0 * found.outside
-            ));
+            produced.warn([Warning::PlanOutsideBrain { plan: scan.plan.clone(), percent: 100.0 * found.outside }]);
         }
         let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
         let t1 = resample(&scan.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
@@ -122,7 +120,7 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
         write(NATIVE_RESECTED, encode_mask(&scan.resection));
         work.tell(|p| p.end());
-        produced.warnings.extend(before.warnings.iter().map(|w| format!("pre: {w}")));
+        produced.warn(all_of("pre", &before.warnings));
         produced.facts = facts(&PlanFacts {
             volumes: ResectionVolumes {
                 cavity_cc: None,

@@ -39,14 +39,11 @@ pub(crate) fn pose(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
     work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("registration", 1));
         work.tell(|p| p.doing(OF_POSE));
-        let mut produced = Produced { warnings: scan.warnings.clone(), ..Produced::default() };
+        let mut produced = Produced::default();
+        produced.warn(&scan.warnings);
         let given = (scan.pose.as_ref().map(|(pose, _)| pose), scan.labels.as_ref().map(|(labels, _)| labels));
-        let (mni_from_pre, fit, odd) = once(&scan.shared.pose, || {
-            let mut odd = Vec::new();
-            let (mni_from_pre, fit) = pose_of(&scan.pre, given, &mut odd)?;
-            Ok::<_, WorkflowError>((mni_from_pre, fit, odd))
-        })?;
-        produced.warnings.extend_from_slice(odd);
+        let (mni_from_pre, fit, odd) = once(&scan.shared.pose, || pose_of(&scan.pre, given))?;
+        produced.warn(odd);
         work.tell(|p| p.end());
         write_transform(&mut produced, layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK, mni_from_pre);
         produced.facts = facts(&PoseFacts { fit: fit.clone() });

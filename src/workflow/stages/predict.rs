@@ -26,6 +26,7 @@ use crate::mesh::format::{Field, vtu};
 use crate::overlay::Drawing;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::stage_name::StageName;
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -81,7 +82,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
                 prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
             }
             let checks = if number == 0 { settings.predict.checks } else { 0 };
-            let found = Lying::of(work, &patient, head, &bodies, checks, &mut produced.warnings)?;
+            let found = Lying::of(work, &patient, head, &bodies, checks, &mut produced)?;
             let state = if number == 0 { PREDICTED.to_owned() } else { format!("{PREDICTED}-{}", head.name(number)) };
             prediction.checks.extend(found.checks.iter().cloned());
             prediction.heads.push(found.in_numbers(&patient, head, &state));
@@ -225,10 +226,7 @@ impl<'a> Patient<'a> {
         write(PREDICTED_STATE.of(state), vtu::encode(mesh, &points, &[])?);
         write(PREDICTED_DRAWS.of(state), draws_to_csv(&modes.draws).into_bytes());
         if field.changed > 0 {
-            produced.warnings.push(format!(
-                "{state}: tissue folds over at {} voxels; the displacement field is smoothed there and not believed",
-                field.changed
-            ));
+            produced.warn([Warning::Folds { state: state.to_owned(), voxels: field.changed }]);
         }
         Ok(())
     }
@@ -253,7 +251,7 @@ impl Lying {
         head: &Head,
         bodies: &[Posed],
         checks: usize,
-        warnings: &mut Vec<String>,
+        produced: &mut Produced,
     ) -> Result<Self, WorkflowError> {
         let settings = &work.settings.predict;
         let nodes = patient.input.mesh.0.nodes_mm().len();
@@ -271,7 +269,8 @@ impl Lying {
         if found.is_empty() {
             return Err(PredictError::NoEquilibrium { reason: refused.join("; ") }.into());
         }
-        warnings.extend(refused.into_iter().map(|error| format!("{head}: left out: {error}")));
+        let left_out = |reason| Warning::ModelLeftOut { model: head.to_string(), reason };
+        produced.warn(refused.into_iter().map(left_out));
         let all: f64 = found.iter().map(|(posed, _)| posed.weight).sum();
         let every = (nodes / SHARED_NODES).max(1);
         let some: Vec<usize> = (0..nodes).step_by(every).collect();

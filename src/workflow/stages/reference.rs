@@ -81,8 +81,7 @@ pub(crate) fn phantom_reference(work: &Work<'_>, made: &mut Made, mesh: &TetMesh
         let rest = Reference::Nodes(vec![[0.0; 3]; mesh.nodes_mm().len()]);
         let solved = solve_sample(mesh, &scenario, &settings.tissue_list(), &truth, &rest, &|_| {})
             .map_err(|source| WorkflowError::Sample { table: "phantom", source })?;
-        let reason = solved.reason.unwrap_or_default();
-        let (outcome, _) = solved.state.ok_or(WorkflowError::NoReferenceState { reason })?;
+        let (outcome, _) = solved.state.map_err(|reason| WorkflowError::NoReferenceState { reason })?;
         let points = [Field::vector("displacement", &outcome.displacement_mm)];
         let files = vec![(REFERENCE_STATE.to_owned(), vtu::encode(mesh, &points, &[])?)];
         Ok(Produced { files, facts: facts(&solved.record), ..Produced::default() })

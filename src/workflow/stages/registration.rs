@@ -15,6 +15,7 @@ use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::inputs::{OwnMasks, ScanSums, Scans};
 use crate::workflow::stage_name::StageName;
+use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -61,8 +62,8 @@ pub(crate) fn registration(
         work.tell(|p| p.step());
         work.tell(|p| p.doing(OF_POSE));
         let mut produced = Produced::default();
-        produced.warnings.extend(scans.warnings.iter().cloned());
-        produced.warnings.extend(pre_from_post.warnings.iter().map(|w| format!("post to pre: {w}")));
+        produced.warn(&scans.warnings);
+        produced.warn(all_of("post to pre", &pre_from_post.warnings));
         let given = (own.pose.as_ref().map(|(pose, _)| pose), own.labels.as_ref().map(|(labels, _)| labels));
         let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
         let fit = if let Some(earlier) = earlier {
@@ -73,7 +74,8 @@ pub(crate) fn registration(
             produced.warnings.extend_from_slice(&earlier.fit.1);
             earlier.fit.0.clone()
         } else {
-            let (mni_from_pre, fit) = pose_of(&scans.pre, given, &mut produced.warnings)?;
+            let (mni_from_pre, fit, odd) = pose_of(&scans.pre, given)?;
+            produced.warn(&odd);
             write_transform(&mut produced, text, itk, &mni_from_pre);
             fit
         };
@@ -86,14 +88,17 @@ pub(crate) fn registration(
     })
 }
 
-/// The pose of the pre-operative scan in the MNI frame: given, or found from a label map or from the scan.
+/// A pose, how it was found, and what was odd about it.
+type FoundPose = (RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<Warning>);
+
+/// The pose of the pre-operative scan in the MNI frame, given, or found from a label map or from the scan; and what was odd about
+/// it.
 pub(super) fn pose_of(
     pre: &Volume<f32, Pre>,
     (given, labels): (Option<&RigidTransform<Pre, Mni>>, Option<&LabelMap<Pre>>),
-    warnings: &mut Vec<String>,
-) -> Result<(RigidTransform<Pre, Mni>, RegistrationOutcome), WorkflowError> {
+) -> Result<FoundPose, WorkflowError> {
     if let Some(pose) = given {
-        return Ok((*pose, by_hand(pose, &pre.grid)));
+        return Ok((*pose, by_hand(pose, &pre.grid), Vec::new()));
     }
     let found = match labels {
         // A label map says where the brain is, whatever the scan's contrast.
@@ -102,8 +107,7 @@ pub(super) fn pose_of(
     };
     let what = "the pre-operative scan (moving) onto the MNI template (fixed)";
     let found = found.map_err(|source| WorkflowError::Registration { what, source })?;
-    warnings.extend(found.warnings.iter().map(|w| format!("{OF_POSE}: {w}")));
-    Ok((found.fixed_from_moving, outcome(&found, &pre.grid)))
+    Ok((found.fixed_from_moving, outcome(&found, &pre.grid), all_of(OF_POSE, &found.warnings).collect()))
 }
 
 /// Post to pre, and pre to MNI.

@@ -13,6 +13,7 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
@@ -134,11 +135,11 @@ fn produced(work: &Work<'_>, mesh: &TetMesh, solved: SolvedSample) -> Result<Pro
     let mut produced = Produced::default();
     let mut record = solved.record;
     match solved.state {
-        None => {
-            work.tell(|p| p.detail(&record.id, &solved.reason.unwrap_or_default()));
-            produced.warnings.push(format!("{} is left out: its body finds no equilibrium under this load", record.id));
+        Err(error) => {
+            work.tell(|p| p.detail(&record.id, &error.to_string()));
+            produced.warn([Warning::SampleLeftOut { sample: record.id.clone() }]);
         }
-        Some((outcome, errors)) => {
+        Ok((outcome, errors)) => {
             let file = SAMPLE_STATE.of(&record.id);
             let observed = errors.node_observed.iter().map(|&seen| f64::from(u8::from(seen))).collect();
             let points = [
@@ -152,7 +153,7 @@ fn produced(work: &Work<'_>, mesh: &TetMesh, solved: SolvedSample) -> Result<Pro
                 Field::scalar("strain_energy_density_pa", outcome.strain_energy_density_pa),
             ];
             produced.files.push((file.clone(), vtu::encode(mesh, &points, &cells)?));
-            produced.warnings.extend(outcome.warnings);
+            produced.warn(&outcome.warnings);
             record.file = Some(file);
         }
     }

@@ -20,6 +20,7 @@ use crate::segment::native::mask_on;
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::settings::Settings;
+use rayon::prelude::*;
 use std::cell::OnceCell;
 
 /// Name of the estimate's state.
@@ -176,12 +177,16 @@ impl<'a> CaseShift<'a> {
 
     /// How far the samples of the sweep lie apart at every node, and the reach with it, mm.
     fn spread_of_samples(&self, mean: &[[f64; 3]]) -> Result<(Vec<f64>, Vec<f64>), WorkflowError> {
-        let mut sums = vec![([0.0; 3], 0.0); mean.len()];
-        let mut count = 0.0;
-        for id in &self.samples {
+        let (case, mut sums) = (self.case, vec![([0.0; 3], 0.0); mean.len()]);
+        let read = |id: &String| -> Result<Vec<[f64; 3]>, WorkflowError> {
             let file = SAMPLE_STATE.of(id);
-            let state = vtu::decode(&self.case.read(&file)?, &file)?;
-            let u = state.point_field("displacement").and_then(Field::vectors).unwrap_or_default();
+            let state = vtu::decode(&case.read(&file)?, &file)?;
+            Ok(state.point_field("displacement").and_then(Field::vectors).unwrap_or_default())
+        };
+        let read: Vec<_> = self.samples.par_iter().map(read).collect();
+        let mut count = 0.0;
+        for u in read {
+            let u = u?;
             if u.len() != mean.len() {
                 continue;
             }

@@ -11,11 +11,11 @@ fn the_preferred_form_wins_and_a_small_difference_is_told() {
         let options = ReadOptions { prefer: Some(orientation), ..ReadOptions::default() };
         let image = decode(&bytes, NAME, &options).unwrap();
         assert_eq!((image.volume.grid.mm_from_voxel[(0, 3)], image.orientation), (x, orientation));
-        assert!(image.warnings[0].contains("4.000 mm"), "{:?}", image.warnings);
+        assert!(image.warnings[0].to_string().contains("4.000 mm"), "{:?}", image.warnings);
     }
     let near = read(&File::with(|f| f.srow[0][3] = 10.3));
     assert_eq!(near.orientation, Orientation::Sform);
-    assert!(near.warnings[0].contains("0.300 mm"), "{:?}", near.warnings);
+    assert!(near.warnings[0].to_string().contains("0.300 mm"), "{:?}", near.warnings);
     let missing = ReadOptions { prefer: Some(Orientation::Qform), ..ReadOptions::default() };
     let text = decode(&File::with(|f| f.qform_code = 0), NAME, &missing).unwrap_err().to_string();
     assert!(text.contains("qform_code is 0"), "{text}");

@@ -62,7 +62,7 @@ fn a_sheared_grid_is_written_without_the_quaternion_it_does_not_fit() {
     let grid = Grid::<Mni>::new([3, 3, 3], affine).unwrap();
     let image = read(&encode_f32(&Volume::from_data(grid, (0..27u8).map(f32::from).collect())));
     assert!(image.volume.grid.coincides(&grid.relabelled::<Native>(), 1e-6));
-    assert!(image.warnings.iter().any(|w| w.contains("perpendicular")), "{:?}", image.warnings);
+    assert!(image.warnings.iter().any(|w| w.to_string().contains("perpendicular")), "{:?}", image.warnings);
 }
 
 #[test]

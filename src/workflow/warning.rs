@@ -1,0 +1,85 @@
+//! What a reader must know of the files of a job: its kind with the values. Manifests, outcomes and pages keep the sentence.
+
+use crate::fem::FemWarning;
+use crate::image::nifti::NiftiWarning;
+use crate::register::FitWarning;
+use crate::segment::SegmentWarning;
+use crate::tag::TagWarning;
+use serde::{Serialize, Serializer};
+use std::fmt::Display;
+use thiserror::Error;
+
+/// What a reader must know of the files of a job.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum Warning {
+    /// Of a scan (`pre`), a fit (`pre to MNI`) or a file, by name.
+    #[error("{whose}: {warning}")]
+    Of { whose: String, warning: Box<Warning> },
+    #[error(transparent)]
+    Image(#[from] NiftiWarning),
+    #[error(transparent)]
+    Fit(#[from] FitWarning),
+    #[error(transparent)]
+    Head(#[from] SegmentWarning),
+    #[error(transparent)]
+    Set(#[from] TagWarning),
+    #[error(transparent)]
+    Simulation(#[from] FemWarning),
+    #[error("both files hold the same bytes: was one image given twice?")]
+    SameBytes,
+    #[error("{plan}: {percent:.0} % of it lie outside the scan and count for nothing")]
+    PlanBesideScan { plan: String, percent: f64 },
+    #[error("{plan}: {percent:.0} % of what is to be taken lies outside the brain and counts for nothing")]
+    PlanOutsideBrain { plan: String, percent: f64 },
+    #[error("a part of {tissue} of {:.2} cc lay apart and was left out of the mesh", volume_mm3 / 1000.0)]
+    Island { tissue: &'static str, volume_mm3: f64 },
+    #[error("{sample} is left out: its body finds no equilibrium under this load")]
+    SampleLeftOut { sample: String },
+    #[error("{model}: left out: {reason}")]
+    ModelLeftOut { model: String, reason: String },
+    #[error("{state}: tissue folds over at {voxels} voxels; the displacement field is smoothed there and not believed")]
+    Folds { state: String, voxels: usize },
+    #[error("the best sample is not the one nearest to the reference's moduli")]
+    OtherSampleIsBest,
+}
+
+impl Warning {
+    /// The same of whom it is about.
+    #[must_use]
+    pub fn of(self, whose: impl Display) -> Self {
+        Self::Of { whose: whose.to_string(), warning: Box::new(self) }
+    }
+}
+
+/// Warnings of a room, of whom they are about.
+pub(crate) fn all_of<'a, W>(whose: &'a str, warnings: &'a [W]) -> impl Iterator<Item = Warning> + 'a
+where
+    W: Clone + Into<Warning>,
+{
+    warnings.iter().map(move |warning| warning.clone().into().of(whose))
+}
+
+impl Serialize for Warning {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_is_kept_as_the_sentence_with_whom_it_is_about_before_it() {
+        let odd = NiftiWarning::NotFinite { voxels: 2 };
+        let of_scan = Warning::from(odd.clone()).of("pre");
+        assert_eq!(serde_json::to_value(&of_scan).unwrap(), "pre: 2 voxels are NaN or infinite and were set to 0");
+        assert_eq!(all_of("pre", std::slice::from_ref(&odd)).collect::<Vec<_>>(), [of_scan]);
+        let twice = Warning::from(FitWarning::LittleOverlap { overlap: 0.4 }).of("pre to MNI").of("scan.nii");
+        assert_eq!(
+            twice.to_string(),
+            "scan.nii: pre to MNI: only 40 % of the head lies in both images: check the fields of view"
+        );
+    }
+}
