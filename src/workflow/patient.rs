@@ -288,7 +288,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
-        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, lying: false })
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {

@@ -28,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 16;
+const VERSION: u32 = 17;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -87,8 +87,6 @@ pub(crate) struct HeldBody {
     pub mesh: TetMesh,
     /// What its state is compared with.
     pub reference: Reference,
-    /// Whether its cortex lies stuck on the skull, which is not believed of it.
-    pub lying: bool,
 }
 
 impl HeldBody {
@@ -116,7 +114,6 @@ impl HeldBody {
             settings: self.settings.clone(),
             mesh: with_lying_set(self.mesh.clone(), &skull, gravity),
             reference: self.reference.clone(),
-            lying: true,
             scenario: lying(&self.scenario),
         }
     }
@@ -222,7 +219,7 @@ pub(crate) fn estimate(
         let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
-        let verdict = bodies.bounded(work, input, found.outcome.verdict.clone())?;
+        let verdict = bodies.bounded(work, input, &found)?;
         let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
         let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
@@ -267,7 +264,6 @@ impl Bodies {
             scenario: input.scenario.clone(),
             mesh: input.mesh.0.clone(),
             reference: input.reference.clone(),
-            lying: false,
         };
         let list = if list.is_empty() { vec![as_posed()] } else { list };
         let coarser = match input.coarser {
@@ -303,9 +299,7 @@ impl Bodies {
 
     /// The coarser mesh as one of them is held.
     fn coarser_of(&self, body: &HeldBody) -> Result<Option<TetMesh>, WorkflowError> {
-        let gravity = body.scenario.loads.gravity_m_per_s2;
         let supported = |coarse: &TetMesh| match &body.settings {
-            Some(settings) if body.lying => Ok(with_lying_set(coarse.clone(), &settings.skull, gravity)),
             Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
             None => Ok(coarse.clone()),
         };
@@ -390,12 +384,32 @@ impl Bodies {
         Ok(solve_problem(problem, &settings)?)
     }
 
-    /// The verdict with bounds that hold for supports as well that are not believed in, on the coarse mesh. Others have none.
-    fn bounded(&self, work: &Work<'_>, input: &EstimateInput<'_>, verdict: Verdict) -> Result<Verdict, WorkflowError> {
+    /// The verdict with bounds that hold for supports as well that are not believed in, by the same displacement. Others have
+    /// none.
+    fn bounded(&self, work: &Work<'_>, input: &EstimateInput<'_>, found: &Estimate) -> Result<Verdict, WorkflowError> {
+        let verdict = found.outcome.verdict.clone();
         let Some(make) = input.suspect.filter(|_| verdict.finding == Finding::NoShift) else { return Ok(verdict) };
-        let found = self.roughly(work, input, &make()?, input.tissues, &work.settings.prior)?;
+        let options = &work.settings.estimate;
+        let body = make()?;
+        let (unknowns, scenario) = Self::posed(work, &body, input.tissues, &work.settings.prior)?;
+        let (_, errors, noise_mm) = self.observation(&body, input, options);
+        let problem = Problem {
+            mesh: &body.mesh,
+            template: &scenario,
+            unknowns,
+            poisson_ratio: input.poisson_ratio,
+            observation: Observation::Nodes(found.seen.clone()),
+            errors,
+            model_log_sd: 0.0,
+            body_log_sd: 0.0,
+            coarser: None,
+            body_known: false,
+            start: Vec::new(),
+            instrument: None,
+        };
+        let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         // Supports without an equilibrium bound nothing.
-        let other = found.map(|found| found.outcome.verdict);
+        let other = solve_problem(problem, &settings).ok().map(|found| found.outcome.verdict);
         Ok(with_weakest_bounds(verdict.clone(), std::iter::once(&verdict).chain(&other)))
     }
 
