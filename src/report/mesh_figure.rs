@@ -196,7 +196,6 @@ struct Shot {
     seen: String,
 }
 
-
 /// Facets of a set: as named, or the boundary facets whose nodes are all in the node set.
 pub fn set_facets(mesh: &TetMesh, set: &str, boundary: &[[u32; 3]]) -> Option<Vec<[u32; 3]>> {
     if let Some(facets) = mesh.facet_sets.get(set).filter(|f| !f.is_empty()) {
