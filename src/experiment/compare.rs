@@ -78,18 +78,24 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
         best.verdict = Verdict::new(Finding::CannotTell, best.verdict.explained_share, moduli, reasons);
         best.limits = best.verdict.because();
     }
-    if best.verdict.finding == Finding::NoShift {
-        // A bound that not every model gives is none.
-        let bound = |(tissue, _): &(String, Claim)| {
-            let of = |(_, m): &(String, EstimateOutcome)| above(&m.verdict, tissue);
-            let weakest = models.iter().map(of).reduce(|a, b| Some(a?.min(b?))).flatten();
-            (tissue.clone(), weakest.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa }))
-        };
-        let moduli = best.verdict.moduli.iter().map(bound).collect();
-        best.verdict = Verdict::new(Finding::NoShift, best.verdict.explained_share, moduli, best.verdict.reasons);
-    }
+    best.verdict = with_weakest_bounds(best.verdict, models.iter().map(|(_, m)| &m.verdict));
     let comparison = Comparison { candidates, log_odds, verdict: best.verdict.clone() };
     Some((comparison, best))
+}
+
+/// Where nothing was seen to move: with the bounds that all these models of the same patient give. One that not every model
+/// gives is none.
+#[must_use]
+pub fn with_weakest_bounds<'a>(verdict: Verdict, models: impl Iterator<Item = &'a Verdict> + Clone) -> Verdict {
+    if verdict.finding != Finding::NoShift {
+        return verdict;
+    }
+    let bound = |(tissue, _): &(String, Claim)| {
+        let weakest = models.clone().map(|m| above(m, tissue)).reduce(|a, b| Some(a?.min(b?))).flatten();
+        (tissue.clone(), weakest.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa }))
+    };
+    let moduli = verdict.moduli.iter().map(bound).collect();
+    Verdict::new(Finding::NoShift, verdict.explained_share, moduli, verdict.reasons)
 }
 
 /// The bound that a verdict gives of a tissue, Pa.
@@ -163,6 +169,21 @@ fn normal_below(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::experiment::estimate::Z_95;
+
+    #[test]
+    fn a_bound_is_the_weakest_of_all_models_and_none_where_one_gives_none() {
+        let verdict = |bound: Option<f64>| {
+            let claim = bound.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa });
+            let reason = Reason::WithinNoise { noise_mm: 0.2, would_be_seen_mm: 0.4 };
+            Verdict::new(Finding::NoShift, Some(0.0), vec![("grey_matter".to_owned(), claim)], vec![reason])
+        };
+        let of = |bounds: &[Option<f64>]| {
+            let models: Vec<Verdict> = bounds.iter().map(|b| verdict(*b)).collect();
+            with_weakest_bounds(models[0].clone(), models.iter())
+        };
+        assert_eq!(of(&[Some(4130.0), Some(1850.0), Some(9000.0)]), verdict(Some(1850.0)));
+        assert_eq!(of(&[Some(4130.0), None]), verdict(None));
+    }
 
     #[test]
     fn quantiles_of_one_gaussian_are_its_own_and_of_two_lie_between() {

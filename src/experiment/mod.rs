@@ -21,6 +21,7 @@ pub mod setting;
 pub mod skull;
 pub mod smooth_noise;
 pub mod supports;
+pub mod suspects;
 pub mod sweep;
 pub mod synth;
 pub mod verdict;

@@ -271,8 +271,9 @@ impl<'w, 'a> Patient<'w, 'a> {
         };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let (shift, coarser, held) = (Some(&shift), Some(&coarser as _), Some(&held as _));
-        let input = EstimateInput { coarser, held, shift, ..self.asked(&tissues) };
+        let suspect = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.lying()) };
+        let (shift, coarser, held, suspect) = (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspect as _));
+        let input = EstimateInput { coarser, held, suspect, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }
 
@@ -287,7 +288,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
-        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, lying: false })
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -300,6 +301,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
+            suspect: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
             rigid_error_mm: settings.resection.registration_error_mm,

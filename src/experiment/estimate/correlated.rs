@@ -20,6 +20,8 @@ use nalgebra::{DMatrix, DVector};
 pub struct CorrelatedErrors {
     /// Noise of the measurement.
     pub noise: Process,
+    /// Standard deviation of that noise once the instrument's own error is taken out, mm.
+    pub corrected_mm: f64,
     /// Expected error of the rigid registration, mm.
     pub rigid_mm: f64,
     /// Most places that are looked at: they are chosen evenly, and what lies between them says the same.
@@ -196,7 +198,11 @@ pub(super) fn fit(
     // A discrepancy that is not needed is none: its size would widen nothing but by chance.
     let unexplained = if evidence.log_evidence > exact.log_evidence { evidence.unexplained } else { exact.unexplained };
 
-    let findings = fit.findings(errors, &seen_there, &descent, unexplained, [evidence, exact])?;
+    let mut findings = fit.findings(errors, &seen_there, &descent, unexplained, [evidence, exact])?;
+    // Whether anything has moved at all is asked of the measurement as it comes.
+    if taken_out_rms_mm.is_some() && findings.shift.seen {
+        findings.measured_noise.sd_mm = errors.corrected_mm;
+    }
     let precisions: Vec<f64> = fit.prior[own..].iter().map(LogPrior::precision).collect();
     let residuals = descent.linearisation.residuals_mm.as_slice();
     let residual_rms_mm = root_mean_square(residuals).unwrap_or(0.0);

@@ -192,7 +192,7 @@ mod tests {
     use crate::material::random::CounterRng;
 
     const ERRORS: CorrelatedErrors =
-        CorrelatedErrors { noise: Process { sd_mm: 0.05, length_mm: 10.0 }, rigid_mm: 0.1, places: 300 };
+        CorrelatedErrors { noise: Process { sd_mm: 0.05, length_mm: 10.0 }, corrected_mm: 0.05, rigid_mm: 0.1, places: 300 };
 
     fn every_fourth(u: &[[f64; 3]]) -> Vec<MovedNode> {
         (0..u.len()).step_by(4).map(|n| (n as u32, u[n])).collect()

@@ -2,7 +2,7 @@
 
 use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
-use crate::experiment::compare::{Comparison, compare};
+use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
     Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, SEEN_AT,
     SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
@@ -11,8 +11,9 @@ use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
+use crate::experiment::suspects::{lying, with_lying_set};
 use crate::experiment::sweep::Reference;
-use crate::experiment::verdict::Finding;
+use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
 use crate::layout::{ESTIMATE_JSON, ESTIMATE_STATE};
@@ -27,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 15;
+const VERSION: u32 = 16;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -86,6 +87,8 @@ pub(crate) struct HeldBody {
     pub mesh: TetMesh,
     /// What its state is compared with.
     pub reference: Reference,
+    /// Whether its cortex lies stuck on the skull, which is not believed of it.
+    pub lying: bool,
 }
 
 impl HeldBody {
@@ -103,6 +106,19 @@ impl HeldBody {
     fn log_sd(&self, options: &EstimateOptions) -> f64 {
         let slides = self.settings.as_ref().is_some_and(|s| s.supports == Supports::Sliding);
         if slides { options.wall_log_sd } else { options.labels_log_sd }
+    }
+
+    /// The same body with its cortex stuck to the skull where it faces down.
+    pub fn lying(&self) -> Self {
+        let gravity = self.scenario.loads.gravity_m_per_s2;
+        let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
+        Self {
+            settings: self.settings.clone(),
+            mesh: with_lying_set(self.mesh.clone(), &skull, gravity),
+            reference: self.reference.clone(),
+            lying: true,
+            scenario: lying(&self.scenario),
+        }
     }
 
     /// What it assumes, in words.
@@ -127,6 +143,8 @@ pub(crate) struct EstimateInput<'a> {
     pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
     pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
+    /// The body as supports hold it that are not believed in, made when it is asked for.
+    pub suspect: Option<&'a dyn Fn() -> Result<HeldBody, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
@@ -204,7 +222,10 @@ pub(crate) fn estimate(
         let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
-        let found = Estimate { outcome: EstimateOutcome { taught_by, ..found.outcome }, ..found };
+        let verdict = bodies.bounded(work, input, found.outcome.verdict.clone())?;
+        let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
+        let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
+        let found = Estimate { outcome, ..found };
         let mut produced = produced(body, input, found, comparison)?;
         produced.warn(warnings);
         Ok(produced)
@@ -246,6 +267,7 @@ impl Bodies {
             scenario: input.scenario.clone(),
             mesh: input.mesh.0.clone(),
             reference: input.reference.clone(),
+            lying: false,
         };
         let list = if list.is_empty() { vec![as_posed()] } else { list };
         let coarser = match input.coarser {
@@ -259,14 +281,12 @@ impl Bodies {
 
     /// What is estimated of one of them, and its scenario.
     fn posed(
-        &self,
         work: &Work<'_>,
-        number: usize,
+        body: &HeldBody,
         tissues: &[Tissue],
         prior: &PriorSettings,
     ) -> Result<(Vec<(Unknown, LogPrior)>, Scenario), WorkflowError> {
         let options = &work.settings.estimate;
-        let body = &self.list[number];
         let mut unknowns = Vec::new();
         for tissue in tissues {
             unknowns.extend(law_priors(tissue, prior)?);
@@ -282,9 +302,10 @@ impl Bodies {
     }
 
     /// The coarser mesh as one of them is held.
-    fn coarser_of(&self, number: usize) -> Result<Option<TetMesh>, WorkflowError> {
-        let body = &self.list[number];
+    fn coarser_of(&self, body: &HeldBody) -> Result<Option<TetMesh>, WorkflowError> {
+        let gravity = body.scenario.loads.gravity_m_per_s2;
         let supported = |coarse: &TetMesh| match &body.settings {
+            Some(settings) if body.lying => Ok(with_lying_set(coarse.clone(), &settings.skull, gravity)),
             Some(settings) => settings.supported_mesh(coarse.clone(), &body.scenario),
             None => Ok(coarse.clone()),
         };
@@ -297,16 +318,15 @@ impl Bodies {
         &self,
         work: &Work<'_>,
         input: &EstimateInput<'_>,
-        number: usize,
+        body: &HeldBody,
         tissues: &[Tissue],
         prior: &PriorSettings,
     ) -> Result<Option<Estimate>, WorkflowError> {
         let options = &work.settings.estimate;
-        let body = &self.list[number];
-        let (Some(bare), Some(coarse), Some(shift)) = (&self.coarser, self.coarser_of(number)?, input.shift) else {
+        let (Some(bare), Some(coarse), Some(shift)) = (&self.coarser, self.coarser_of(body)?, input.shift) else {
             return Ok(None);
         };
-        let (unknowns, scenario) = self.posed(work, number, tissues, prior)?;
+        let (unknowns, scenario) = Self::posed(work, body, tissues, prior)?;
         let (_, errors, noise_mm) = self.observation(body, input, options);
         let nodes = options.displacement.observed(bare, |x| moved_by(&shift.seen, x));
         let problem = Problem {
@@ -336,11 +356,11 @@ impl Bodies {
         tissues: &[Tissue],
         prior: &PriorSettings,
     ) -> Result<Estimate, WorkflowError> {
-        let rough = self.roughly(work, input, number, tissues, prior)?;
         let options = &work.settings.estimate;
         let body = &self.list[number];
+        let rough = self.roughly(work, input, body, tissues, prior)?;
         let mesh = &body.mesh;
-        let (unknowns, scenario) = self.posed(work, number, tissues, prior)?;
+        let (unknowns, scenario) = Self::posed(work, body, tissues, prior)?;
         let patient = matches!(body.reference, Reference::Surfaces(_));
         let (observation, errors, noise_mm) = self.observation(body, input, options);
         let believed = &options.displacement;
@@ -351,7 +371,7 @@ impl Bodies {
                 Ok(self.deep.iter().map(|(n, x)| (*n, moved_by(&shown, *x))).collect())
             }
         });
-        let coarser = self.coarser_of(number)?;
+        let coarser = self.coarser_of(body)?;
         let problem = Problem {
             mesh,
             template: &scenario,
@@ -368,6 +388,15 @@ impl Bodies {
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         Ok(solve_problem(problem, &settings)?)
+    }
+
+    /// The verdict with bounds that hold for supports as well that are not believed in, on the coarse mesh. Others have none.
+    fn bounded(&self, work: &Work<'_>, input: &EstimateInput<'_>, verdict: Verdict) -> Result<Verdict, WorkflowError> {
+        let Some(make) = input.suspect.filter(|_| verdict.finding == Finding::NoShift) else { return Ok(verdict) };
+        let found = self.roughly(work, input, &make()?, input.tissues, &work.settings.prior)?;
+        // Supports without an equilibrium bound nothing.
+        let other = found.map(|found| found.outcome.verdict);
+        Ok(with_weakest_bounds(verdict.clone(), std::iter::once(&verdict).chain(&other)))
     }
 
     /// What is observed, how far it is believed, and the standard deviation of one observation in mm.

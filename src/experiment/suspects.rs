@@ -1,0 +1,65 @@
+//! Supports that an estimate does not believe in but that a brain may have had all the same: where nothing is seen to move,
+//! stiffness is not the only reason for it, and a bound on the stiffness has to hold under these as well.
+
+use super::skull::SkullSettings;
+use super::supports::{PIAL, with_sliding_sets};
+use crate::fem::Scenario;
+use crate::mesh::TetMesh;
+use nalgebra::Vector3;
+
+/// Node set of the cortex that lies on the bone below it.
+pub const LYING: &str = "lying";
+
+/// Cortex counts as lying on the bone where its outward normal is within 60 degrees of gravity: half or more of the weight
+/// above it presses it there.
+const PRESSED_COSINE: f64 = 0.5;
+
+/// A scenario of held sets whose cortex sticks to the skull as well, where it faces down: for a mesh of [`with_lying_set`].
+#[must_use]
+pub fn lying(held: &Scenario) -> Scenario {
+    let mut scenario = held.clone();
+    scenario.fixed.push(LYING.to_owned());
+    scenario
+}
+
+/// The mesh with [`LYING`]: nodes of the cortex ([`PIAL`]) whose outward normal is within 60 degrees of gravity.
+#[must_use]
+pub fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
+    let nodes = mesh.nodes_mm();
+    let mut normals = vec![Vector3::zeros(); nodes.len()];
+    let tagged = with_sliding_sets(&mesh, skull);
+    for facet in tagged.facet_sets.get(PIAL).map_or(&[][..], Vec::as_slice) {
+        let [a, b, c] = facet.map(|n| Vector3::from(nodes[n as usize]));
+        // As long as twice the facet is large.
+        let normal = (b - a).cross(&(c - a));
+        facet.iter().for_each(|&n| normals[n as usize] += normal);
+    }
+    let down = Vector3::from(gravity_m_per_s2).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+    let pressed = |n: &u32| {
+        let normal = normals[*n as usize];
+        normal.dot(&down) > PRESSED_COSINE * normal.norm()
+    };
+    let lying = (0..nodes.len() as u32).filter(pressed).collect();
+    mesh.node_sets.insert(LYING.to_owned(), lying);
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::block;
+
+    #[test]
+    fn what_lies_on_the_skull_faces_down_whichever_way_that_is() {
+        let mesh = block(4);
+        let skull = SkullSettings { brainstem_cut_mm: -1.0, ..SkullSettings::default() };
+        for (axis, sign) in [(0, 1.0), (1, -1.0), (2, 1.0)] {
+            let mut gravity = [0.0; 3];
+            gravity[axis] = 9.81 * sign;
+            let lying = with_lying_set(mesh.clone(), &skull, gravity).node_sets[LYING].clone();
+            let end = |n: u32| sign * mesh.nodes_mm()[n as usize][axis];
+            let farthest = (0..mesh.nodes_mm().len() as u32).map(end).fold(f64::NEG_INFINITY, f64::max);
+            assert!(!lying.is_empty() && lying.iter().all(|&n| (end(n) - farthest).abs() < 1e-9));
+        }
+    }
+}
