@@ -4,6 +4,7 @@ pub use super::case_files::ReportError;
 
 use super::case_files::{Case, best_sample, displaced};
 use super::case_views::add_results;
+use super::figure::CaseImages;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
 use super::listing::listing;
@@ -21,7 +22,7 @@ use crate::image::Volume;
 use crate::image::nifti::{self, ReadOptions};
 use crate::layout;
 use crate::mesh::TetMesh;
-use crate::mesh::format::Field;
+use crate::mesh::format::{Field, MeshWithFields};
 use std::path::{Path, PathBuf};
 
 /// The brain shift of the model's state on a slice.
@@ -37,6 +38,34 @@ fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftF
     let seen: Volume<[f32; 3], Mni> = nifti::decode_displacement(&seen, layout::SAG)?.relabelled();
     let displacement = state.point_field("displacement").and_then(Field::vectors);
     Ok(displacement.and_then(|u| shift_figure(&t1, &seen, &state.mesh, &u)))
+}
+
+/// The sections that show the scans alone.
+fn scans_of(case: &Case<'_>, images: Option<&CaseImages>) -> Result<CasePage, ReportError> {
+    let Some(images) = images else { return Ok(CasePage::default()) };
+    let seen = case.bytes(layout::SAG)?.map(|bytes| nifti::decode_displacement(&bytes, layout::SAG)).transpose()?;
+    Ok(CasePage {
+        glance: glance_figure(images, seen.map(Volume::relabelled).as_ref()),
+        registration: images.registration(),
+        mosaics: images.mosaics(),
+        ..CasePage::default()
+    })
+}
+
+/// The sections of the samples or the estimate; what of them is not there is named.
+fn results_of(
+    case: &Case<'_>,
+    outcome: Option<&ExperimentOutcome>,
+    rest: Option<&MeshWithFields>,
+    images: Option<&CaseImages>,
+) -> Result<CasePage, ReportError> {
+    let mut page = CasePage::default();
+    match outcome {
+        Some(outcome) if outcome.kind == ExperimentKind::Prediction => {}
+        Some(outcome) => add_results(case, outcome, rest, images, &mut page)?,
+        None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
+    }
+    Ok(page)
 }
 
 /// What the estimate leaves of the displacement of the nodes that it was held against; nothing where those were surfaces.
@@ -72,6 +101,11 @@ fn expected_of(case: &Case<'_>, prediction: Option<&Prediction>) -> Result<Optio
 /// # Errors
 /// [`ReportError`] for a file that is there but cannot be used; what is not there is named on the page.
 pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
+    Ok(read_with_images(folder)?.0)
+}
+
+/// The same with the scans that it shows, where they are there.
+fn read_with_images(folder: &Path) -> Result<(CasePage, Option<CaseImages>), ReportError> {
     let case = Case { folder };
     let outcome = match case.text(layout::OUTCOME)? {
         // A file of an earlier version holds no verdict.
@@ -96,34 +130,39 @@ pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     if let Some(png) = case.bytes(layout::REFUSED_PICTURE)? {
         page.refused = Some(refused(png));
     }
-    if let Some(images) = &images {
-        let seen = case.bytes(layout::SAG)?.map(|bytes| nifti::decode_displacement(&bytes, layout::SAG)).transpose()?;
-        page.glance = glance_figure(images, seen.map(Volume::relabelled).as_ref());
-        page.registration = images.registration();
-        page.mosaics = images.mosaics();
-    }
-    if let Some(rest) = &rest {
-        page.mesh_pictures = cut_views(&rest.mesh, focus_mm(&rest.mesh), PICTURE);
+    page.prediction = case.numbers(layout::PREDICTION_JSON)?;
+    page.evaluation = evaluation_of(&case)?;
+    page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
+    page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
+    let estimated = outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some());
+    // Sections that need nothing of each other are drawn side by side.
+    let ((scans, cuts), (results, (shift, (expected, residuals)))) = rayon::join(
+        || {
+            let cuts = || rest.as_ref().map(|rest| cut_views(&rest.mesh, focus_mm(&rest.mesh), PICTURE));
+            rayon::join(|| scans_of(&case, images.as_ref()), cuts)
+        },
+        || {
+            let predicted = || expected_of(&case, page.prediction.as_ref());
+            let left = || if estimated { residuals_of(&case) } else { Ok(None) };
+            rayon::join(
+                || results_of(&case, outcome.as_ref(), rest.as_ref(), images.as_ref()),
+                || rayon::join(|| shift_of(&case, page.brain_shift.as_ref()), || rayon::join(predicted, left)),
+            )
+        },
+    );
+    let (scans, results) = (scans?, results?);
+    (page.glance, page.registration, page.mosaics) = (scans.glance, scans.registration, scans.mosaics);
+    if let (Some(rest), Some(cuts)) = (&rest, cuts) {
+        page.mesh_pictures = cuts;
         page.mesh_legend = legend(&rest.mesh);
     } else {
         page.absent.push(format!("the mesh ({} is not there)", layout::REST_MESH));
     }
-    match &outcome {
-        Some(outcome) if outcome.kind == ExperimentKind::Prediction => {}
-        Some(outcome) => add_results(&case, outcome, rest.as_ref(), images.as_ref(), &mut page)?,
-        None => page.absent.push(format!("samples and errors ({} is not there; run `hgm sweep`)", layout::OUTCOME)),
-    }
-    page.prediction = case.numbers(layout::PREDICTION_JSON)?;
-    page.evaluation = evaluation_of(&case)?;
-    page.prediction_figure = expected_of(&case, page.prediction.as_ref())?;
-    page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
-    page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
-    page.shift_figure = shift_of(&case, page.brain_shift.as_ref())?;
-    if outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some()) {
-        page.residual_figure = residuals_of(&case)?;
-    }
+    (page.error_map, page.viewer) = (results.error_map, results.viewer);
+    page.absent.extend(results.absent);
+    (page.prediction_figure, page.shift_figure, page.residual_figure) = (expected?, shift?, residuals?);
     page.outcome = outcome;
-    Ok(page)
+    Ok((page, images))
 }
 
 /// The prediction against what was seen: nothing where another prediction was evaluated.
@@ -159,11 +198,11 @@ fn refused(png: Vec<u8>) -> CaptionedPicture {
 /// # Errors
 /// [`ReportError`] as [`read_case`].
 pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
-    let mut page = read_case(folder)?;
+    let (mut page, images) = read_with_images(folder)?;
     let mut files = Vec::new();
     let case = Case { folder };
-    if let Some(images) = case.images()? {
-        files.extend(hand_off::segmentations(&images));
+    if let Some(images) = &images {
+        files.extend(hand_off::segmentations(images));
     }
     if let Some(outcome) = &page.outcome {
         files.extend(hand_off::series(outcome));

@@ -142,8 +142,11 @@ impl Case<'_> {
 
     /// The images in the MNI frame; `None` without the pre-operative image and its brain.
     pub(super) fn images(&self) -> Result<Option<CaseImages>, ReportError> {
-        let pre = self.masked_image(layout::PRE_T1, layout::PRE_BRAIN)?;
-        let Some((pre, pre_brain)) = pre else { return Ok(None) };
+        let (pre, post) = rayon::join(
+            || self.masked_image(layout::PRE_T1, layout::PRE_BRAIN),
+            || self.masked_image(layout::POST_T1, layout::POST_BRAIN),
+        );
+        let Some((pre, pre_brain)) = pre? else { return Ok(None) };
         let pre_from_post = self.transform::<Post, Pre>(layout::PRE_FROM_POST_TEXT)?;
         let mni_from_pre = self.transform::<Pre, Mni>(layout::MNI_FROM_PRE_TEXT)?;
         // As scanned: the coordinates of the one scan are taken for those of the other.
@@ -153,7 +156,7 @@ impl Case<'_> {
         Ok(Some(CaseImages {
             pre,
             pre_brain,
-            post: self.masked_image(layout::POST_T1, layout::POST_BRAIN)?,
+            post: post?,
             labels: self.labels(layout::PRE_LABELS)?,
             resected: self.mask(layout::RESECTED)?,
             cavity: self.mask(layout::CAVITY)?,

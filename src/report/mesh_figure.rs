@@ -9,6 +9,8 @@ use super::render::{Camera, CutPlane, Scene};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::segment::label;
 use nalgebra::Vector3;
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Pixels of the mesh pictures on the page.
 pub const PICTURE: [usize; 2] = [560, 460];
@@ -56,7 +58,7 @@ pub fn cut_views(mesh: &TetMesh, at_mm: [f64; 3], size: [usize; 2]) -> Vec<Capti
     let (surface, colours) = labelled_surface(mesh);
     let names = label_names(mesh);
     CUT_VIEWS
-        .iter()
+        .par_iter()
         .map(|view| {
             let plane = CutPlane::along(view.axis, at_mm[view.axis], view.away);
             let mut scene = Scene::default();
@@ -135,26 +137,16 @@ pub fn value_views(
     let facets = mesh.boundary_facets(|_| true);
     let (surface, old) = TriMesh::from_facets(nodes_mm, &facets);
     let on_surface: Vec<f64> = old.iter().map(|&n| values[n as usize]).collect();
-    let mut pictures = Vec::new();
-    let mut shoot = |scene: &Scene, camera: &Camera, caption: String, seen: &str| {
-        let (picture, _) = scene.render(camera, size[0], size[1]);
-        let description =
-            format!("{seen}, colours: {} from {} to {}", scale.title, number(scale.low, 3), number(scale.high, 3));
-        pictures.push(CaptionedPicture {
-            png: picture.to_png(),
-            size,
-            caption,
-            description,
-            sides: Some(camera.sides()),
-        });
-    };
-    let mut scene = Scene::default();
-    scene.add_surface(&surface, &colours_of(&on_surface, scale), None, false);
+    let mut shots: Vec<Shot> = Vec::new();
+    let mut outside = Scene::default();
+    outside.add_surface(&surface, &colours_of(&on_surface, scale), None, false);
+    let outside = Arc::new(outside);
     for (side, caption) in
         [("left-anterior", "Outer surface from the left"), ("right-anterior", "Outer surface from the right")]
     {
         if let Some(camera) = Camera::named(side) {
-            shoot(&scene, &camera, caption.to_owned(), caption);
+            let (scene, caption) = (Arc::clone(&outside), caption.to_owned());
+            shots.push(Shot { scene, camera, seen: caption.clone(), caption });
         }
     }
     let inside = values.iter().filter(|v| v.is_finite()).count();
@@ -165,7 +157,8 @@ pub fn value_views(
         let mut scene = Scene::default();
         scene.add_surface(&surface, &colours_of(&on_surface, scale), Some(&plane), false);
         scene.add_section(mesh, nodes_mm, &plane, |_, [a, b], w| scale.colour(values[a] + w * (values[b] - values[a])));
-        shoot(&scene, &camera(view), format!("Coronal cut at y = {} mm", fixed(at, 0)), "The mesh cut open");
+        let caption = format!("Coronal cut at y = {} mm", fixed(at, 0));
+        shots.push(Shot { scene: scene.into(), camera: camera(view), caption, seen: "The mesh cut open".to_owned() });
     }
     for set in sets {
         let Some(facets) = set_facets(mesh, set, &facets) else { continue };
@@ -181,11 +174,26 @@ pub fn value_views(
         let open = mean.norm() > 0.25 * surface.area_mm2();
         let side = if open && mean.x > 0.0 { "right-anterior" } else { "left-anterior" };
         if let Some(camera) = Camera::named(side) {
-            let name = super::page::set_name(set);
-            shoot(&scene, &camera, capitalised(&name), &capitalised(&name));
+            let caption = capitalised(&super::page::set_name(set));
+            shots.push(Shot { scene: scene.into(), camera, seen: caption.clone(), caption });
         }
     }
-    pictures
+    let colours = format!("colours: {} from {} to {}", scale.title, number(scale.low, 3), number(scale.high, 3));
+    let shoot = |Shot { scene, camera, caption, seen }: Shot| {
+        let (picture, _) = scene.render(&camera, size[0], size[1]);
+        let (png, sides) = (picture.to_png(), Some(camera.sides()));
+        CaptionedPicture { png, size, caption, description: format!("{seen}, {colours}"), sides }
+    };
+    shots.into_par_iter().map(shoot).collect()
+}
+
+/// A picture that is still to be drawn.
+struct Shot {
+    scene: Arc<Scene>,
+    camera: Camera,
+    caption: String,
+    /// What is seen, for those who do not see it.
+    seen: String,
 }
 
 /// Facets of a set: as named, or the boundary facets whose nodes are all in the node set.

@@ -272,7 +272,8 @@ impl<'w, 'a> Patient<'w, 'a> {
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
         let suspect = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.lying()) };
-        let (shift, coarser, held, suspect) = (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspect as _));
+        let (shift, coarser, held, suspect) =
+            (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspect as _));
         let input = EstimateInput { coarser, held, suspect, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }

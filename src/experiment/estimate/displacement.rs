@@ -37,7 +37,14 @@ pub struct DisplacementSettings {
 
 impl Default for DisplacementSettings {
     fn default() -> Self {
-        Self { depth_mm: 10.0, noise_mm: 0.2, corrected_noise_mm: 0.1, correlation_mm: 20.0, places: 400, re_registrations: 1 }
+        Self {
+            depth_mm: 10.0,
+            noise_mm: 0.2,
+            corrected_noise_mm: 0.1,
+            correlation_mm: 20.0,
+            places: 400,
+            re_registrations: 1,
+        }
     }
 }
 

@@ -483,7 +483,12 @@ mod tests {
         let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
         let problem = Problem {
             unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
-            errors: Errors::Correlated(CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 }),
+            errors: Errors::Correlated(CorrelatedErrors {
+                noise,
+                corrected_mm: noise.sd_mm,
+                rigid_mm: 0.1,
+                places: 150,
+            }),
             start: Vec::new(),
             body_known: false,
             instrument,

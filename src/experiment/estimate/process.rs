@@ -5,6 +5,7 @@ use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, 
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, Par};
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,11 +44,15 @@ impl Factor {
     pub fn new(places_mm: &[[f64; 3]], processes: &[Process]) -> Option<Self> {
         let n = places_mm.len();
         let variance: f64 = processes.iter().map(|p| p.sd_mm * p.sd_mm).sum();
+        let with = |c: usize, r: usize| -> f64 {
+            let distance = (Vector3::from(places_mm[r]) - Vector3::from(places_mm[c])).norm();
+            processes.iter().map(|p| p.covariance_mm2(distance)).sum()
+        };
+        let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(|c| (c..n).map(|r| with(c, r)).collect()).collect();
         let mut lower = Mat::<f64>::zeros(n, n);
-        for c in 0..n {
-            for r in c..n {
-                let distance = (Vector3::from(places_mm[r]) - Vector3::from(places_mm[c])).norm();
-                lower[(r, c)] = processes.iter().map(|p| p.covariance_mm2(distance)).sum();
+        for (c, column) in columns.iter().enumerate() {
+            for (r, covariance) in (c..n).zip(column) {
+                lower[(r, c)] = *covariance;
             }
             lower[(c, c)] += OWN * variance;
         }

@@ -191,8 +191,12 @@ mod tests {
     use crate::experiment::phantom::block;
     use crate::material::random::CounterRng;
 
-    const ERRORS: CorrelatedErrors =
-        CorrelatedErrors { noise: Process { sd_mm: 0.05, length_mm: 10.0 }, corrected_mm: 0.05, rigid_mm: 0.1, places: 300 };
+    const ERRORS: CorrelatedErrors = CorrelatedErrors {
+        noise: Process { sd_mm: 0.05, length_mm: 10.0 },
+        corrected_mm: 0.05,
+        rigid_mm: 0.1,
+        places: 300,
+    };
 
     fn every_fourth(u: &[[f64; 3]]) -> Vec<MovedNode> {
         (0..u.len()).step_by(4).map(|n| (n as u32, u[n])).collect()

@@ -46,8 +46,8 @@ pub(crate) fn error_at_rest(case: &Case, anatomy: &Anatomy, mesh: &TetMesh) -> R
         let (mask, _) = nifti::decode_labels(&case.read(file)?, file, &ReadOptions::default())?;
         Ok(mask_surface(&mask.relabelled::<Mni>().map(|l| l > 0)))
     };
-    let (before, after) = (brain(PRE_BRAIN)?, brain(POST_BRAIN)?);
-    Ok(error_at_rest_mm(mesh, &own, BASE, [&before, &after]))
+    let (before, after) = rayon::join(|| brain(PRE_BRAIN), || brain(POST_BRAIN));
+    Ok(error_at_rest_mm(mesh, &own, BASE, [&before?, &after?]))
 }
 
 /// The stage of a patient with its input.
