@@ -78,7 +78,7 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
         best.verdict = Verdict::new(Finding::CannotTell, best.verdict.explained_share, moduli, reasons);
         best.limits = best.verdict.because();
     }
-    best.verdict = with_weakest_bounds(best.verdict, models.iter().map(|(_, m)| &m.verdict));
+    best.verdict = with_weakest_bounds(best.verdict, &models.iter().map(|(_, m)| &m.verdict));
     let comparison = Comparison { candidates, log_odds, verdict: best.verdict.clone() };
     Some((comparison, best))
 }
@@ -86,7 +86,7 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
 /// Where nothing was seen to move: with the bounds that all these models of the same patient give. One that not every model
 /// gives is none.
 #[must_use]
-pub fn with_weakest_bounds<'a>(verdict: Verdict, models: impl Iterator<Item = &'a Verdict> + Clone) -> Verdict {
+pub fn with_weakest_bounds<'a>(verdict: Verdict, models: &(impl Iterator<Item = &'a Verdict> + Clone)) -> Verdict {
     if verdict.finding != Finding::NoShift {
         return verdict;
     }
@@ -179,7 +179,7 @@ mod tests {
         };
         let of = |bounds: &[Option<f64>]| {
             let models: Vec<Verdict> = bounds.iter().map(|b| verdict(*b)).collect();
-            with_weakest_bounds(models[0].clone(), models.iter())
+            with_weakest_bounds(models[0].clone(), &models.iter())
         };
         assert_eq!(of(&[Some(4130.0), Some(1850.0), Some(9000.0)]), verdict(Some(1850.0)));
         assert_eq!(of(&[Some(4130.0), None]), verdict(None));

@@ -32,7 +32,9 @@ pub fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2
         let [a, b, c] = facet.map(|n| Vector3::from(nodes[n as usize]));
         // As long as twice the facet is large.
         let normal = (b - a).cross(&(c - a));
-        facet.iter().for_each(|&n| normals[n as usize] += normal);
+        for n in facet {
+            normals[*n as usize] += normal;
+        }
     }
     let down = Vector3::from(gravity_m_per_s2).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
     let pressed = |n: &u32| {

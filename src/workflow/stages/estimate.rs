@@ -410,7 +410,7 @@ impl Bodies {
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         // Supports without an equilibrium bound nothing.
         let other = solve_problem(problem, &settings).ok().map(|found| found.outcome.verdict);
-        Ok(with_weakest_bounds(verdict.clone(), std::iter::once(&verdict).chain(&other)))
+        Ok(with_weakest_bounds(verdict.clone(), &std::iter::once(&verdict).chain(&other)))
     }
 
     /// What is observed, how far it is believed, and the standard deviation of one observation in mm.
