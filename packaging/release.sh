@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes what a release consists of: packaging/release.sh [OUT]     (OUT: target/release-VERSION)
 #
-#   hgm-VERSION-x86_64-linux      the program, linked statically: runs on any Linux on a processor since 2009 (SSE4.2)
+#   hgm-VERSION-x86_64-linux      the program, linked statically: runs on any Linux on x86-64 with SSE4.2
 #   hgm-VERSION-*.whl             the Python wheel
 #   hgm-VERSION-containers.tar.gz recipes of the containers and the Boutiques descriptor
 #   hgm-VERSION.cdx.json          what is inside and under which licence (CycloneDX)

@@ -271,10 +271,9 @@ impl<'w, 'a> Patient<'w, 'a> {
         };
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let suspect = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.lying()) };
-        let (shift, coarser, held, suspect) =
-            (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&suspect as _));
-        let input = EstimateInput { coarser, held, suspect, shift, ..self.asked(&tissues) };
+        let stuck = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.stuck()) };
+        let (shift, coarser, held, stuck) = (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&stuck as _));
+        let input = EstimateInput { coarser, held, stuck, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }
 
@@ -302,7 +301,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
-            suspect: None,
+            stuck: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
             rigid_error_mm: settings.resection.registration_error_mm,

@@ -100,7 +100,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
-            suspect: None,
+            stuck: None,
             shift: None,
             noise_mm: self.work.settings.estimate.phantom_noise_mm,
             rigid_error_mm: 0.0,

@@ -85,7 +85,7 @@ pub struct Shift {
 pub struct Findings {
     /// Noise and discrepancy.
     pub unexplained: Unexplained,
-    /// The noise as it was measured.
+    /// What the measurement is worth: its noise, or what is left of it without the instrument's own error.
     pub measured_noise: Process,
     /// Model, any movement, none.
     pub odds: Odds,

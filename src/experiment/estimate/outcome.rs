@@ -110,7 +110,7 @@ pub struct EstimateOutcome {
     /// Noise of the measurement and discrepancy of the model, where errors are alike over a distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unexplained: Option<Unexplained>,
-    /// The measurement's noise before it was held against the residual.
+    /// What the residual is held against: the measurement's noise, or what is left of it without the instrument's own error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_noise: Option<Process>,
     /// How probable the model is beside simpler explanations.
@@ -290,7 +290,7 @@ mod tests {
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
-    use crate::experiment::verdict::Claim;
+    use crate::experiment::verdict::{Claim, Reason};
     use crate::fem::simulate;
     use crate::material::meta_model::MetaModel;
 
@@ -476,19 +476,25 @@ mod tests {
         observed: &[[f64; 3]],
         instrument: Option<(&Instrument<'_>, usize)>,
     ) -> Estimate {
+        let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
+        let errors = CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 };
+        estimated_with(errors, mesh, scenario, observed, instrument)
+    }
+
+    fn estimated_with(
+        errors: CorrelatedErrors,
+        mesh: &TetMesh,
+        scenario: &Scenario,
+        observed: &[[f64; 3]],
+        instrument: Option<(&Instrument<'_>, usize)>,
+    ) -> Estimate {
         let known = |unknown: Unknown| {
             let prior = unknown.prior(1100f64.ln(), 0.4);
             (unknown, prior)
         };
-        let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
         let problem = Problem {
             unknowns: Tissue::grey_and_white().into_iter().map(|t| known(Unknown::ShearModulus(t))).collect(),
-            errors: Errors::Correlated(CorrelatedErrors {
-                noise,
-                corrected_mm: noise.sd_mm,
-                rigid_mm: 0.1,
-                places: 150,
-            }),
+            errors: Errors::Correlated(errors),
             start: Vec::new(),
             body_known: false,
             instrument,
@@ -547,6 +553,33 @@ mod tests {
         let found = estimated(&mesh, &scenario, &observed, Some((&shown, 2))).outcome;
         assert!(found.taken_out_rms_mm.is_some_and(|mm| mm > 0.02), "{:?}", found.taken_out_rms_mm);
         assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
+    }
+
+    /// What the model leaves is less than the measurement's noise, and more than is left of that without the instrument's error.
+    #[test]
+    fn a_model_is_held_against_what_is_left_of_the_noise_once_the_instruments_own_error_is_out() {
+        let (mesh, scenario) = (block(5), settings().scenario());
+        let truth = settings();
+        let posed = scenario_of(&scenario, &truth.tissue_list(), &truth.reference_sample()).unwrap();
+        let u = simulate(&mesh, &posed, &|_| {}).unwrap().displacement_mm;
+        let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.03 * v);
+        let with_wave = |(x, u): (&[f64; 3], &[f64; 3])| {
+            let left = wave(x);
+            [0, 1, 2].map(|a| u[a] + left[a])
+        };
+        let observed: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&u).map(with_wave).collect();
+        let exact = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> { Ok(every_node(u)) };
+        let noise = Process { sd_mm: 0.05, length_mm: 7.5 };
+        let told = |corrected_mm: f64, rounds: usize| {
+            let errors = CorrelatedErrors { noise, corrected_mm, rigid_mm: 0.1, places: 150 };
+            let found = estimated_with(errors, &mesh, &scenario, &observed, Some((&exact, rounds))).outcome;
+            (found.verdict.reasons.iter().any(|r| matches!(r, Reason::Discrepancy { .. })), found.posterior)
+        };
+        let ((lenient, before), (strict, after)) = (told(noise.sd_mm, 1), told(0.005, 1));
+        assert!(!lenient && strict);
+        assert_eq!(before.interval_95, after.interval_95);
+        // Nothing was taken out: the noise counts as it was measured.
+        assert!(!told(0.005, 0).0);
     }
 
     #[test]

@@ -12,9 +12,10 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
+use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const NAME: StageName = StageName::Compare;
 /// The laws of the family.
 const LAWS: [MetaModel; 3] = [MetaModel::NEO_HOOKEAN, MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN];
@@ -35,7 +36,7 @@ pub(crate) fn compare(
         let families = [(1, Tissue::whole_brain()), (2, Tissue::grey_and_white())];
         let bodies = Bodies::of(work, input)?;
         work.tell(|p| p.begin("models", bodies.list.len() * families.len() * LAWS.len()));
-        let (mut models, mut produced) = (Vec::new(), Produced::default());
+        let (mut models, mut seen, mut produced) = (Vec::new(), BTreeMap::new(), Produced::default());
         for (n, body) in bodies.list.iter().enumerate() {
             for (count, tissues) in &families {
                 for law in LAWS {
@@ -45,7 +46,10 @@ pub(crate) fn compare(
                     // A population is of one law: models are held against each other under the literature's priors.
                     let prior = PriorSettings { law, population: None, ..prior.clone() };
                     match bodies.solved(work, input, n, tissues, &prior) {
-                        Ok(found) => models.push((name, found.outcome)),
+                        Ok(found) => {
+                            seen.insert(name.clone(), (tissues, prior, found.seen));
+                            models.push((name, found.outcome));
+                        }
                         // A model that has no equilibrium explains nothing; the others are still compared.
                         Err(error) => {
                             produced.warn([Warning::ModelLeftOut { model: name, reason: error.to_string() }]);
@@ -56,7 +60,10 @@ pub(crate) fn compare(
             }
         }
         work.tell(|p| p.end());
-        let (comparison, _) = weigh(models).ok_or(WorkflowError::NoEvidence)?;
+        let (mut comparison, _) = weigh(models).ok_or(WorkflowError::NoEvidence)?;
+        if let Some((tissues, prior, seen)) = comparison.candidates.first().and_then(|best| seen.get(&best.name)) {
+            comparison.verdict = bodies.bounded(work, input, (tissues.as_slice(), prior), seen, comparison.verdict)?;
+        }
         let json = serde_json::to_string_pretty(&comparison).expect("figures are plain data") + "\n";
         produced.files.push((COMPARISON.to_owned(), json.into_bytes()));
         produced.facts = facts(&comparison);

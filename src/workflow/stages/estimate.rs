@@ -4,14 +4,14 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, Observation, Problem, SEEN_AT,
-    SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, MovedNode, Observation, Problem,
+    SEEN_AT, SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
-use crate::experiment::suspects::{lying, with_lying_set};
+use crate::experiment::stuck_cortex::{with_stuck_cortex, with_stuck_set};
 use crate::experiment::sweep::Reference;
 use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Loads, Scenario};
@@ -28,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 17;
+const VERSION: u32 = 18;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -107,14 +107,14 @@ impl HeldBody {
     }
 
     /// The same body with its cortex stuck to the skull where it faces down.
-    pub fn lying(&self) -> Self {
+    pub fn stuck(&self) -> Self {
         let gravity = self.scenario.loads.gravity_m_per_s2;
         let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
         Self {
             settings: self.settings.clone(),
-            mesh: with_lying_set(self.mesh.clone(), &skull, gravity),
+            mesh: with_stuck_set(self.mesh.clone(), &skull, gravity),
             reference: self.reference.clone(),
-            scenario: lying(&self.scenario),
+            scenario: with_stuck_cortex(&self.scenario),
         }
     }
 
@@ -140,8 +140,8 @@ pub(crate) struct EstimateInput<'a> {
     pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
     pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
-    /// The body as supports hold it that are not believed in, made when it is asked for.
-    pub suspect: Option<&'a dyn Fn() -> Result<HeldBody, WorkflowError>>,
+    /// The body with its cortex stuck to the skull, which is not believed of it, made when it is asked for.
+    pub stuck: Option<&'a dyn Fn() -> Result<HeldBody, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
     pub shift: Option<&'a SeenShift>,
     /// Standard deviation of one distance to a surface (of a node of a phantom), mm.
@@ -219,7 +219,8 @@ pub(crate) fn estimate(
         let taught_by = work.settings.prior.patients();
         let ((name, found), comparison) = found;
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
-        let verdict = bodies.bounded(work, input, &found)?;
+        let of = (input.tissues, prior);
+        let verdict = bodies.bounded(work, input, of, &found.seen, found.outcome.verdict.clone())?;
         let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
         let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
@@ -384,21 +385,27 @@ impl Bodies {
         Ok(solve_problem(problem, &settings)?)
     }
 
-    /// The verdict with bounds that hold for supports as well that are not believed in, by the same displacement. Others have
-    /// none.
-    fn bounded(&self, work: &Work<'_>, input: &EstimateInput<'_>, found: &Estimate) -> Result<Verdict, WorkflowError> {
-        let verdict = found.outcome.verdict.clone();
-        let Some(make) = input.suspect.filter(|_| verdict.finding == Finding::NoShift) else { return Ok(verdict) };
+    /// A verdict of no shift with bounds that hold for a cortex stuck to the skull as well, by the same displacement, `seen`; where
+    /// such a body has no equilibrium nobody knows what it would bound, and none is told. Other verdicts stay as they are.
+    pub fn bounded(
+        &self,
+        work: &Work<'_>,
+        input: &EstimateInput<'_>,
+        (tissues, prior): (&[Tissue], &PriorSettings),
+        seen: &[MovedNode],
+        verdict: Verdict,
+    ) -> Result<Verdict, WorkflowError> {
+        let Some(make) = input.stuck.filter(|_| verdict.finding == Finding::NoShift) else { return Ok(verdict) };
         let options = &work.settings.estimate;
         let body = make()?;
-        let (unknowns, scenario) = Self::posed(work, &body, input.tissues, &work.settings.prior)?;
+        let (unknowns, scenario) = Self::posed(work, &body, tissues, prior)?;
         let (_, errors, noise_mm) = self.observation(&body, input, options);
         let problem = Problem {
             mesh: &body.mesh,
             template: &scenario,
             unknowns,
             poisson_ratio: input.poisson_ratio,
-            observation: Observation::Nodes(found.seen.clone()),
+            observation: Observation::Nodes(seen.to_vec()),
             errors,
             model_log_sd: 0.0,
             body_log_sd: 0.0,
@@ -408,9 +415,9 @@ impl Bodies {
             instrument: None,
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        // Supports without an equilibrium bound nothing.
-        let other = solve_problem(problem, &settings).ok().map(|found| found.outcome.verdict);
-        Ok(with_weakest_bounds(verdict.clone(), &std::iter::once(&verdict).chain(&other)))
+        let stuck = solve_problem(problem, &settings).map(|found| found.outcome.verdict);
+        let stuck = stuck.unwrap_or_else(|_| Verdict::new(Finding::NoShift, None, Vec::new(), Vec::new()));
+        Ok(with_weakest_bounds(verdict.clone(), &[&verdict, &stuck].into_iter()))
     }
 
     /// What is observed, how far it is believed, and the standard deviation of one observation in mm.

@@ -1,5 +1,5 @@
-//! Supports that an estimate does not believe in but that a brain may have had all the same: where nothing is seen to move,
-//! stiffness is not the only reason for it, and a bound on the stiffness has to hold under these as well.
+//! A cortex stuck to the skull where it faces down: no supports that an estimate believes in, but a brain may have had them all the
+//! same. Where nothing is seen to move stiffness is not the only reason for it, and a bound on it has to hold under these as well.
 
 use super::skull::SkullSettings;
 use super::supports::{PIAL, with_sliding_sets};
@@ -7,24 +7,24 @@ use crate::fem::Scenario;
 use crate::mesh::TetMesh;
 use nalgebra::Vector3;
 
-/// Node set of the cortex that lies on the bone below it.
-pub const LYING: &str = "lying";
+/// Node set of the cortex that sticks to the bone below it.
+pub const STUCK: &str = "stuck";
 
-/// Cortex counts as lying on the bone where its outward normal is within 60 degrees of gravity: half or more of the weight
-/// above it presses it there.
+/// Cortex counts as pressed onto the bone where its outward normal is within 60 degrees of gravity: half or more of the weight
+/// above presses it there.
 const PRESSED_COSINE: f64 = 0.5;
 
-/// A scenario of held sets whose cortex sticks to the skull as well, where it faces down: for a mesh of [`with_lying_set`].
+/// A scenario of held sets whose cortex sticks to the skull as well, where it faces down: for a mesh of [`with_stuck_set`].
 #[must_use]
-pub fn lying(held: &Scenario) -> Scenario {
+pub fn with_stuck_cortex(held: &Scenario) -> Scenario {
     let mut scenario = held.clone();
-    scenario.fixed.push(LYING.to_owned());
+    scenario.fixed.push(STUCK.to_owned());
     scenario
 }
 
-/// The mesh with [`LYING`]: nodes of the cortex ([`PIAL`]) whose outward normal is within 60 degrees of gravity.
+/// The mesh with [`STUCK`]: nodes of the cortex ([`PIAL`]) whose outward normal is within 60 degrees of gravity.
 #[must_use]
-pub fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
+pub fn with_stuck_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
     let nodes = mesh.nodes_mm();
     let mut normals = vec![Vector3::zeros(); nodes.len()];
     let tagged = with_sliding_sets(&mesh, skull);
@@ -41,8 +41,8 @@ pub fn with_lying_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2
         let normal = normals[*n as usize];
         normal.dot(&down) > PRESSED_COSINE * normal.norm()
     };
-    let lying = (0..nodes.len() as u32).filter(pressed).collect();
-    mesh.node_sets.insert(LYING.to_owned(), lying);
+    let stuck = (0..nodes.len() as u32).filter(pressed).collect();
+    mesh.node_sets.insert(STUCK.to_owned(), stuck);
     mesh
 }
 
@@ -58,10 +58,10 @@ mod tests {
         for (axis, sign) in [(0, 1.0), (1, -1.0), (2, 1.0)] {
             let mut gravity = [0.0; 3];
             gravity[axis] = 9.81 * sign;
-            let lying = with_lying_set(mesh.clone(), &skull, gravity).node_sets[LYING].clone();
+            let stuck = with_stuck_set(mesh.clone(), &skull, gravity).node_sets[STUCK].clone();
             let end = |n: u32| sign * mesh.nodes_mm()[n as usize][axis];
             let farthest = (0..mesh.nodes_mm().len() as u32).map(end).fold(f64::NEG_INFINITY, f64::max);
-            assert!(!lying.is_empty() && lying.iter().all(|&n| (end(n) - farthest).abs() < 1e-9));
+            assert!(!stuck.is_empty() && stuck.iter().all(|&n| (end(n) - farthest).abs() < 1e-9));
         }
     }
 }
