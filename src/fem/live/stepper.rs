@@ -266,9 +266,10 @@ impl Stepper {
 
     /// Energy and cells, which take a pass over the body.
     pub fn readout(&self) -> Readout {
-        let ratios = || self.model.body.state(&self.u, &self.laws).into_iter().map(|s| s[1]);
+        let cells = self.model.body.state(&self.u, &self.laws);
+        let ratios = || cells.iter().map(|s| s[1]);
         Readout {
-            energy_j: self.model.energy(&self.u, &self.laws),
+            energy_j: self.stored.unwrap_or_else(|| self.model.energy(&self.u, &self.laws)),
             inverted: ratios().filter(|&r| r <= 0.0).count(),
             least_volume_ratio: ratios().fold(f64::INFINITY, f64::min),
         }

@@ -32,8 +32,9 @@ canvas.addEventListener("pointermove", (event) => {
   } else {
     const found = pick({ from, along });
     if (found) ballAt(found, along);
+    // The ball is where the hand is; what is pulled is drawn where the solver has it.
+    turned = true;
   }
-  turned = true;
 });
 function letGo() {
   if (!grip) return;
