@@ -87,20 +87,28 @@ impl Map {
         };
         let family = if part == Part::Points { points } else { images };
         let file = family.of(&state);
-        let (field, sd, believed) = if case.path(&file).exists() {
-            let (sd, mask) = (SHIFT_SD.of(&state), SHIFT_MASK.of(&state));
-            let options = ReadOptions::default();
-            let sd = if part == Part::Points {
-                Some(nifti::decode_intensities(&case.read(&sd)?, &sd, &options)?)
-            } else {
-                None
-            };
-            let (mask, _) = nifti::decode_labels(&case.read(&mask)?, &mask, &options)?;
-            (decode_displacement(&case.read(&file)?, &file)?, sd, mask.map(|l| l > 0))
-        } else {
-            computed(case, &state, family, to)?
+        let options = ReadOptions::default();
+        let mask_of = |file: &str| -> Result<Mask<Native>, WorkflowError> {
+            let (mask, _) = nifti::decode_labels(&case.read(file)?, file, &options)?;
+            Ok(mask.map(|l| l > 0))
         };
-        let (taken, _) = nifti::decode_labels(&case.read(NATIVE_RESECTED)?, NATIVE_RESECTED, &ReadOptions::default())?;
+        let taken = || mask_of(NATIVE_RESECTED);
+        let ((field, sd, believed), taken) = if case.path(&file).exists() {
+            // The vectors take as long to unpack as all the others together.
+            let vectors = || -> Result<_, WorkflowError> { Ok(decode_displacement(&case.read(&file)?, &file)?) };
+            let others = || -> Result<_, WorkflowError> {
+                let of = SHIFT_SD.of(&state);
+                let sd = (part == Part::Points).then(|| -> Result<_, WorkflowError> {
+                    Ok(nifti::decode_intensities(&case.read(&of)?, &of, &options)?)
+                });
+                Ok((sd.transpose()?, mask_of(&SHIFT_MASK.of(&state))?, taken()?))
+            };
+            let (field, others) = rayon::join(vectors, others);
+            let (sd, mask, taken) = others?;
+            ((field?, sd, mask), taken)
+        } else {
+            (computed(case, &state, family, to)?, taken()?)
+        };
         let rigid = match to {
             WarpTo::Post => pre_from_post.inverse().to_matrix(),
             WarpTo::Pre => pre_from_post.to_matrix(),
@@ -117,7 +125,7 @@ impl Map {
             rigid: AffineTransform::from_matrix(&rigid),
             sd,
             believed: Some(believed),
-            resected: Some(taken.map(|l| l > 0)),
+            resected: Some(taken),
             backwards: to == WarpTo::Pre,
             grid: Some(grid),
         };

@@ -114,9 +114,10 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
         }
     };
     if image {
-        let volume = nifti::decode_intensities(&bytes, &name, &asked.reading)?;
+        let (volume, map) = rayon::join(|| nifti::decode_intensities(&bytes, &name, &asked.reading), map);
+        let volume = volume?;
         let labels = asked.labels.unwrap_or_else(|| looks_like_labels(&volume));
-        let (map, state) = map()?;
+        let (map, state) = map?;
         let carried = image_through(&volume, &map, labels);
         write_whole(&asked.output, &encode_intensities(&carried))?;
         let kind = if labels { "labels" } else { "image" };

@@ -76,9 +76,10 @@ pub fn fused(
 
 impl Fused {
     /// The state of what was not seen to move, with the model's spread: what is seen there all the same is the registration's
-    /// noise, and no shift of anybody.
-    pub fn at_rest(model_sd_mm: &[f64]) -> Self {
-        let sd_mm = model_sd_mm.to_vec();
+    /// noise, and no shift of anybody. How far the rigid registration is off nobody has seen either: `rigid_mm` is expected
+    /// of it.
+    pub fn at_rest(model_sd_mm: &[f64], rigid_mm: f64) -> Self {
+        let sd_mm: Vec<f64> = model_sd_mm.iter().map(|sd| sd.hypot(rigid_mm)).collect();
         Self { displacement_mm: vec![[0.0; 3]; sd_mm.len()], model_sd_mm: sd_mm.clone(), sd_mm, left: None }
     }
 }
@@ -284,5 +285,13 @@ mod tests {
         }
         let share = f64::from(inside as u32) / f64::from(all);
         assert!(share > 0.9, "{share}");
+    }
+
+    #[test]
+    fn what_is_at_rest_is_known_no_better_than_the_scans_lie_to_each_other() {
+        let still = Fused::at_rest(&[0.0, 0.3], 0.2);
+        assert_eq!(still.displacement_mm, [[0.0; 3]; 2]);
+        assert_eq!(still.sd_mm, [0.2, 0.3f64.hypot(0.2)]);
+        assert_eq!(still.model_sd_mm, still.sd_mm);
     }
 }

@@ -298,7 +298,7 @@ impl<'a> CaseShift<'a> {
         let at_rest = model.name == ESTIMATE && displacement_mm.iter().flatten().all(|u| *u == 0.0);
         model.fused.get_or_init(|| {
             if at_rest {
-                return Fused::at_rest(sd_mm);
+                return Fused::at_rest(sd_mm, self.believed.errors.rigid_mm);
             }
             fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model), &self.believed.errors)
         })
