@@ -1,6 +1,6 @@
 //! From what the Gaussian process says of a tissue to the samples a sweep tries and the prior an estimate starts from.
 
-use super::estimate::{LogPrior, Scale, Unknown};
+use super::estimate::{Average, LogPrior, Scale, Unknown};
 use super::moments::mean_and_sd;
 use super::person_prior::{person_materials, person_prior};
 use super::population::PopulationPrior;
@@ -24,8 +24,11 @@ use thiserror::Error;
 pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
     pub published: bool,
-    /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person.
-    pub model: GenerativeModel,
+    /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person. Left out:
+    /// estimates start from a person, whom the literature knows far less well than the average of its studies; levels of a
+    /// sweep and predictions are the paper's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<GenerativeModel>,
     /// Whose studies: elastography, linear elasticity or hyperelastic tests.
     pub study: StudyKind,
     /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
@@ -41,7 +44,7 @@ impl Default for PriorSettings {
     fn default() -> Self {
         Self {
             published: false,
-            model: GenerativeModel::Published,
+            model: None,
             study: StudyKind::Hyperelastic,
             law: MetaModel::NEO_HOOKEAN,
             population: None,
@@ -50,6 +53,28 @@ impl Default for PriorSettings {
 }
 
 impl PriorSettings {
+    /// Of whom levels and predictions are.
+    fn model_of_levels(&self) -> GenerativeModel {
+        self.model.unwrap_or(GenerativeModel::Published)
+    }
+
+    /// What an estimate starts from.
+    fn model_of_estimates(&self) -> GenerativeModel {
+        let own = if self.published { GenerativeModel::Published } else { GenerativeModel::StudyLevel };
+        self.model.unwrap_or(own)
+    }
+
+    /// The same with the model that levels and predictions are of, where none is named.
+    #[must_use]
+    pub fn for_predictions(&self) -> Self {
+        Self { model: Some(self.model_of_levels()), ..self.clone() }
+    }
+
+    /// The same with the model that an estimate starts from, where none is named.
+    fn for_estimates(&self) -> Self {
+        Self { model: Some(self.model_of_estimates()), ..self.clone() }
+    }
+
     /// Refuses a population that is not of patients like this one.
     ///
     /// # Errors
@@ -62,7 +87,7 @@ impl PriorSettings {
     #[must_use]
     pub fn learnt(&self, prior: LogPrior) -> LogPrior {
         match self.population.as_ref().and_then(|population| population.of(&prior.name)) {
-            Some(learnt) => LogPrior { mean: learnt.log_mean, sd: Some(learnt.log_sd), ..prior },
+            Some(learnt) => LogPrior { mean: learnt.log_mean, sd: Some(learnt.log_sd), average: None, ..prior },
             None => prior,
         }
     }
@@ -129,7 +154,7 @@ fn materials_of_task(
     }
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: prior.law, ..settings };
-    match prior.model {
+    match prior.model_of_levels() {
         GenerativeModel::Published => sample_shear_moduli(task, levels, &settings)
             .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source }),
         GenerativeModel::StudyLevel => Ok(person_materials(task, levels, DRAWN_STRETCHES, &settings)?),
@@ -218,6 +243,7 @@ pub fn log_prior(tissue: &Tissue, prior: &PriorSettings) -> Result<LogPrior, Pri
         sd: Some(0.5 * (log(2) - log(0))),
         scale: Scale::Logarithm,
         correlation: Vec::new(),
+        average: None,
     })
 }
 
@@ -231,15 +257,23 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and the exponent of
 /// Ogden's law or the share of C1 of Mooney and Rivlin's. The modulus' mean and spread, and its correlation with an exponent,
 /// are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
-/// report) or, of the study-level model, of persons nobody has measured. Those curves share their shape far more than studies do, so an exponent's mean and spread are those of the
-/// published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
+/// report) or, of the study-level model, of persons nobody has measured; then what the paper's process says stands beside it, as the
+/// average of the studies. Those curves share their shape far more than studies do, so an exponent's mean and spread are those
+/// of the published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
 /// as another. What a cohort has taught takes the place of mean and spread.
 ///
 /// # Errors
 /// [`PriorError`].
 pub fn law_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
-    let known = literature_priors(tissue, prior)?;
+    let prior = &prior.for_estimates();
+    let mut known = literature_priors(tissue, prior)?;
+    if prior.model == Some(GenerativeModel::StudyLevel) {
+        let papers = PriorSettings { model: Some(GenerativeModel::Published), ..prior.clone() };
+        for ((_, known), (_, average)) in known.iter_mut().zip(literature_priors(tissue, &papers)?) {
+            known.average = average.sd.map(|sd| Average { mean: average.mean, sd });
+        }
+    }
     Ok(known.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))).collect())
 }
 
@@ -253,7 +287,7 @@ fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unkn
     let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..settings };
     let task = task_of(tissue, prior.study)?;
-    let draws = match prior.model {
+    let draws = match prior.model_of_levels() {
         GenerativeModel::Published => {
             draw_materials(&joint_tissue_prior(task, &table(), &settings), DRAWS, 0, Spread::Study, &settings)
         }
@@ -354,7 +388,7 @@ mod tests {
     #[test]
     fn the_study_level_prior_is_that_of_a_person_and_wider_than_the_papers() {
         let tissue = Tissue::whole_brain().remove(0);
-        let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
+        let person = PriorSettings { model: Some(GenerativeModel::StudyLevel), ..PriorSettings::default() };
         let [papers, own] = [&PriorSettings::default(), &person].map(|prior| log_prior(&tissue, prior).unwrap());
         assert!(own.sd.unwrap() > 1.5 * papers.sd.unwrap(), "{own:?} beside {papers:?}");
         // The law fitted to ln g at the mean has about the modulus that ln g has at rest.
@@ -367,6 +401,20 @@ mod tests {
         assert!((own.sd.unwrap() / sd - 1.0).abs() < 0.4, "{own:?} beside {sd}");
         let two = law_priors(&tissue, &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
         assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));
+    }
+
+    #[test]
+    fn an_estimate_starts_from_a_person_and_keeps_the_papers_average_beside_it() {
+        let tissue = &Tissue::grey_and_white()[0];
+        let own = PriorSettings::default();
+        let [started, predicted] = [&own, &own.for_predictions()].map(|p| law_priors(tissue, p).unwrap().remove(0).1);
+        let papers = log_prior(tissue, &own).unwrap();
+        assert_eq!(started.average, papers.sd.map(|sd| Average { mean: papers.mean, sd }));
+        assert_eq!(predicted, papers);
+        assert!(started.sd.unwrap() > 2.0 * papers.sd.unwrap(), "{started:?}");
+        // Who asks for the published program gets its prior.
+        let published = PriorSettings { published: true, ..PriorSettings::default() };
+        assert_eq!(law_priors(tissue, &published).unwrap()[0].1, log_prior(tissue, &published).unwrap());
     }
 
     #[test]

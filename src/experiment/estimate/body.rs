@@ -70,7 +70,7 @@ impl Unknown {
 
     /// What is known of it beforehand.
     pub fn prior(&self, mean: f64, sd: f64) -> LogPrior {
-        LogPrior { name: self.name(), mean, sd: Some(sd), scale: self.scale(), correlation: Vec::new() }
+        LogPrior { name: self.name(), mean, sd: Some(sd), scale: self.scale(), correlation: Vec::new(), average: None }
     }
 
     /// How tables name it.

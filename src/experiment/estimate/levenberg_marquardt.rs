@@ -300,6 +300,7 @@ mod tests {
                 sd: None,
                 scale: Scale::Logarithm,
                 correlation: Vec::new(),
+                average: None,
             })
             .to_vec()
     }
@@ -342,6 +343,7 @@ mod tests {
             sd: Some(1e-6),
             scale: Scale::Logarithm,
             correlation: Vec::new(),
+            average: None,
         };
         let descent =
             estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();

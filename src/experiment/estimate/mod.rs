@@ -56,6 +56,19 @@ pub struct LogPrior {
     /// Correlation with the parameters right before it, the nearest first; independent of all others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub correlation: Vec<f64>,
+    /// The average of the studies, where `mean` and `sd` are of a person: what lies far from it contradicts the literature, and
+    /// what the data do not narrow it by is not said by them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub average: Option<Average>,
+}
+
+/// A Gaussian over ln(parameter).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Average {
+    /// Its mean.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub sd: f64,
 }
 
 /// What an estimated number stands for.
@@ -106,5 +119,14 @@ impl LogPrior {
     /// 1 / sd^2, zero without prior knowledge.
     pub fn precision(&self) -> f64 {
         self.sd.map_or(0.0, |sd| 1.0 / (sd * sd))
+    }
+
+    /// The average of the studies as a prior, where there is one beside this.
+    #[must_use]
+    pub fn of_average(&self) -> Self {
+        match self.average {
+            Some(Average { mean, sd }) => Self { mean, sd: Some(sd), average: None, ..self.clone() },
+            None => self.clone(),
+        }
     }
 }

@@ -102,6 +102,17 @@ pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
     precision
 }
 
+/// The most probable numbers under other priors than those they were found with, as far as the data are linear there.
+pub fn mode_under(other: &[LogPrior], own: &[LogPrior], numbers: &[f64], fisher: &DMatrix<f64>) -> Vec<f64> {
+    let pull = |prior: &[LogPrior]| {
+        let away = DVector::from_fn(prior.len(), |n, _| numbers[n] - prior[n].mean);
+        joint_precision(prior) * away
+    };
+    // At the minimum the data pull as strongly as the own prior, the other way.
+    let change = invert(&(fisher + joint_precision(other))) * (pull(own) - pull(other));
+    numbers.iter().zip(change.iter()).map(|(number, change)| number + change).collect()
+}
+
 /// The Laplace posterior at a minimum; `fisher` is what the data alone say there ([`information`]).
 pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
     let n = prior.len();
@@ -120,10 +131,13 @@ pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]
 
     let log_sd: Vec<f64> = (0..n).map(|p| covariance[(p, p)].max(0.0).sqrt()).collect();
     let at = |p: usize, z: f64| prior[p].scale.value(log_parameters[p] + z * log_sd[p]);
+    // A person may be anybody: whether the data say anything is asked of the average of the studies.
+    let average: Vec<LogPrior> = prior.iter().map(LogPrior::of_average).collect();
+    let from_average = invert(&(fisher + joint_precision(&average)));
     let verdict = |p: usize| {
         let sd = data_only[(p, p)].max(0.0).sqrt();
-        match prior[p].sd {
-            Some(prior_sd) if log_sd[p] > 0.7 * prior_sd => Knowledge::PriorDominated,
+        match average[p].sd {
+            Some(sd) if from_average[(p, p)].max(0.0).sqrt() > 0.7 * sd => Knowledge::PriorDominated,
             Some(_) => Knowledge::Identified,
             // Written so that an infinite or NaN variance is not identifiable.
             None if Z_95 * sd <= 10f64.ln() => Knowledge::Identified,
@@ -222,7 +236,14 @@ mod tests {
     }
 
     fn prior(sd: Option<f64>) -> LogPrior {
-        LogPrior { name: "mu".to_owned(), mean: 7.0, sd, scale: Scale::Logarithm, correlation: Vec::new() }
+        LogPrior {
+            name: "mu".to_owned(),
+            mean: 7.0,
+            sd,
+            scale: Scale::Logarithm,
+            correlation: Vec::new(),
+            average: None,
+        }
     }
 
     #[test]
@@ -296,6 +317,7 @@ mod tests {
             sd,
             scale: Scale::Plain,
             correlation,
+            average: None,
         };
         let found = joint_precision(&[prior(Some(0.5), vec![]), prior(Some(2.0), vec![0.6]), prior(None, vec![])]);
         let covariance = nalgebra::Matrix2::new(0.25, 0.6, 0.6, 4.0);
@@ -306,5 +328,36 @@ mod tests {
             }
         }
         assert_eq!(found[(2, 2)], 0.0);
+    }
+
+    #[test]
+    fn what_other_priors_would_have_found_is_exact_where_the_data_are_linear() {
+        let of = |mean: f64, sd: f64| LogPrior { mean, ..prior(Some(sd)) };
+        let (person, average) = ([of(7.5, 2.0), of(7.0, 2.2)], [of(7.0, 0.4), of(6.4, 0.3)]);
+        let fisher = DMatrix::from_row_slice(2, 2, &[30.0, -12.0, -12.0, 50.0]);
+        let data = DVector::from_row_slice(&[6.6, 7.2]);
+        let found = |prior: &[LogPrior]| -> Vec<f64> {
+            let precision = joint_precision(prior);
+            let mean = DVector::from_fn(2, |n, _| prior[n].mean);
+            let mode = invert(&(&fisher + &precision)) * (&fisher * &data + precision * mean);
+            mode.iter().copied().collect()
+        };
+        let from_person = found(&person);
+        for (told, known) in mode_under(&average, &person, &from_person, &fisher).iter().zip(found(&average)) {
+            assert!((told - known).abs() < 1e-12, "{told} {known}");
+        }
+        assert_eq!(mode_under(&person, &person, &from_person, &fisher), from_person);
+    }
+
+    #[test]
+    fn whether_the_data_say_anything_is_asked_of_the_average_of_the_studies() {
+        let average = Some(crate::experiment::estimate::Average { mean: 7.0, sd: 0.35 });
+        let person = LogPrior { sd: Some(2.2), average, ..prior(None) };
+        // As good as the average alone: what the data narrow of a person's prior is known without them.
+        let told = |known_to: f64| {
+            let fisher = DMatrix::from_element(1, 1, known_to.powi(-2));
+            laplace(&[7.0], &fisher, std::slice::from_ref(&person)).identifiability.verdicts[0]
+        };
+        assert_eq!([told(0.5), told(0.2)], [Knowledge::PriorDominated, Knowledge::Identified]);
     }
 }

@@ -53,7 +53,7 @@ impl RigidModes {
         let names = ["shift along x", "shift along y", "shift along z", "turn about x", "turn about y", "turn about z"];
         let prior = |(name, sd): (&str, f64)| {
             let name = format!("remainder of the rigid registration: {name}");
-            LogPrior { name, mean: 0.0, sd: Some(sd), scale: Scale::Plain, correlation: Vec::new() }
+            LogPrior { name, mean: 0.0, sd: Some(sd), scale: Scale::Plain, correlation: Vec::new(), average: None }
         };
         names.into_iter().zip(self.sd).map(prior)
     }

@@ -252,6 +252,7 @@ mod tests {
             sd: Some(0.9),
             scale: Scale::Logarithm,
             correlation: Vec::new(),
+            average: None,
         };
         let claims = (0..2).map(|n| {
             let claim = match finding {
