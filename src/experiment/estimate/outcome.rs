@@ -286,7 +286,7 @@ fn tissue_materials(unknowns: &[Unknown], values: &[f64], poisson_ratio: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::estimate::{InstrumentError, Scale, Turn, material};
+    use crate::experiment::estimate::{Average, InstrumentError, Scale, Turn, material};
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
@@ -447,6 +447,24 @@ mod tests {
         assert!((wide - narrow.hypot(0.1).hypot(0.05)).abs() < 1e-12, "{narrow} {wide}");
         assert_eq!(exact.outcome.posterior.mode, rough.outcome.posterior.mode);
         assert_eq!(exact.displacement_sd_mm, rough.displacement_sd_mm);
+    }
+
+    #[test]
+    fn the_average_of_the_studies_judges_a_figure_and_does_not_draw_it() {
+        let (mesh, scenario, observed) = phantom(3);
+        let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+        // The reference's 1370 and 990 Pa, so many standard deviations from an average of theirs.
+        let found = |sds: f64| {
+            let mut posed = Problem { body_known: false, ..problem(&mesh, &scenario, observed.clone()) };
+            for ((_, prior), truth) in posed.unknowns.iter_mut().zip([1370f64, 990.0]) {
+                prior.average = Some(Average { mean: truth.ln() - 0.3 * sds, sd: 0.3 });
+            }
+            solve_problem(posed, &precise).unwrap().outcome
+        };
+        let ([near, far], [allowed, refused]) = ([3.5, 5.0].map(found), [Finding::Identified, Finding::Conflict]);
+        assert_eq!([near.verdict.finding, far.verdict.finding], [allowed, refused]);
+        assert_eq!(near.posterior.mode, far.posterior.mode);
+        assert!(far.verdict.moduli.iter().all(|(_, claim)| *claim == Claim::Withheld), "{:?}", far.verdict);
     }
 
     /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.

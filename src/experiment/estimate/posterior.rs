@@ -102,17 +102,6 @@ pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
     precision
 }
 
-/// The most probable numbers under other priors than those they were found with, as far as the data are linear there.
-pub fn mode_under(other: &[LogPrior], own: &[LogPrior], numbers: &[f64], fisher: &DMatrix<f64>) -> Vec<f64> {
-    let pull = |prior: &[LogPrior]| {
-        let away = DVector::from_fn(prior.len(), |n, _| numbers[n] - prior[n].mean);
-        joint_precision(prior) * away
-    };
-    // At the minimum the data pull as strongly as the own prior, the other way.
-    let change = invert(&(fisher + joint_precision(other))) * (pull(own) - pull(other));
-    numbers.iter().zip(change.iter()).map(|(number, change)| number + change).collect()
-}
-
 /// The Laplace posterior at a minimum; `fisher` is what the data alone say there ([`information`]).
 pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
     let n = prior.len();
@@ -328,25 +317,6 @@ mod tests {
             }
         }
         assert_eq!(found[(2, 2)], 0.0);
-    }
-
-    #[test]
-    fn what_other_priors_would_have_found_is_exact_where_the_data_are_linear() {
-        let of = |mean: f64, sd: f64| LogPrior { mean, ..prior(Some(sd)) };
-        let (person, average) = ([of(7.5, 2.0), of(7.0, 2.2)], [of(7.0, 0.4), of(6.4, 0.3)]);
-        let fisher = DMatrix::from_row_slice(2, 2, &[30.0, -12.0, -12.0, 50.0]);
-        let data = DVector::from_row_slice(&[6.6, 7.2]);
-        let found = |prior: &[LogPrior]| -> Vec<f64> {
-            let precision = joint_precision(prior);
-            let mean = DVector::from_fn(2, |n, _| prior[n].mean);
-            let mode = invert(&(&fisher + &precision)) * (&fisher * &data + precision * mean);
-            mode.iter().copied().collect()
-        };
-        let from_person = found(&person);
-        for (told, known) in mode_under(&average, &person, &from_person, &fisher).iter().zip(found(&average)) {
-            assert!((told - known).abs() < 1e-12, "{told} {known}");
-        }
-        assert_eq!(mode_under(&person, &person, &from_person, &fisher), from_person);
     }
 
     #[test]

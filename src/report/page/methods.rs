@@ -198,7 +198,9 @@ fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &
         "Shear moduli of " (tissues(outcome)) " were estimated by least squares with solver sensitivities from "
         (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from "
         @if let Some(patients) = estimate.taught_by { "a cohort of " (patients) " patients" }
-        @else { "a Gaussian-process model of the literature " (model) }
+        @else if estimate.prior.iter().any(|prior| prior.average.is_some()) {
+            "a study-level model of the literature " (model) ", of a person nobody has measured; its average judged the result"
+        } @else { "a Gaussian-process model of the literature " (model) }
         @if !laws.is_empty() { ", with " (laws) " laws" }
         "; intervals are 95 % intervals of the posterior. "
         @if estimate.taken_out_rms_mm.is_some() {
