@@ -62,7 +62,7 @@ impl PredictSettings {
             list.push(Uncertain { unknown, prior, cause, levels_mm: Vec::new() });
         };
         for tissue in self.tissue_list() {
-            for (unknown, prior) in law_priors(&tissue, &prior.for_predictions())? {
+            for (unknown, prior) in law_priors(&tissue, prior)? {
                 add(unknown, prior, Cause::Stiffness);
             }
         }
