@@ -33,9 +33,10 @@ program="$out.part/hgm-$version-x86_64-linux"
 # Without its tables of names, which nobody who runs it needs.
 strip -o "$program" "${CARGO_TARGET_DIR:-target}/$target/release/hgm"
 # ldd is content with a static program that can be placed anywhere (static-pie); one that is not static names its libraries.
-if ldd "$program" 2>/dev/null | grep -q '=>'; then
-  echo "$program is not static:" >&2
-  ldd "$program" >&2
+# Read whole before it is searched: a pipe that grep leaves early fails ldd now and then, and with it the search.
+libraries=$(ldd "$program" 2>&1 || true)
+if grep -q '=>' <<< "$libraries"; then
+  printf '%s is not static:\n%s\n' "$program" "$libraries" >&2
   exit 1
 fi
 [ "$("$program" --version)" = "hgm $version" ] || {
