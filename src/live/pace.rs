@@ -18,11 +18,11 @@ const NAP: Duration = Duration::from_millis(20);
 /// Steps between two looks at whether the time step still follows the clock.
 const LOOK_EVERY: u64 = 30;
 /// Shortest and longest step in time, s: a hundred a second is more than a screen shows; of a body that the solver cannot keep
-/// up with, one that moves slowly is better than one that jumps, and longer steps take longer to solve (30,000 nodes: 55 ms up
-/// to here, 85 ms for twice the length).
+/// up with, one that moves slowly is better than one that jumps, and longer steps take longer to solve (docs/evidence/choices.md,
+/// "Live view").
 const TIME_STEPS_S: [f64; 2] = [0.01, 0.05];
 /// A time step that is off by less than this part stays: another one makes the preconditioner anew.
-const ANOTHER_STEP: f64 = 0.15;
+const TIME_STEP_SLACK: f64 = 0.15;
 /// Steps a second are counted over this time.
 const COUNT_OVER: Duration = Duration::from_millis(500);
 /// Energy and cells are read out this often: it takes a good part of a step.
@@ -155,7 +155,7 @@ impl<'a> Driver<'a> {
         if self.session.steps().is_multiple_of(LOOK_EVERY) && !self.session.is_quasi_static() {
             let s = (1.1e3 * self.cost_s).ceil() / 1e3;
             let s = s.clamp(TIME_STEPS_S[0], TIME_STEPS_S[1]);
-            if (s / self.session.time_step_s() - 1.0).abs() > ANOTHER_STEP {
+            if (s / self.session.time_step_s() - 1.0).abs() > TIME_STEP_SLACK {
                 self.apply(Command::TimeStep { s }).ok();
             }
         }

@@ -1,7 +1,6 @@
 //! The bundled pair, a synthetic patient whose truth is known, through the whole job, and the phantom beside it.
 
 use super::layer::Layer;
-use super::progress::Later;
 use super::{Case, Goal, Inputs, Place, Progress, Settings, WorkflowError, run_to};
 use crate::artefact::write_whole;
 use crate::mesh::engine::{Engine, MeshSize};
@@ -49,18 +48,7 @@ pub fn demo(
         Ok(path)
     };
     let inputs = Inputs::pair(scan("pre.nii.gz", PRE)?, scan("post.nii.gz", POST)?);
-    let made_phantom = |progress: &mut dyn Progress| super::phantom(false, &at("phantom"), of_phantom, progress);
-    if rayon::current_num_threads() == 1 {
-        return Ok([run_to(Goal::Estimate, &inputs, &at("pair"), of_pair, progress)?, made_phantom(progress)?]);
-    }
-    // The phantom takes what processors the pair leaves idle.
-    let mut later = Later::default();
-    let (pair, phantom) = std::thread::scope(|both| {
-        let beside = both.spawn(|| made_phantom(&mut later));
-        let pair = run_to(Goal::Estimate, &inputs, &at("pair"), of_pair, progress);
-        (pair, beside.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    });
-    let pair = pair?;
-    later.tell(progress);
-    Ok([pair, phantom?])
+    let pair = run_to(Goal::Estimate, &inputs, &at("pair"), of_pair, progress)?;
+    let phantom = super::phantom(false, &at("phantom"), of_phantom, progress)?;
+    Ok([pair, phantom])
 }

@@ -94,7 +94,6 @@ impl Map {
         };
         let taken = || mask_of(NATIVE_RESECTED);
         let ((field, sd, believed), taken) = if case.path(&file).exists() {
-            // The vectors take as long to unpack as all the others together.
             let vectors = || -> Result<_, WorkflowError> { Ok(decode_displacement(&case.read(&file)?, &file)?) };
             let others = || -> Result<_, WorkflowError> {
                 let of = SHIFT_SD.of(&state);

@@ -44,57 +44,6 @@ pub struct Silent;
 
 impl Progress for Silent {}
 
-/// What a job told that ran beside another, kept to be told after that one; its steps are nobody's.
-#[derive(Debug, Default)]
-pub(super) struct Later(Vec<Told>);
-
-#[derive(Debug)]
-enum Told {
-    Stage { stage: StageName, skipped: bool, reasons: Vec<Reason>, warnings: Vec<String> },
-    Odd { file: String, what: String },
-    Noted(String),
-    Detail { of: String, what: String },
-}
-
-impl Later {
-    /// Tells it all, in its order.
-    pub(super) fn tell(&self, progress: &mut dyn Progress) {
-        for told in &self.0 {
-            match told {
-                Told::Stage { stage, skipped, reasons, warnings } => {
-                    progress.stage(&StageEnded { stage, skipped: *skipped, reasons, warnings });
-                }
-                Told::Odd { file, what } => progress.odd(file, what),
-                Told::Noted(what) => progress.noted(what),
-                Told::Detail { of, what } => progress.detail(of, what),
-            }
-        }
-    }
-}
-
-impl Progress for Later {
-    fn stage(&mut self, ended: &StageEnded<'_>) {
-        self.0.push(Told::Stage {
-            stage: ended.stage.clone(),
-            skipped: ended.skipped,
-            reasons: ended.reasons.to_vec(),
-            warnings: ended.warnings.to_vec(),
-        });
-    }
-
-    fn odd(&mut self, file: &str, what: &str) {
-        self.0.push(Told::Odd { file: file.to_owned(), what: what.to_owned() });
-    }
-
-    fn noted(&mut self, what: &str) {
-        self.0.push(Told::Noted(what.to_owned()));
-    }
-
-    fn detail(&mut self, of: &str, what: &str) {
-        self.0.push(Told::Detail { of: of.to_owned(), what: what.to_owned() });
-    }
-}
-
 /// One that whoever asked for the job keeps a hold of. A caller that breaks a job off does so by unwinding out of it, which
 /// must not silence it.
 #[derive(Clone)]

@@ -10,7 +10,6 @@ use hgm::material::study_level::{
     leave_one_publication_out, predict, published_log_density, refit, simulate, uniform_probability,
 };
 use hgm::material::task::stretches;
-use hgm::report::study_level_figure::{TaskBands, bands_figure, left_out_figure};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -33,7 +32,6 @@ pub fn bars() -> Vec<Bar> {
 
 fn left_out(studies: &Studies, all: &StudyLevelFit) -> Vec<Bar> {
     let left = leave_one_publication_out(studies, all).unwrap_or_default();
-    figures(studies, all, &left);
     let points = left.iter().map(|l| l.points).sum::<usize>() as f64;
     let sum = |of: fn(&LeftOut) -> f64| left.iter().map(of).sum::<f64>() / points;
     let (density, at_mode) = (sum(|l| l.log_density), sum(|l| l.log_density_at_mode));
@@ -80,26 +78,6 @@ fn left_out(studies: &Studies, all: &StudyLevelFit) -> Vec<Bar> {
         ),
         Bar::new("study-level: ranks of moduli", "uniform, p >= .01", format!("p = {p:.2} (Kolmogorov)"), p >= 0.01),
     ]
-}
-
-/// The figures beside the evidence.
-fn figures(studies: &Studies, all: &StudyLevelFit, left: &[LeftOut]) {
-    let Some(evidence) = Evidence::new(studies, &all.spreads) else { return };
-    let panel = |task: Task| {
-        let [low, high] = task.stretch_window();
-        let grid = stretches(low, high, 101);
-        let bands =
-            [Of::Study, Of::Laboratory, Of::Mean].map(|of| predict(&evidence.means, &all.spreads, task, of, &grid));
-        let curves = studies.publications.iter().flat_map(|(_, curves)| curves);
-        TaskBands { bands, curves: curves.filter(|curve| curve.task == task).cloned().collect() }
-    };
-    let panels: Vec<TaskBands> = Task::all().map(panel).collect();
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/evidence");
-    std::fs::create_dir_all(&folder).expect("docs/ can be written");
-    for (name, svg) in [("bands", bands_figure(&panels)), ("left-out", left_out_figure(left))] {
-        let file = folder.join(format!("study-level-{name}.svg"));
-        std::fs::write(&file, svg).expect("docs/evidence can be written");
-    }
 }
 
 /// Ten times the studies: copies of the publications, each over a slightly narrower window, so that no grid is shared.

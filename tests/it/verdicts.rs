@@ -1,6 +1,7 @@
 //! One verdict: eight ways a case can end, each read on the page, on the terminal, in the JSON and in the group's table and page.
 
 use hgm::cli::Failure;
+use hgm::experiment::estimate::Average;
 use hgm::experiment::outcome::{Answer, ExperimentKind, ExperimentOutcome, NoiseFloor, SampleOutcome};
 use hgm::experiment::verdict::Finding;
 use hgm::report::cohort::{Cohort, Member, Status};
@@ -182,4 +183,13 @@ fn the_methods_tell_only_what_was_done() {
         // No sentence that ends before it has said anything ("Compared with: .").
         assert!(!text.contains(": .") && !text.contains("with  "), "{name}: {text}");
     }
+}
+
+#[test]
+fn the_methods_name_the_model_that_an_estimate_started_from() {
+    let mut outcome = in_conflict();
+    let methods = |outcome: &ExperimentOutcome| page(outcome).contains("study-level model");
+    assert!(!methods(&outcome));
+    outcome.estimate.as_mut().unwrap().prior[0].average = Some(Average { mean: 6.5, sd: 0.4 });
+    assert!(methods(&outcome));
 }

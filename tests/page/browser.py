@@ -15,8 +15,8 @@ import time
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-dev-shm-usage", "--mute-audio",
-    # WebGL 2 without a graphics card, as a user without one has it: pages are put together by the browser itself. Forced onto
-    # the drawing in software as well (--ignore-gpu-blocklist), that alone would take a core.
+    # WebGL 2 without a graphics card, as a user without one has it: the browser puts pages together itself, where
+    # --ignore-gpu-blocklist would have that drawn in software as well.
     "--enable-unsafe-swiftshader",
     # Whatever is asked for outside goes to a port where nobody listens.
     "--proxy-server=127.0.0.1:9", "--remote-debugging-pipe",

@@ -14,10 +14,12 @@ mod levenberg_marquardt;
 mod mesh_error;
 mod outcome;
 mod posterior;
+mod problem;
 mod process;
 mod projection;
 mod re_registration;
 mod rigid_remainder;
+mod solve;
 mod spread;
 mod verdict_of_fit;
 
@@ -29,13 +31,15 @@ pub use findings::{Odds, ProblemError, Shift};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
-pub use outcome::{Errors, Estimate, EstimateOutcome, Problem, SEEN_AT, SEEN_DISPLACEMENT, solve_problem};
+pub use outcome::{Estimate, EstimateOutcome, SEEN_AT, SEEN_DISPLACEMENT};
 pub use posterior::{
     Identifiability, Knowledge, Posterior, Z_95, information, joint_precision, laplace, prior_correlation,
 };
+pub use problem::{Errors, Problem};
 pub use process::{Factor, Process, spread_out};
 pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, moved_by};
 pub use rigid_remainder::RigidModes;
+pub use solve::solve_problem;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,8 +60,8 @@ pub struct LogPrior {
     /// Correlation with the parameters right before it, the nearest first; independent of all others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub correlation: Vec<f64>,
-    /// The average of the studies, where `mean` and `sd` are of a person: what lies far from it contradicts the literature, and
-    /// what the data do not narrow it by is not said by them.
+    /// The average of the studies, where `mean` and `sd` are of a person: a figure far from it contradicts the literature, and
+    /// data that do not narrow it say nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average: Option<Average>,
 }

@@ -5,8 +5,8 @@ use super::findings::Fitted;
 use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
 
-/// How far from the average of the studies, in its standard deviations, a figure may lie that was not drawn towards it: patients
-/// with true moduli came as far as 3.4, stuck ones from 6 on (docs/evidence/estimate.md).
+/// How far from the average of the studies, in its standard deviations, a figure may lie that was not drawn towards it
+/// (docs/evidence/estimate.md, "A person instead of the average").
 const FAR_FROM_AVERAGE_SD: f64 = 4.0;
 
 /// What a verdict needs of its problem.

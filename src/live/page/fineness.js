@@ -8,8 +8,8 @@ const software = (() => {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 })();
 const fineness = {
-  /// Of a screen's points along an axis. Where the processor draws, half of them are enough for what moves: more would cost the
-  /// solver a third of its steps.
+  /// Of a screen's points along an axis. Where the processor draws, half of them are enough for what moves: more would be
+  /// taken from the solver (docs/evidence/choices.md, "Live view").
   steps: software ? [0.5, 0.35] : [1],
   /// Without several samples a point, more points make up for it at rest.
   atRest: software ? 1.5 : 1,

@@ -199,7 +199,7 @@ fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &
         (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from "
         @if let Some(patients) = estimate.taught_by { "a cohort of " (patients) " patients" }
         @else if estimate.prior.iter().any(|prior| prior.average.is_some()) {
-            "a study-level model of the literature " (model) ", of a person nobody has measured; its average judged the result"
+            "a study-level model of the curves collected by " (model) ", for a person nobody has measured; their average judged the result"
         } @else { "a Gaussian-process model of the literature " (model) }
         @if !laws.is_empty() { ", with " (laws) " laws" }
         "; intervals are 95 % intervals of the posterior. "
