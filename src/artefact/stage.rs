@@ -3,6 +3,7 @@
 use super::manifest::{Manifest, OutputRecord, Provenance, remove_output};
 use super::reason::Reason;
 use super::write::{WriteError, sha256_hex, write_whole};
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -191,11 +192,12 @@ impl Stage {
         for name in old.iter().flat_map(|old| old.outputs.keys()).filter(|name| !made(name)) {
             remove_output(&self.folder, name);
         }
-        let mut outputs = BTreeMap::new();
-        for (name, bytes) in &produced.files {
+        // The disk is waited for once, not file by file.
+        let written = |(name, bytes): &(String, Vec<u8>)| {
             write_whole(&self.folder.join(name), bytes)?;
-            outputs.insert(name.clone(), OutputRecord { sha256: sha256_hex(bytes) });
-        }
+            Ok::<_, WriteError>((name.clone(), OutputRecord { sha256: sha256_hex(bytes) }))
+        };
+        let outputs = produced.files.par_iter().with_max_len(1).map(written).collect::<Result<BTreeMap<_, _>, _>>()?;
         let mut manifest = Manifest {
             program: concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned(),
             stage: self.name.clone(),
@@ -208,10 +210,10 @@ impl Stage {
             facts: produced.facts,
         };
         let text = |manifest: &Manifest| serde_json::to_string_pretty(manifest).expect("a manifest is plain data");
-        for (name, record) in &outputs {
+        outputs.par_iter().try_for_each(|(name, record)| {
             let one = Manifest { outputs: BTreeMap::from([(name.clone(), record.clone())]), ..manifest.clone() };
-            write_whole(&self.folder.join(format!("{name}.manifest.json")), text(&one).as_bytes())?;
-        }
+            write_whole(&self.folder.join(format!("{name}.manifest.json")), text(&one).as_bytes())
+        })?;
         manifest.outputs = outputs;
         write_whole(&self.manifest_path(), text(&manifest).as_bytes())?;
         Ok(StageOutcome { skipped: false, reasons, manifest })

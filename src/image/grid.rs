@@ -1,7 +1,7 @@
 //! Where the voxels of an image lie in space.
 
 use crate::geometry::{Frame, Position};
-use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Point3, RowVector4, Vector3};
 use std::marker::PhantomData;
 
 /// An oriented grid: `dims` voxels along i, j, k and the affine that takes a voxel index (centre of the voxel) to mm.
@@ -22,7 +22,9 @@ impl<F: Frame> Grid<F> {
         if !mm_from_voxel.iter().all(|x| x.is_finite()) || determinant.abs() < 1e-12 {
             return None;
         }
-        let voxel_from_mm = mm_from_voxel.try_inverse()?;
+        let mut voxel_from_mm = mm_from_voxel.try_inverse()?;
+        // Of an affine: what rounding leaves there is none of it.
+        voxel_from_mm.set_row(3, &RowVector4::new(0.0, 0.0, 0.0, 1.0));
         Some(Self { dims, mm_from_voxel, voxel_from_mm, frame: PhantomData })
     }
 
@@ -66,13 +68,21 @@ impl<F: Frame> Grid<F> {
     }
 
     /// Centre of a (fractional) voxel index.
+    #[inline]
     pub fn position(&self, voxel: Point3<f64>) -> Position<F> {
-        Position::from_point(self.mm_from_voxel.transform_point(&voxel))
+        Position::from_point(through(&self.mm_from_voxel, &voxel))
+    }
+
+    /// Centre of voxel (i, j, k).
+    #[inline]
+    pub fn centre(&self, voxel: [usize; 3]) -> Position<F> {
+        self.position(Point3::new(voxel[0] as f64, voxel[1] as f64, voxel[2] as f64))
     }
 
     /// Fractional voxel index of a point.
+    #[inline]
     pub fn voxel_at(&self, p: Position<F>) -> Point3<f64> {
-        self.voxel_from_mm.transform_point(&p.mm)
+        through(&self.voxel_from_mm, &p.mm)
     }
 
     /// Distance between neighbouring voxel centres along i, j, k in mm.
@@ -100,6 +110,13 @@ impl<F: Frame> Grid<F> {
     pub fn coincides(&self, other: &Self, tolerance_mm: f64) -> bool {
         self.dims == other.dims && (self.mm_from_voxel - other.mm_from_voxel).abs().max() <= tolerance_mm
     }
+}
+
+/// A point through an affine, without the division that only a perspective needs: this is done for every voxel of every image.
+#[inline]
+fn through(m: &Matrix4<f64>, p: &Point3<f64>) -> Point3<f64> {
+    let row = |r: usize| m[(r, 0)] * p.x + m[(r, 1)] * p.y + m[(r, 2)] * p.z + m[(r, 3)];
+    Point3::new(row(0), row(1), row(2))
 }
 
 #[cfg(test)]

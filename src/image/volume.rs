@@ -69,6 +69,28 @@ impl<T: Copy, F: Frame> Volume<T, F> {
         Self { grid, data: (0..grid.len()).into_par_iter().map(f).collect() }
     }
 
+    /// The value of a function of the voxel (i, j, k) at every voxel of a grid.
+    pub fn from_voxels(grid: Grid<F>, f: impl Fn([usize; 3]) -> T + Sync + Send) -> Self
+    where
+        T: Default + Send,
+    {
+        let mut volume = Self::filled(grid, T::default());
+        volume.each_voxel(|v, value| *value = f(v));
+        volume
+    }
+
+    /// Calls a function with every voxel (i, j, k) and its value, a row of the memory after the other and rows side by side.
+    pub fn each_voxel(&mut self, f: impl Fn([usize; 3], &mut T) + Sync + Send)
+    where
+        T: Send,
+    {
+        let [nx, ny, _] = self.grid.dims;
+        self.data.par_chunks_mut(nx.max(1)).enumerate().for_each(|(row, values)| {
+            let (j, k) = (row % ny, row / ny);
+            values.iter_mut().enumerate().for_each(|(i, value)| f([i, j, k], value));
+        });
+    }
+
     /// The same voxels in another frame: for a caller that has learnt what a `Native` image is.
     pub fn relabelled<G: Frame>(self) -> Volume<T, G> {
         Volume { grid: self.grid.relabelled(), data: self.data }

@@ -150,7 +150,7 @@ fn rows(moved: impl Fn(Position<Mni>) -> [f64; 3]) -> [[f64; 4]; 3] {
 
 /// Compressed without a time or a name, so that the same scan gives the same bytes.
 fn packed(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
     // Writing to memory does not fail.
     let written = encoder.write_all(bytes).and_then(|()| encoder.finish());
     written.unwrap_or_default()

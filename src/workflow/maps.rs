@@ -223,13 +223,13 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     let field: ShiftField = of_case.state(state)?;
     let vectors = if family == PRE_FROM_POST_FIELD {
         let value = field.to_pre(&of_case.post_grid, &of_case.post_from_pre.inverse());
-        native(Volume::from_fn(of_case.post_grid, value))
+        native(Volume::from_voxels(of_case.post_grid, value))
     } else if family == POST_FROM_PRE_FIELD {
-        native(Volume::from_fn(field.whole, field.to_post(&of_case.post_from_pre)))
+        native(Volume::from_voxels(field.whole, field.to_post(&of_case.post_from_pre)))
     } else if to == WarpTo::Deformed && family == SHIFT {
-        native(Volume::from_fn(field.whole, |n| field.forward_at(n)))
+        native(Volume::from_voxels(field.whole, |v| field.forward_at(v)))
     } else {
-        native(Volume::from_fn(field.whole, |n| field.inverse_at(n)))
+        native(Volume::from_voxels(field.whole, |v| field.inverse_at(v)))
     };
     let sd = native(field.on_whole(&field.sd_mm, 0.0));
     Ok((vectors, Some(sd), native(field.on_whole(&field.believed, false))))

@@ -10,7 +10,6 @@ use crate::geometry::{Native, Position};
 use crate::image::Volume;
 use crate::image::nifti::{self, ReadOptions, decode_displacement, encode_intensities};
 use crate::overlay::{Carried, Drawing, PointState};
-use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -153,8 +152,8 @@ pub fn warp_points(
 
 fn image_through(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> Volume<f32, Native> {
     let grid = map.grid.unwrap_or(volume.grid);
-    let from = |n: usize| {
-        let y: Position<Native> = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+    let from = |v: [usize; 3]| {
+        let y: Position<Native> = grid.centre(v);
         map.source(y).filter(|x| !map.removed(*x, y))
     };
     let between = if labels { Between::Labels } else { Between::Intensities };

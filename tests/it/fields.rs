@@ -64,8 +64,8 @@ fn written(folder: &Path, field: &ShiftField) -> Vec<(&'static str, Volume<[f32;
     let pre_from_post = post_from_pre().inverse();
     let post_grid = Grid::<Post>::new([69; 3], post_from_pre().to_matrix() * grid().mm_from_voxel).unwrap();
     [
-        ("forward", encode_displacement(&field.whole, |n| field.forward_at(n))),
-        ("back", encode_displacement(&field.whole, |n| field.inverse_at(n))),
+        ("forward", encode_displacement(&field.whole, |v| field.forward_at(v))),
+        ("back", encode_displacement(&field.whole, |v| field.inverse_at(v))),
         ("to_post", encode_displacement(&field.whole, field.to_post(&post_from_pre()))),
         ("to_pre", encode_displacement(&post_grid, field.to_pre(&post_grid, &pre_from_post))),
     ]

@@ -3,7 +3,7 @@
 use crate::job::output;
 use hgm::geometry::{Mni, Position, Pre, RigidTransform};
 use hgm::image::Volume;
-use hgm::image::nifti::decode_vectors;
+use hgm::image::nifti::decode_displacement;
 use hgm::register::deformable::DisplacementField;
 use hgm::register::transform_text::rigid_from_text;
 use hgm::resect::midline_shift_mm;
@@ -27,14 +27,14 @@ fn slow_the_midline_shift_that_is_seen_is_the_one_that_went_in() {
     let seen = outcome["volumes"]["midline_shift_mm"].as_f64().unwrap();
 
     let field = |name: &str| {
-        let displacement = decode_vectors(&read(&format!("case/anat/{name}.nii.gz")), "field.nii.gz").unwrap();
+        let displacement = decode_displacement(&read(&format!("case/anat/{name}.nii.gz")), "field.nii.gz").unwrap();
         DisplacementField::<Mni>::from_displacement(&displacement.relabelled())
     };
     let template_from_patient = field("pre_space-MNI_desc-template_displacement");
     let grid = *field("pre_space-MNI_desc-sag_displacement").grid();
     let text = String::from_utf8(read("case/xfm/from-pre_to-MNI.txt")).unwrap();
     let mni_from_pre: RigidTransform<Pre, Mni> = rigid_from_text(&text, "from-pre_to-MNI.txt").unwrap();
-    let truth = decode_vectors(&read("scans/truth/displacement_pre.nii.gz"), "displacement_pre.nii.gz").unwrap();
+    let truth = decode_displacement(&read("scans/truth/displacement_pre.nii.gz"), "displacement_pre.nii.gz").unwrap();
     let truth: Volume<[f32; 3], Pre> = truth.relabelled();
     let went_in = (0..grid.len()).map(|n| {
         let at = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));

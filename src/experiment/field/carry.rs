@@ -20,26 +20,34 @@ pub enum Between {
 pub fn seen_through<S: Frame, T: Frame>(
     source: &Volume<f32, S>,
     target: &Grid<T>,
-    source_from_target: impl Fn(usize) -> Option<Position<S>> + Sync,
+    source_from_target: impl Fn([usize; 3]) -> Option<Position<S>> + Sync + Send,
     removed: Option<&Mask<S>>,
     between: Between,
 ) -> Volume<f32, T> {
     let dims = source.grid.dims;
-    let value = |n: usize| -> Option<f32> {
-        let p = source_from_target(n)?;
-        if removed.is_some_and(|mask| mask.nearest(p) == Some(true)) {
+    let aligned = removed.is_some_and(|mask| mask.grid.coincides(&source.grid, 1e-9));
+    let value = |voxel: [usize; 3]| -> Option<f32> {
+        let p = source_from_target(voxel)?;
+        let v = source.grid.voxel_at(p);
+        let centre = Point3::new(v.x.round_ties_even(), v.y.round_ties_even(), v.z.round_ties_even());
+        let [i, j, k] = [centre.x as isize, centre.y as isize, centre.z as isize];
+        let gone = |mask: &Mask<S>| if aligned { mask.get(i, j, k) } else { mask.nearest(p) };
+        if removed.and_then(gone) == Some(true) {
             return None;
         }
-        let v = source.grid.voxel_at(p);
         // A hair off a centre, by rounding alone, is the centre.
-        let v = Point3::from([v.x, v.y, v.z].map(|x| if (x - x.round()).abs() < 1e-5 { x.round() } else { x }));
+        let near = |a: usize| (v[a] - centre[a]).abs() < 1e-5;
+        if near(0) && near(1) && near(2) {
+            return source.get(i, j, k);
+        }
+        let v = Point3::from([0, 1, 2].map(|a| if near(a) { centre[a] } else { v[a] }));
         let corners = Cell::at(dims, &v)?.weighed(&source.data);
         Some(match between {
             Between::Intensities => corners.iter().map(|(x, w)| f64::from(*x) * w).sum::<f64>() as f32,
             Between::Labels => heaviest(&corners),
         })
     };
-    Volume::from_data(*target, (0..target.len()).into_par_iter().map(|n| value(n).unwrap_or(0.0)).collect())
+    Volume::from_voxels(*target, |v| value(v).unwrap_or(0.0))
 }
 
 fn heaviest(corners: &[(f32, f64); 8]) -> f32 {
@@ -83,8 +91,8 @@ mod tests {
     fn labels_stay_labels_and_intensities_are_mixed() {
         let source = labels();
         let grid = source.grid;
-        let moved = |n: usize| {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+        let moved = |v: [usize; 3]| {
+            let p = grid.centre(v);
             Some(Position::new(p.mm.x - 0.4, p.mm.y, p.mm.z))
         };
         let carried = seen_through(&source, &grid, moved, None, Between::Labels);
@@ -100,7 +108,7 @@ mod tests {
     fn removed_tissue_is_nowhere_and_standing_still_changes_nothing() {
         let source = labels();
         let grid = source.grid;
-        let still = |n: usize| Some(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))));
+        let still = |v: [usize; 3]| Some(grid.centre(v));
         let removed = Mask::from_fn(grid, |n| grid.voxel(n)[2] > 5);
         let carried = seen_through(&source, &grid, still, Some(&removed), Between::Intensities);
         for n in 0..grid.len() {

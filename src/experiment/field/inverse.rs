@@ -10,6 +10,8 @@ use rayon::prelude::*;
 const STEPS: usize = 40;
 /// How near the point carried back must come to the one it started from, in voxels.
 const NEAR: f64 = 1e-4;
+/// The gradient is taken anew where a step leaves more than this part of what was missed.
+const SLOW: f64 = 0.1;
 
 /// The inverse on the same grid: `y + inverse(y) = x` where `x + field(x) = y`, by Newton's method on the field as it is
 /// read, linear between voxels. Where no point of the grid is carried to a voxel, the field is continued with its value
@@ -22,17 +24,18 @@ pub fn inverse<F: Frame>(field: &Volume<[f32; 3], F>) -> Volume<[f32; 3], F> {
     let last = dims.map(|n| n as f64 - 1.0);
     let within =
         |x: &Vector3<f64>| Vector3::new(x.x.clamp(0.0, last[0]), x.y.clamp(0.0, last[1]), x.z.clamp(0.0, last[2]));
-    // Displacement and its gradient, both in voxels.
-    let shift = |x: &Vector3<f64>| {
-        let cell = Cell::at(dims, &Point3::from(within(x)))?;
-        let (value, gradient) = cell.value_and_gradient(&field.data);
-        Some((voxel_from_mm * value, voxel_from_mm * gradient))
+    let cell = |x: &Vector3<f64>| Cell::at(dims, &Point3::from(within(x)));
+    // Displacement in voxels, and what makes a miss a step by its gradient.
+    let shift = |x: &Vector3<f64>| Some(voxel_from_mm * cell(x)?.value(&field.data));
+    let newton = |x: &Vector3<f64>| {
+        let (_, gradient) = cell(x)?.value_and_gradient(&field.data);
+        (Matrix3::identity() + voxel_from_mm * gradient).try_inverse()
     };
     let mut back = Volume::filled(grid, [0f32; 3]);
     back.data.par_chunks_mut(dims[0].max(1)).enumerate().for_each(|(row, out)| {
         let (j, k) = (row % dims[1], row / dims[1]);
-        // The voxel before is a good place to start from.
-        let mut start = Vector3::zeros();
+        // The voxel before is a good place to start from, and its gradient a good one to try first.
+        let (mut start, mut slope) = (Vector3::zeros(), Matrix3::identity());
         for (i, out) in out.iter_mut().enumerate() {
             if field.data[row * dims[0] + i] == [0.0; 3] {
                 // Nothing has moved there: it came from where it is.
@@ -41,26 +44,29 @@ pub fn inverse<F: Frame>(field: &Volume<[f32; 3], F>) -> Volume<[f32; 3], F> {
             }
             let y = Vector3::new(i as f64, j as f64, k as f64);
             let mut x = y + start;
-            let mut best = (f64::INFINITY, x);
-            let mut damping = 1.0;
-            let mut step = Vector3::zeros();
+            let mut best = (f64::INFINITY, x, Vector3::zeros());
+            let (mut damping, mut fresh) = (1.0, false);
             for _ in 0..STEPS {
-                let Some((d, gradient)) = shift(&x) else { break };
+                let Some(d) = shift(&x) else { break };
                 let miss = x + d - y;
                 let size = miss.norm();
-                if size < best.0 {
-                    best = (size, x);
+                let (nearer, slow) = (size < best.0, size > SLOW * best.0);
+                if nearer {
+                    best = (size, x, miss);
                     damping = f64::min(1.0, 2.0 * damping);
                     if size < NEAR {
                         break;
                     }
-                    let newton = (Matrix3::identity() + gradient).try_inverse().map(|inverse| -(inverse * miss));
-                    step = newton.unwrap_or(-miss);
-                } else {
+                    fresh = false;
+                }
+                if slow && !fresh {
+                    slope = newton(&best.1).unwrap_or_else(Matrix3::identity);
+                    fresh = true;
+                } else if !nearer {
                     // Past a kink of the field: half the way from the best place so far.
                     damping *= 0.5;
                 }
-                x = best.1 + damping * step;
+                x = best.1 - damping * (slope * best.2);
             }
             start = best.1 - y;
             let d = mm_from_voxel * start;

@@ -69,14 +69,14 @@ impl StateShift {
         let (largest_mm, median_mm, at) = field.sizes().unwrap_or_default();
         let mut sd: Vec<f32> =
             field.believed.iter().zip(&field.sd_mm).filter(|(b, _)| **b).map(|(_, sd)| *sd).collect();
-        sd.sort_by(f32::total_cmp);
         let count = sd.len();
+        let median = (count > 0).then(|| *sd.select_nth_unstable_by(count / 2, f32::total_cmp).1);
         Self {
             state: state.to_owned(),
             largest_mm: rounded(largest_mm),
             median_mm: rounded(median_mm),
             largest_at_mm: at.map(rounded),
-            sd_median_mm: rounded(sd.get(count / 2).copied().map_or(0.0, f64::from)),
+            sd_median_mm: rounded(median.map_or(0.0, f64::from)),
             jacobian_min: rounded(field.jacobian_min),
             smoothed_voxels: field.changed,
             believed_cc: rounded(count as f64 * field.forward.grid.voxel_volume_mm3() / 1000.0),

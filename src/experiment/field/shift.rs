@@ -12,8 +12,8 @@ use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix4, Point3, Vector3};
 use rayon::prelude::*;
 
-/// Steps of a vector's components, mm: far below what any of it is worth, so that files pack well.
-const STEP_MM: f64 = 1.0 / 512.0;
+/// Steps to a mm of a vector's components: far below what any of it is worth, so that files pack well.
+const STEPS_PER_MM: f64 = 256.0;
 
 /// A state of a mesh in the MNI frame.
 #[derive(Clone, Copy, Debug)]
@@ -88,57 +88,63 @@ pub fn shift_field(
         let mni_from_pre = pre_from_mni.inverse();
         known.par_iter_mut().enumerate().for_each(|(n, value)| {
             let Some(value) = value else { return };
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
-            let u = turned(seen(mni_from_pre.apply(p).mm.into()));
+            let u = turned(seen(mni_from_pre.apply(grid.centre(grid.voxel(n))).mm.into()));
             (0..3).for_each(|a| value[a] = u[a] as f32);
             value[4] = (length(&u) + 1.96 / 3f64.sqrt() * f64::from(value[3])) as f32;
         });
     }
     let brain = cut(&around.brain, first, &grid);
     let resected = cut(&around.resected, first, &grid);
-    from_tissue(&known, &brain, &resected, (around.brain.grid, first), settings)
+    from_tissue(known, &brain, &resected, (around.brain.grid, first), settings)
 }
 
 /// The field of what is known at voxels of tissue: displacement, standard deviation and reach.
 fn from_tissue(
-    known: &[Option<[f32; 5]>],
+    known: Vec<Option<[f32; 5]>>,
     brain: &Mask<Pre>,
     resected: &Mask<Pre>,
     (whole, first): (Grid<Pre>, [usize; 3]),
     settings: &FieldSettings,
 ) -> ShiftField {
     let grid = brain.grid;
-    let tissue = |n: usize| known[n].is_some() && !resected.data[n];
+    let tissue: Vec<bool> = known.par_iter().zip(&resected.data).map(|(v, gone)| v.is_some() && !gone).collect();
     let head = Mask::from_fn(grid, |n| brain.data[n] || known[n].is_some());
     let reached = dilate(&head, settings.fall_mm);
-    let place_of = |n: usize| if tissue(n) || !reached.data[n] { Place::Known } else { Place::Free };
+    let place_of = |n: usize| if tissue[n] || !reached.data[n] { Place::Known } else { Place::Free };
     let place: Vec<Place> = (0..grid.len()).into_par_iter().map(place_of).collect();
-    let value_of = |n: usize| if tissue(n) { known[n].unwrap_or_default() } else { [0.0; 5] };
-    let values = (0..grid.len()).into_par_iter().map(value_of).collect();
+    let value_of = |(known, tissue): (Option<[f32; 5]>, &bool)| known.filter(|_| *tissue).unwrap_or_default();
+    let values = known.into_par_iter().zip(&tissue).map(value_of).collect();
     let values = continued(grid.dims, grid.spacing_mm(), &place, values);
-    let mut mended = mended(Volume::from_fn(grid, |n| [0, 1, 2].map(|c| values[n][c])), settings.jacobian_least);
-    mended.field.data.par_iter_mut().for_each(|v| *v = v.map(rounded));
-    let changed = (0..grid.len()).into_par_iter().filter(|&n| tissue(n) && mended.changed[n]).count();
+    let vectors = values.par_iter().map(|&[x, y, z, ..]| [x, y, z]).collect();
+    let mut mended = mended(Volume::from_data(grid, vectors), settings.jacobian_least);
+    mended.field.data.par_iter_mut().for_each(|v| *v = [rounded(v[0]), rounded(v[1]), rounded(v[2])]);
+    let changed = (0..grid.len()).into_par_iter().filter(|&n| tissue[n] && mended.changed[n]).count();
     let inside = |n: usize, v: f32| if resected.data[n] { 0.0 } else { rounded(v.max(0.0)) };
     let component = |c: usize| values.par_iter().enumerate().map(|(n, v)| inside(n, v[c])).collect();
     let mut inverse = inverse(&mended.field);
-    inverse.data.par_iter_mut().for_each(|v| *v = v.map(rounded));
+    inverse.data.par_iter_mut().for_each(|v| *v = [rounded(v[0]), rounded(v[1]), rounded(v[2])]);
     ShiftField {
         whole,
         first,
         inverse,
         sd_mm: component(3),
         reach95_mm: component(4),
-        believed: (0..grid.len()).into_par_iter().map(|n| tissue(n) && !mended.changed[n]).collect(),
+        believed: (0..grid.len()).into_par_iter().map(|n| tissue[n] && !mended.changed[n]).collect(),
         jacobian_min: mended.jacobian_min,
         changed,
         forward: mended.field,
     }
 }
 
+#[inline]
+fn vector(d: &Vector3<f64>) -> [f32; 3] {
+    [rounded(d.x as f32), rounded(d.y as f32), rounded(d.z as f32)]
+}
+
+#[inline]
 fn rounded(x: f32) -> f32 {
     // Plus zero: no -0 in a file.
-    ((f64::from(x) / STEP_MM).round() * STEP_MM) as f32 + 0.0
+    ((f64::from(x) * STEPS_PER_MM).round_ties_even() / STEPS_PER_MM) as f32 + 0.0
 }
 
 /// The part of a mask's grid that holds its inside and some points, with room around.
@@ -150,8 +156,9 @@ fn part(mask: &Mask<Pre>, points: &[[f64; 3]], room_mm: f64) -> ([usize; 3], Gri
             (low[a], high[a]) = (low[a].min(v[a]), high[a].max(v[a]));
         }
     };
-    for (n, _) in mask.data.iter().enumerate().filter(|(_, inside)| **inside) {
-        hold(grid.voxel(n).map(|v| v as f64));
+    if let Some(inside) = mask.bounding_box() {
+        hold(inside.first.map(|v| v as f64));
+        hold(inside.end.map(|v| v as f64 - 1.0));
     }
     for p in points {
         hold(grid.voxel_at(Position::new(p[0], p[1], p[2])).into());
@@ -173,21 +180,21 @@ fn part(mask: &Mask<Pre>, points: &[[f64; 3]], room_mm: f64) -> ([usize; 3], Gri
 }
 
 fn cut(mask: &Mask<Pre>, first: [usize; 3], grid: &Grid<Pre>) -> Mask<Pre> {
-    Mask::from_fn(*grid, |n| {
-        let v = grid.voxel(n);
-        mask.at(v[0] + first[0], v[1] + first[1], v[2] + first[2])
-    })
+    Mask::from_voxels(*grid, |[i, j, k]| mask.at(i + first[0], j + first[1], k + first[2]))
 }
 
 impl ShiftField {
     /// From a point of the pre-operative scan to the post-operative one, by voxel of the whole grid, mm.
-    pub fn to_post(&self, post_from_pre: &RigidTransform<Pre, Post>) -> impl Fn(usize) -> [f32; 3] + Sync + use<'_> {
+    pub fn to_post(
+        &self,
+        post_from_pre: &RigidTransform<Pre, Post>,
+    ) -> impl Fn([usize; 3]) -> [f32; 3] + Sync + Send + use<'_> {
         let (turn, shift) = (post_from_pre.rotation.to_rotation_matrix(), post_from_pre.translation_mm);
-        move |n| {
-            let x = self.whole.position(Point3::from(self.whole.voxel(n).map(|v| v as f64))).mm.coords;
-            let u = self.forward_at(n).map(f64::from);
-            let d = turn * (x + Vector3::from(u)) + shift - x;
-            [d.x as f32, d.y as f32, d.z as f32].map(rounded)
+        move |v| {
+            let x = self.whole.centre(v).mm.coords;
+            let [u, v, w] = self.forward_at(v);
+            let d = turn * (x + Vector3::new(f64::from(u), f64::from(v), f64::from(w))) + shift - x;
+            vector(&d)
         }
     }
 
@@ -196,38 +203,39 @@ impl ShiftField {
         &self,
         grid: &Grid<Post>,
         pre_from_post: &RigidTransform<Post, Pre>,
-    ) -> impl Fn(usize) -> [f32; 3] + Sync + use<'_> {
-        let (grid, pre_from_post) = (*grid, *pre_from_post);
-        move |n| {
-            let y = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
-            let moved = pre_from_post.apply(y);
+    ) -> impl Fn([usize; 3]) -> [f32; 3] + Sync + Send + use<'_> {
+        let (grid, turn, shift) = (*grid, pre_from_post.rotation.to_rotation_matrix(), pre_from_post.translation_mm);
+        move |v| {
+            let y = grid.centre(v);
+            let moved = Position::from_point(Point3::from(turn * y.mm.coords + shift));
             let back = at(&self.inverse, moved).unwrap_or_default();
             let d = moved.mm.coords + Vector3::from(back) - y.mm.coords;
-            [d.x as f32, d.y as f32, d.z as f32].map(rounded)
+            vector(&d)
         }
     }
 
     /// A voxel of the whole grid as one of the part.
-    fn of_whole(&self, n: usize) -> Option<usize> {
-        let v = self.whole.voxel(n);
+    #[inline]
+    fn of_whole(&self, v: [usize; 3]) -> Option<usize> {
         let dims = self.forward.grid.dims;
-        let at = [0, 1, 2].map(|a| v[a].wrapping_sub(self.first[a]));
-        (0..3).all(|a| at[a] < dims[a]).then(|| self.forward.grid.index(at[0], at[1], at[2]))
+        let at = |a: usize| v[a].wrapping_sub(self.first[a]);
+        let (i, j, k) = (at(0), at(1), at(2));
+        (i < dims[0] && j < dims[1] && k < dims[2]).then(|| self.forward.grid.index(i, j, k))
     }
 
     /// How far the point at a voxel of the whole grid moves, mm.
-    pub fn forward_at(&self, n: usize) -> [f32; 3] {
-        self.of_whole(n).map_or([0.0; 3], |m| self.forward.data[m])
+    pub fn forward_at(&self, voxel: [usize; 3]) -> [f32; 3] {
+        self.of_whole(voxel).map_or([0.0; 3], |m| self.forward.data[m])
     }
 
     /// The same of the inverse.
-    pub fn inverse_at(&self, n: usize) -> [f32; 3] {
-        self.of_whole(n).map_or([0.0; 3], |m| self.inverse.data[m])
+    pub fn inverse_at(&self, voxel: [usize; 3]) -> [f32; 3] {
+        self.of_whole(voxel).map_or([0.0; 3], |m| self.inverse.data[m])
     }
 
     /// A volume of the part on the whole grid, `outside` elsewhere.
-    pub fn on_whole<T: Copy + Send + Sync>(&self, part: &[T], outside: T) -> Volume<T, Pre> {
-        Volume::from_fn(self.whole, |n| self.of_whole(n).map_or(outside, |m| part[m]))
+    pub fn on_whole<T: Copy + Default + Send + Sync>(&self, part: &[T], outside: T) -> Volume<T, Pre> {
+        Volume::from_voxels(self.whole, |v| self.of_whole(v).map_or(outside, |m| part[m]))
     }
 
     /// Largest and median length of the shift over the tissue, mm, and where the largest is (mm, pre-operative scan).
@@ -235,11 +243,13 @@ impl ShiftField {
         let size = |n: usize| self.forward.data[n].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt();
         let mut sizes: Vec<(f64, usize)> =
             (0..self.believed.len()).filter(|&n| self.believed[n]).map(|n| (size(n), n)).collect();
-        sizes.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-        let (largest, at) = *sizes.last()?;
+        // Of equals the first voxel is the largest.
+        let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1));
+        let (largest, at) = sizes.iter().copied().max_by(order)?;
+        let half = sizes.len() / 2;
+        let (_, (median, _), _) = sizes.select_nth_unstable_by(half, order);
         let grid = &self.forward.grid;
-        let place = grid.position(Point3::from(grid.voxel(at).map(|v| v as f64)));
-        Some((largest, sizes[sizes.len() / 2].0, place.mm.into()))
+        Some((largest, *median, grid.centre(grid.voxel(at)).mm.into()))
     }
 }
 
@@ -289,7 +299,7 @@ mod tests {
         let outside = dilate(&around.brain, 8.0);
         for n in 0..field.whole.len() {
             if !outside.data[n] {
-                assert_eq!(field.forward_at(n), [0.0; 3]);
+                assert_eq!(field.forward_at(field.whole.voxel(n)), [0.0; 3]);
             }
         }
         let resected = field.on_whole(&field.believed, false);

@@ -1,20 +1,19 @@
 //! Displacement fields as ITK, ANTs and 3D Slicer read them: five dimensions, the intent "vector" (1007), components in mm
 //! along left, posterior, superior. docs/FIELDS.md has the conventions side by side.
 
-use super::encode::header_1;
+use super::encode::plain_vectors;
 use super::error::{NiftiError, NiftiProblem};
 use super::header::{HEADER_BYTES, Header};
 use super::{check_extension, gzip, orientation, refused, voxels};
 use crate::geometry::{Frame, Native};
 use crate::image::{Grid, Volume};
-use rayon::prelude::*;
 
 /// `NIFTI_INTENT_VECTOR`: ITK takes the numbers as they are, in its own frame (LPS).
-const VECTOR: i32 = 1007;
+const VECTOR: i16 = 1007;
 /// `NIFTI_INTENT_DISPVECT`: components along the axes of NIfTI's frame (RAS); ITK from 5.3 on turns them.
-const DISPLACEMENT: i32 = 1006;
+pub(super) const DISPLACEMENT: i16 = 1006;
 
-/// A displacement (mm, RAS, by voxel in memory order) as `.nii.gz` bytes.
+/// A displacement (mm, RAS, by voxel (i, j, k)) as `.nii.gz` bytes.
 ///
 /// ```
 /// use hgm::geometry::Pre;
@@ -25,30 +24,10 @@ const DISPLACEMENT: i32 = 1006;
 /// let back = nifti::decode_displacement(&bytes, "shift.nii.gz").unwrap();
 /// assert_eq!(back.data[5], [10.0, -1.25, 3.0]);
 /// ```
-pub fn encode_displacement<F: Frame>(grid: &Grid<F>, mm: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<u8> {
-    let mut bytes = header_1(grid, 16, 32);
-    let dims = [5i16, 1, 1, 1, 1, 3];
-    bytes[40..42].copy_from_slice(&dims[0].to_le_bytes());
-    for n in 4..6 {
-        bytes[40 + 2 * n..42 + 2 * n].copy_from_slice(&dims[n].to_le_bytes());
-    }
-    bytes[68..70].copy_from_slice(&(VECTOR as i16).to_le_bytes());
-    let (head, count) = (bytes.len(), grid.len());
-    bytes.resize(head + 12 * count, 0);
-    const PART: usize = 1 << 16;
-    let (x, rest) = bytes[head..].split_at_mut(4 * count);
-    let (y, z) = rest.split_at_mut(4 * count);
-    let parts = x.par_chunks_mut(4 * PART).zip(y.par_chunks_mut(4 * PART)).zip(z.par_chunks_mut(4 * PART));
-    parts.enumerate().for_each(|(part, ((x, y), z))| {
-        let components =
-            x.as_chunks_mut::<4>().0.iter_mut().zip(y.as_chunks_mut::<4>().0).zip(z.as_chunks_mut::<4>().0);
-        for (n, ((x, y), z)) in components.enumerate() {
-            let [r, a, s] = mm(part * PART + n);
-            // Plus zero: no -0 in a file.
-            (*x, *y, *z) = ((-r + 0.0).to_le_bytes(), (-a + 0.0).to_le_bytes(), s.to_le_bytes());
-        }
-    });
-    gzip::pack_fast(&bytes)
+pub fn encode_displacement<F: Frame>(grid: &Grid<F>, mm: impl Fn([usize; 3]) -> [f32; 3] + Sync) -> Vec<u8> {
+    // Plus zero: no -0 in a file.
+    let lps = |[r, a, s]: [f32; 3]| [-r + 0.0, -a + 0.0, s];
+    gzip::pack_fast(plain_vectors(grid, VECTOR, |v| lps(mm(v))))
 }
 
 /// Reads a displacement field of this program, ITK, ANTs or 3D Slicer, and turns it to RAS: three components in the fifth
@@ -86,7 +65,7 @@ fn read(bytes: &[u8]) -> Result<Volume<[f32; 3], Native>, NiftiProblem> {
     let one = layout.bytes as usize;
     let component = |c: usize| voxels(raw[c * one..(c + 1) * one].to_vec(), &layout, &header, slope, intercept);
     let (x, y, z) = (component(0)?, component(1)?, component(2)?);
-    let sign = if header.intent == DISPLACEMENT { 1.0 } else { -1.0 };
+    let sign = if header.intent == i32::from(DISPLACEMENT) { 1.0 } else { -1.0 };
     let vectors: Vec<[f32; 3]> =
         x.iter().zip(&y).zip(&z).map(|((&x, &y), &z)| [sign * x + 0.0, sign * y + 0.0, z]).collect();
     if let Some(n) = vectors.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
@@ -111,7 +90,7 @@ mod tests {
     fn what_itk_reads_and_what_the_standard_says_come_back_the_same() {
         let grid = Grid::<Pre>::axis_aligned([5, 4, 3], [1.0, 2.0, 3.0], [-4.0, 7.0, 1.0]);
         let shift = Volume::from_fn(grid, |n| [n as f32, -0.5 * n as f32, 0.25]);
-        let itk = decode_displacement(&encode_displacement(&grid, |n| shift.data[n]), "a.nii.gz").unwrap();
+        let itk = decode_displacement(&encode_displacement(&grid, |[i, j, k]| shift.at(i, j, k)), "a.nii.gz").unwrap();
         let standard = decode_displacement(&encode_vectors(&shift), "a.nii.gz").unwrap();
         assert_eq!(itk.relabelled::<Pre>(), shift);
         assert_eq!(standard.relabelled::<Pre>(), shift);

@@ -1,5 +1,6 @@
 //! Volumes to NIfTI bytes: one deterministic `.nii.gz`, without a word about the patient, the machine or the time.
 
+use super::displacement::DISPLACEMENT;
 use super::gzip;
 use super::orientation::shear;
 use crate::geometry::Frame;
@@ -9,22 +10,22 @@ use rayon::prelude::*;
 
 /// 32-bit floats as `.nii.gz` bytes.
 pub fn encode_f32<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
-    encode(&volume.grid, 16, 32, volume.data.iter().flat_map(|x| x.to_le_bytes()))
+    gzip::pack(plain(volume, 16, f32::to_le_bytes))
 }
 
 /// The same packed in less time: maps of numbers that are like no other.
 pub fn encode_numbers<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
-    gzip::pack_fast(&plain(&volume.grid, 16, 32, volume.data.iter().flat_map(|x| x.to_le_bytes())))
+    gzip::pack_fast(plain(volume, 16, f32::to_le_bytes))
 }
 
 /// Bytes (labels, small intensities) as `.nii.gz` bytes.
 pub fn encode_u8<F: Frame>(volume: &Volume<u8, F>) -> Vec<u8> {
-    encode(&volume.grid, 2, 8, volume.data.iter().copied())
+    gzip::pack(plain(volume, 2, |x| [x]))
 }
 
 /// 16-bit integers as `.nii.gz` bytes.
 pub fn encode_i16<F: Frame>(volume: &Volume<i16, F>) -> Vec<u8> {
-    encode(&volume.grid, 4, 16, volume.data.iter().flat_map(|x| x.to_le_bytes()))
+    gzip::pack(plain(volume, 4, i16::to_le_bytes))
 }
 
 /// Intensities as `.nii.gz` bytes: whole numbers in 8 or 16 bits where all are and fit, else 32-bit floats.
@@ -42,35 +43,68 @@ pub fn encode_intensities<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {
 
 /// A mask as `.nii.gz` bytes: 1 inside, 0 outside, 8 bits.
 pub fn encode_mask<F: Frame>(mask: &Mask<F>) -> Vec<u8> {
-    encode(&mask.grid, 2, 8, mask.data.iter().map(|&inside| u8::from(inside)))
+    gzip::pack(plain(mask, 2, |inside| [u8::from(inside)]))
 }
 
 /// Three 32-bit floats per voxel (a displacement in mm, RAS) as `.nii.gz` bytes, 5-D with `dim[5] = 3` as the NIfTI
 /// standard stores vectors.
 pub fn encode_vectors<F: Frame>(volume: &Volume<[f32; 3], F>) -> Vec<u8> {
-    let component = |c: usize| volume.data.iter().flat_map(move |v| v[c].to_le_bytes());
-    let data = component(0).chain(component(1)).chain(component(2));
-    let mut bytes = header_1(&volume.grid, 16, 32);
-    bytes[40..42].copy_from_slice(&5i16.to_le_bytes());
-    for (n, size) in [(4, 1i16), (5, 3)] {
-        bytes[40 + 2 * n..42 + 2 * n].copy_from_slice(&size.to_le_bytes());
+    gzip::pack(plain_vectors(&volume.grid, DISPLACEMENT, |[i, j, k]| volume.at(i, j, k)))
+}
+
+/// Header of five dimensions and three components, one after the other.
+pub(super) fn plain_vectors<F: Frame>(
+    grid: &Grid<F>,
+    intent: i16,
+    value: impl Fn([usize; 3]) -> [f32; 3] + Sync,
+) -> Vec<u8> {
+    let mut header = header_1(grid, 16, 32);
+    for (n, size) in [(0, 5i16), (4, 1), (5, 3)] {
+        header[40 + 2 * n..42 + 2 * n].copy_from_slice(&size.to_le_bytes());
     }
-    // NIFTI_INTENT_DISPVECT
-    bytes[68..70].copy_from_slice(&1006i16.to_le_bytes());
-    bytes.extend(data);
-    gzip::pack(&bytes)
+    header[68..70].copy_from_slice(&intent.to_le_bytes());
+    let (head, count) = (header.len(), grid.len());
+    let mut bytes = with_room(&header, 12 * count);
+    let [nx, ny, _] = grid.dims;
+    let (x, rest) = bytes[head..].split_at_mut(4 * count);
+    let (y, z) = rest.split_at_mut(4 * count);
+    let row = 4 * nx.max(1);
+    let rows = x.par_chunks_mut(row).zip(y.par_chunks_mut(row)).zip(z.par_chunks_mut(row));
+    rows.enumerate().for_each(|(row, ((x, y), z))| {
+        let (j, k) = (row % ny, row / ny);
+        let components =
+            x.as_chunks_mut::<4>().0.iter_mut().zip(y.as_chunks_mut::<4>().0).zip(z.as_chunks_mut::<4>().0);
+        for (i, ((x, y), z)) in components.enumerate() {
+            let [a, b, c] = value([i, j, k]);
+            // Zeros are there already, in memory that the system need not hand out.
+            if [a, b, c] != [0.0; 3] {
+                (*x, *y, *z) = (a.to_le_bytes(), b.to_le_bytes(), c.to_le_bytes());
+            }
+        }
+    });
+    bytes
 }
 
-fn encode<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16, data: impl Iterator<Item = u8>) -> Vec<u8> {
-    gzip::pack(&plain(grid, datatype, bits, data))
-}
-
-fn plain<F: Frame>(grid: &Grid<F>, datatype: i16, bits: i16, data: impl Iterator<Item = u8>) -> Vec<u8> {
+/// Header and values of `N` bytes each.
+fn plain<T: Copy + Sync, F: Frame, const N: usize>(
+    volume: &Volume<T, F>,
+    datatype: i16,
+    to_bytes: impl Fn(T) -> [u8; N] + Sync,
+) -> Vec<u8> {
+    let (grid, bits) = (&volume.grid, 8 * N as i16);
     // NIfTI-1 stores sizes in 16 bits; everything reads it, so NIfTI-2 only where it must be.
     let large = grid.dims.iter().any(|&n| n > i16::MAX as usize);
-    let mut bytes = if large { header_2(grid, datatype, bits) } else { header_1(grid, datatype, bits) };
-    bytes.reserve_exact(grid.len() * bits as usize / 8);
-    bytes.extend(data);
+    let header = if large { header_2(grid, datatype, bits) } else { header_1(grid, datatype, bits) };
+    let mut bytes = with_room(&header, N * grid.len());
+    let values = bytes[header.len()..].par_chunks_exact_mut(N).zip(&volume.data);
+    values.with_min_len(1 << 14).for_each(|(out, x)| out.copy_from_slice(&to_bytes(*x)));
+    bytes
+}
+
+/// A header and zeros behind it, which the system hands out when they are first written.
+fn with_room(header: &[u8], room: usize) -> Vec<u8> {
+    let mut bytes = vec![0; header.len() + room];
+    bytes[..header.len()].copy_from_slice(header);
     bytes
 }
 

@@ -20,12 +20,15 @@ pub use error::{NiftiError, NiftiProblem};
 pub use warning::NiftiWarning;
 pub use which::Orientation;
 
+use super::grid::Grid;
 use super::volume::{LabelMap, Mask, Volume};
 use crate::geometry::Native;
 use header::{Header, Layout};
 use nifti::{InMemNiftiVolume, IntoNdArray, NiftiType};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Choices that a file may leave open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -83,13 +86,13 @@ pub fn decode_labels(
 ) -> Result<(LabelMap<Native>, Vec<NiftiWarning>), NiftiError> {
     let image = read(bytes, name, options)?;
     // Scaling in 32 bits leaves 2.9999998 for 3.
-    let is_label = |x: f32| (x - x.round()).abs() < 1e-3 && (-0.5..255.5).contains(&x);
-    let count = image.volume.data.iter().filter(|&&x| !is_label(x)).count();
+    let is_label = |x: f32| (x - x.round_ties_even()).abs() < 1e-3 && (-0.5..255.5).contains(&x);
+    let count = image.volume.data.par_iter().filter(|&&x| !is_label(x)).count();
     if count > 0 {
         let first = image.volume.data.iter().copied().find(|&x| !is_label(x)).unwrap_or(f32::NAN);
         return Err(refused(name, NiftiProblem::NotLabels { count, first }));
     }
-    Ok((image.volume.map(|x| x.round() as u8), image.warnings))
+    Ok((image.volume.map(|x| x.round_ties_even() as u8), image.warnings))
 }
 
 /// Reads a label map as another tool wrote it: whole numbers from 0 to 2^24. Returns the warnings beside it.
@@ -154,38 +157,23 @@ pub fn decode_mask(
 /// Numbers of a label map that a message lists.
 const MOST_LISTED: usize = 6;
 
-/// Reads a displacement as [`encode_vectors`] writes it: three volumes, the components in mm along R, A, S.
-///
-/// ```
-/// use hgm::geometry::Mni;
-/// use hgm::image::{Grid, Volume, nifti};
-///
-/// let grid = Grid::<Mni>::axis_aligned([4, 3, 2], [2.0; 3], [-4.0, 0.0, 1.0]);
-/// let shift = Volume::filled(grid, [0.5f32, -1.25, 3.0]);
-/// let back = nifti::decode_vectors(&nifti::encode_vectors(&shift), "shift.nii.gz").unwrap();
-/// assert_eq!(back.relabelled::<Mni>(), shift);
-/// ```
+/// Where the voxels of a NIfTI file lie; they themselves are not looked at.
 ///
 /// # Errors
-/// [`NiftiError`], also for a file with fewer than three volumes.
-pub fn decode_vectors(bytes: &[u8], name: &str) -> Result<Volume<[f32; 3], Native>, NiftiError> {
-    if read(bytes, name, &ReadOptions::default()).is_ok() {
-        return Err(refused(name, NiftiProblem::NoSuchVolume { chosen: 1, volumes: 1 }));
-    }
-    let component = |n: usize| {
-        let options = ReadOptions { volume: Some(n), ..ReadOptions::default() };
-        read(bytes, name, &options).map(|image| image.volume)
+/// [`NiftiError`] for a header that is refused.
+pub fn decode_grid(bytes: &[u8], name: &str) -> Result<Grid<Native>, NiftiError> {
+    let read = || {
+        let header = Header::parse(&head_of(bytes)?)?;
+        let dims = header.layout(Some(0))?.dims;
+        Ok(orientation::grid(&header, dims, None, &mut Vec::new())?.0)
     };
-    let (x, y, z) = (component(0)?, component(1)?, component(2)?);
-    let vectors = x.data.iter().zip(&y.data).zip(&z.data).map(|((&x, &y), &z)| [x, y, z]);
-    Ok(Volume::from_data(x.grid, vectors.collect()))
+    read().map_err(|problem| refused(name, problem))
 }
 
 /// Whether the header says that the coordinates are those of the MNI template (code 4 for the affine that is believed).
 /// False for what is no NIfTI.
 pub fn says_mni(bytes: &[u8]) -> bool {
-    let head = if gzip::is_gzip(bytes) { gzip::head(bytes, header::HEADER_BYTES) } else { Ok(bytes.to_vec()) };
-    let Some(header) = head.ok().and_then(|head| Header::parse(&head).ok()) else { return false };
+    let Some(header) = head_of(bytes).ok().and_then(|head| Header::parse(&head).ok()) else { return false };
     (if header.sform_code > 0 { header.sform_code } else { header.qform_code }) == 4
 }
 
@@ -216,16 +204,19 @@ fn check_extension(name: &str) -> Result<(), NiftiProblem> {
     Err(NiftiProblem::Extension { hint })
 }
 
+/// The first bytes, unpacked.
+fn head_of(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NiftiProblem> {
+    if gzip::is_gzip(bytes) {
+        gzip::head(bytes, header::HEADER_BYTES).map(Cow::Owned)
+    } else {
+        Ok(Cow::Borrowed(bytes))
+    }
+}
+
 fn read_checked(bytes: &[u8], mgh: bool, options: &ReadOptions) -> Result<NiftiImage, NiftiProblem> {
     let packed = gzip::is_gzip(bytes);
-    let unpacked;
-    let head = if packed {
-        unpacked = gzip::head(bytes, header::HEADER_BYTES)?;
-        &unpacked[..]
-    } else {
-        bytes
-    };
-    let header = if mgh { mgh::header(head)? } else { Header::parse(head)? };
+    let head = head_of(bytes)?;
+    let header = if mgh { mgh::header(&head)? } else { Header::parse(&head)? };
     let layout = header.layout(options.volume)?;
     let (slope, intercept) = header.scaling()?;
     let mut warnings = Vec::new();

@@ -44,6 +44,21 @@ impl NumberType {
         }
     }
 
+    /// Numbers one after the other. The types that this program writes take the short way.
+    fn read_all(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
+        match self {
+            Self::Float32 if !big_endian => {
+                bytes.as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
+            }
+            Self::Float64 if !big_endian => bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect(),
+            Self::Int(8) if !big_endian => {
+                bytes.as_chunks::<8>().0.iter().map(|b| i64::from_le_bytes(*b) as f64).collect()
+            }
+            Self::UInt(1) => bytes.iter().map(|b| f64::from(*b)).collect(),
+            _ => bytes.chunks_exact(self.bytes()).map(|b| self.read(b, big_endian)).collect(),
+        }
+    }
+
     /// Integers beyond 2^53 lose digits; no node number or label is that large.
     fn read(self, bytes: &[u8], big_endian: bool) -> f64 {
         let mut word = [0u8; 8];
@@ -92,6 +107,13 @@ impl<'a> Source<'a> {
             Self::Base64 { text, ready } => {
                 if count > ready.len() + text.len() {
                     return Err(short(count, ready.len() + text.len() / 4 * 3));
+                }
+                // Text without white space or padding, as most writers have it, at once.
+                let (whole, after) = text.split_at(text.len().min(count.saturating_sub(ready.len()) / 3 * 4));
+                let before = ready.len();
+                match BASE64_STANDARD.decode_vec(whole, ready) {
+                    Ok(()) => *text = after,
+                    Err(_) => ready.truncate(before),
                 }
                 let mut group = [0u8; 4];
                 let mut filled = 0;
@@ -167,7 +189,7 @@ pub(super) fn numbers_from_bytes(
     if bytes.len() % number.bytes() != 0 {
         return Err(format!("{} bytes are no whole number of values of {} bytes", bytes.len(), number.bytes()));
     }
-    Ok(bytes.chunks_exact(number.bytes()).map(|b| number.read(b, storage.big_endian)).collect())
+    Ok(number.read_all(&bytes, storage.big_endian))
 }
 
 /// Inline base64 text of zlib blocks with `UInt64` header words, little-endian.
@@ -198,6 +220,27 @@ mod tests {
             let text = base64_zlib(&bytes);
             let back = numbers_from_bytes(Source::base64(text.as_bytes()), storage, NumberType::UInt(1)).unwrap();
             assert_eq!(back, bytes.iter().map(|&b| f64::from(b)).collect::<Vec<_>>());
+        }
+    }
+
+    /// Some writers break base64 text into lines, and pad the header apart from the data.
+    #[test]
+    fn broken_and_padded_text_says_the_same_as_text_in_one_piece() {
+        let storage = Storage { big_endian: false, header_bytes: 8, zlib: false };
+        let bytes: Vec<u8> = (0..6400u32).map(|n| (n * n % 251) as u8).collect();
+        let header = (bytes.len() as u64).to_le_bytes();
+        let together = BASE64_STANDARD.encode([&header[..], &bytes].concat());
+        let apart = BASE64_STANDARD.encode(header) + &BASE64_STANDARD.encode(&bytes);
+        let lines = together.as_bytes().chunks(76).collect::<Vec<_>>().join(&b'\n');
+        for number in
+            [NumberType::Float64, NumberType::Float32, NumberType::Int(8), NumberType::UInt(1), NumberType::Int(2)]
+        {
+            let read = |text: &[u8]| numbers_from_bytes(Source::base64(text), storage, number).unwrap();
+            let one_by_one: Vec<f64> = bytes.chunks_exact(number.bytes()).map(|b| number.read(b, false)).collect();
+            for text in [together.as_bytes(), apart.as_bytes(), &lines] {
+                let same = read(text).iter().zip(&one_by_one).all(|(a, b)| a.to_bits() == b.to_bits());
+                assert!(same && read(text).len() == one_by_one.len(), "{number:?}");
+            }
         }
     }
 

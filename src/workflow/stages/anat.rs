@@ -72,7 +72,7 @@ impl Anatomy {
             }
         }
         let field = |name: &str| -> Result<DisplacementField<Mni>, WorkflowError> {
-            let displacement = nifti::decode_vectors(&case.read(name)?, name)?;
+            let displacement = nifti::decode_displacement(&case.read(name)?, name)?;
             Ok(DisplacementField::from_displacement(&displacement.relabelled()))
         };
         Ok(Self {

@@ -52,7 +52,7 @@ impl Earlier {
             if data.len() == pre.grid.len() { Ok(Volume::from_data(pre.grid, data)) } else { Err(self.damaged(name)) }
         };
         let (labels, brain): (_, Mask<Pre>) = (of_pre(PRE_NATIVE_LABELS)?, of_pre(PRE_NATIVE_BRAIN)?.map(|l| l > 0));
-        let deformation = nifti::decode_vectors(&self.case.read(TEMPLATE_FIT)?, TEMPLATE_FIT)?;
+        let deformation = nifti::decode_displacement(&self.case.read(TEMPLATE_FIT)?, TEMPLATE_FIT)?;
         let template_from_patient = DisplacementField::from_parts(fit, &deformation.data);
         let to_pre = self.mni_from_pre.inverse().to_affine();
         let pre = Segmentation {

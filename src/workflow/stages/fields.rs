@@ -3,7 +3,7 @@
 use super::shift::{Believed, CaseShift, FUSED, OBSERVED};
 use crate::artefact::{Manifest, Produced};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
-use crate::geometry::{Frame, Position, Pre};
+use crate::geometry::{Frame, Position, Post, Pre, RigidTransform};
 use crate::image::nifti::{
     self, ReadOptions, encode_displacement, encode_intensities, encode_mask, encode_numbers, encode_u8,
 };
@@ -16,10 +16,10 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
-use nalgebra::Point3;
+use std::sync::{Arc, OnceLock};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Fields;
 
 /// What the fields are made from.
@@ -56,22 +56,30 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
             discrepancy: case.discrepancy(),
             ..BrainShift::default()
         };
-        for source in &settings.states {
-            let state = match (source, &input.model) {
-                (Source::Model, Some(model)) => model.as_str(),
-                (Source::Fused, Some(_)) => FUSED,
-                (Source::Observed, _) => OBSERVED,
-                (Source::Model | Source::Fused, None) => continue,
-            };
-            work.tell(|p| p.doing(state));
-            let field = case.state(state)?;
-            shift.states.push(StateShift::of(state, &field));
-            files(state, &field, &case, &mut produced);
-            if *source == Source::Model {
-                carried(work, &field, &mut produced)?;
+        let to_post = (&case.post_grid, &case.post_from_pre);
+        let packed: Vec<OnceLock<Files>> = settings.states.iter().map(|_| OnceLock::new()).collect();
+        // A state's files are packed while the next one is worked out.
+        rayon::in_place_scope(|beside| -> Result<(), WorkflowError> {
+            for (source, packed) in settings.states.iter().zip(&packed) {
+                let state = match (source, &input.model) {
+                    (Source::Model, Some(model)) => model.as_str(),
+                    (Source::Fused, Some(_)) => FUSED,
+                    (Source::Observed, _) => OBSERVED,
+                    (Source::Model | Source::Fused, None) => continue,
+                };
+                work.tell(|p| p.doing(state));
+                let field = Arc::new(case.state(state)?);
+                shift.states.push(StateShift::of(state, &field));
+                let of_state = Arc::clone(&field);
+                beside.spawn(move |_| _ = packed.set(files(state, &of_state, to_post)));
+                if *source == Source::Model {
+                    carried(work, &field, &mut produced)?;
+                }
+                work.tell(|p| p.step());
             }
-            work.tell(|p| p.step());
-        }
+            Ok(())
+        })?;
+        produced.files.extend(packed.into_iter().filter_map(OnceLock::into_inner).flatten());
         let folded = shift.states.iter().filter(|state| state.smoothed_voxels > 0);
         let folds = |s: &StateShift| Warning::Folds { state: s.state.clone(), voxels: s.smoothed_voxels };
         produced.warn(folded.map(folds));
@@ -83,30 +91,47 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
     })
 }
 
-/// The files of one state.
-fn files(state: &str, field: &ShiftField, case: &CaseShift<'_>, produced: &mut Produced) {
-    let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
-    write(SHIFT.of(state), encode_displacement(&field.whole, |n| field.forward_at(n)));
-    write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |n| field.inverse_at(n)));
-    write(POST_FROM_PRE_FIELD.of(state), encode_displacement(&field.whole, field.to_post(&case.post_from_pre)));
-    let to_pre = field.to_pre(&case.post_grid, &case.post_from_pre.inverse());
-    write(PRE_FROM_POST_FIELD.of(state), encode_displacement(&case.post_grid, to_pre));
-    write(SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
-    write(SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
-    write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+/// Bytes by name.
+type Files = Vec<(String, Vec<u8>)>;
+
+/// The files of one state; `post_grid` and `post_from_pre` lead to the post-operative scan.
+fn files(
+    state: &str,
+    field: &ShiftField,
+    (post_grid, post_from_pre): (&Grid<Post>, &RigidTransform<Pre, Post>),
+) -> Files {
+    let whole = &field.whole;
+    let forward = || (SHIFT.of(state), encode_displacement(whole, |v| field.forward_at(v)));
+    let back = || (SHIFT_BACK.of(state), encode_displacement(whole, |v| field.inverse_at(v)));
+    let to_post = || (POST_FROM_PRE_FIELD.of(state), encode_displacement(whole, field.to_post(post_from_pre)));
+    let to_pre = || {
+        let value = field.to_pre(post_grid, &post_from_pre.inverse());
+        (PRE_FROM_POST_FIELD.of(state), encode_displacement(post_grid, value))
+    };
+    let sd = || (SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
+    let reach = || (SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
+    // Two at a time: what one waits for the other can use, and no more has to be held at once.
+    let pairs = [rayon::join(forward, back), rayon::join(to_post, to_pre), rayon::join(sd, reach)];
+    let mask = (SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+    pairs.into_iter().flat_map(|(a, b)| [a, b]).chain([mask]).collect()
 }
 
 /// The pre-operative scan and its labels carried to the deformed state, on the scan's own grid.
 pub(super) fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produced) -> Result<(), WorkflowError> {
     let options = ReadOptions::default();
-    let t1: Volume<f32, Pre> =
-        nifti::decode(&work.case.read(PRE_NATIVE_T1)?, PRE_NATIVE_T1, &options)?.volume.relabelled();
-    let (labels, _) = nifti::decode_labels(&work.case.read(PRE_NATIVE_LABELS)?, PRE_NATIVE_LABELS, &options)?;
-    let labels: Volume<f32, Pre> = labels.relabelled::<Pre>().map(f32::from);
+    let [t1, labels] = [work.case.read(PRE_NATIVE_T1)?, work.case.read(PRE_NATIVE_LABELS)?];
+    let (t1, labels) = rayon::join(
+        || nifti::decode(&t1, PRE_NATIVE_T1, &options),
+        || nifti::decode_labels(&labels, PRE_NATIVE_LABELS, &options),
+    );
+    let t1: Volume<f32, Pre> = t1?.volume.relabelled();
+    let labels: Volume<f32, Pre> = labels?.0.relabelled::<Pre>().map(f32::from);
     let (taken, _) = nifti::decode_labels(&work.case.read(NATIVE_RESECTED)?, NATIVE_RESECTED, &options)?;
     let taken: Mask<Pre> = taken.relabelled::<Pre>().map(|l| l > 0);
     let grid = t1.grid;
-    let back = |n: usize| Some(moved_back(field, &grid, n));
+    // Fields on the scan's own grid need not be interpolated.
+    let same = grid.coincides(&field.whole, 1e-9);
+    let back = |voxel: [usize; 3]| Some(moved_back(field, (&grid, same), voxel));
     // As whole as the scan: between whole numbers there is nothing to be known.
     let whole = t1.data.iter().all(|x| *x == x.round());
     let t1 = seen_through(&t1, &grid, back, Some(&taken), Between::Intensities);
@@ -118,8 +143,8 @@ pub(super) fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produc
 }
 
 /// Where the tissue at a voxel came from.
-fn moved_back(field: &ShiftField, grid: &Grid<Pre>, n: usize) -> Position<Pre> {
-    let y = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
-    let d = at(&field.inverse, y).unwrap_or_default();
+fn moved_back(field: &ShiftField, (grid, same): (&Grid<Pre>, bool), voxel: [usize; 3]) -> Position<Pre> {
+    let y = grid.centre(voxel);
+    let d = if same { field.inverse_at(voxel).map(f64::from) } else { at(&field.inverse, y).unwrap_or_default() };
     Position::new(y.mm.x + d[0], y.mm.y + d[1], y.mm.z + d[2])
 }

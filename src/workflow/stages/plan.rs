@@ -63,7 +63,7 @@ impl PlannedHead {
         let (labels, _) = nifti::decode_labels(&case.read(PRE_LABELS)?, PRE_LABELS, &options)?;
         let (taken, _) = nifti::decode_labels(&case.read(RESECTED)?, RESECTED, &options)?;
         let taken: Mask<Mni> = taken.relabelled::<Mni>().map(|l| l > 0);
-        let field = nifti::decode_vectors(&case.read(TEMPLATE_DISPLACEMENT)?, TEMPLATE_DISPLACEMENT)?;
+        let field = nifti::decode_displacement(&case.read(TEMPLATE_DISPLACEMENT)?, TEMPLATE_DISPLACEMENT)?;
         Ok(Self {
             labels: without_resected(labels.relabelled(), &taken),
             template_from_patient: DisplacementField::from_displacement(&field.relabelled()),

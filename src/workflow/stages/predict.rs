@@ -207,8 +207,8 @@ impl<'a> Patient<'a> {
             known.iter().zip(&field.believed).map(|(v, believed)| if *believed { rounded(*v) } else { 0.0 }).collect()
         };
         let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
-        write(SHIFT.of(state), encode_displacement(&field.whole, |n| field.forward_at(n)));
-        write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |n| field.inverse_at(n)));
+        write(SHIFT.of(state), encode_displacement(&field.whole, |v| field.forward_at(v)));
+        write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |v| field.inverse_at(v)));
         write(SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
         write(SHIFT_REACH_50.of(state), encode_numbers(&field.on_whole(&part(0), 0.0)));
         write(SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));

@@ -6,7 +6,7 @@ use crate::experiment::field::{
     BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, depth_mm, explained,
     fused, shift_field,
 };
-use crate::geometry::{Frame, Mni, Native, Post, Pre, RigidTransform};
+use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::grid_with_spacing;
 use crate::image::{Grid, Mask};
@@ -108,8 +108,7 @@ pub(crate) fn mask_of<F: Frame>(case: &Case, name: &str, grid: &Grid<F>) -> Resu
 
 /// The grid of an image of the case.
 pub(crate) fn grid_of<F: Frame>(case: &Case, name: &str) -> Result<Grid<F>, WorkflowError> {
-    let (labels, _) = nifti::decode_labels(&case.read(name)?, name, &ReadOptions::default())?;
-    Ok(labels.grid.relabelled::<Native>().relabelled())
+    Ok(nifti::decode_grid(&case.read(name)?, name)?.relabelled())
 }
 
 pub(super) fn spaced<F: Frame>(grid: Grid<F>, spacing_mm: f64) -> Grid<F> {
@@ -131,7 +130,7 @@ impl<'a> CaseShift<'a> {
             brain: mask_of(case, PRE_NATIVE_BRAIN, &grid)?,
             resected: mask_of(case, NATIVE_RESECTED, &grid)?,
         };
-        let seen = nifti::decode_vectors(&case.read(SAG)?, SAG)?;
+        let seen = nifti::decode_displacement(&case.read(SAG)?, SAG)?;
         let mut shift = Self {
             case,
             settings,
