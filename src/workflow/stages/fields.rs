@@ -16,7 +16,6 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
-use std::sync::{Arc, OnceLock};
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 6;
@@ -56,30 +55,22 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
             discrepancy: case.discrepancy(),
             ..BrainShift::default()
         };
-        let to_post = (&case.post_grid, &case.post_from_pre);
-        let packed: Vec<OnceLock<Files>> = settings.states.iter().map(|_| OnceLock::new()).collect();
-        // A state's files are packed while the next one is worked out.
-        rayon::in_place_scope(|beside| -> Result<(), WorkflowError> {
-            for (source, packed) in settings.states.iter().zip(&packed) {
-                let state = match (source, &input.model) {
-                    (Source::Model, Some(model)) => model.as_str(),
-                    (Source::Fused, Some(_)) => FUSED,
-                    (Source::Observed, _) => OBSERVED,
-                    (Source::Model | Source::Fused, None) => continue,
-                };
-                work.tell(|p| p.doing(state));
-                let field = Arc::new(case.state(state)?);
-                shift.states.push(StateShift::of(state, &field));
-                let of_state = Arc::clone(&field);
-                beside.spawn(move |_| _ = packed.set(files(state, &of_state, to_post)));
-                if *source == Source::Model {
-                    carried(work, &field, &mut produced)?;
-                }
-                work.tell(|p| p.step());
+        for source in &settings.states {
+            let state = match (source, &input.model) {
+                (Source::Model, Some(model)) => model.as_str(),
+                (Source::Fused, Some(_)) => FUSED,
+                (Source::Observed, _) => OBSERVED,
+                (Source::Model | Source::Fused, None) => continue,
+            };
+            work.tell(|p| p.doing(state));
+            let field = case.state(state)?;
+            shift.states.push(StateShift::of(state, &field));
+            produced.files.extend(files(state, &field, (&case.post_grid, &case.post_from_pre)));
+            if *source == Source::Model {
+                carried(work, &field, &mut produced)?;
             }
-            Ok(())
-        })?;
-        produced.files.extend(packed.into_iter().filter_map(OnceLock::into_inner).flatten());
+            work.tell(|p| p.step());
+        }
         let folded = shift.states.iter().filter(|state| state.smoothed_voxels > 0);
         let folds = |s: &StateShift| Warning::Folds { state: s.state.clone(), voxels: s.smoothed_voxels };
         produced.warn(folded.map(folds));
@@ -91,15 +82,12 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
     })
 }
 
-/// Bytes by name.
-type Files = Vec<(String, Vec<u8>)>;
-
 /// The files of one state; `post_grid` and `post_from_pre` lead to the post-operative scan.
 fn files(
     state: &str,
     field: &ShiftField,
     (post_grid, post_from_pre): (&Grid<Post>, &RigidTransform<Pre, Post>),
-) -> Files {
+) -> Vec<(String, Vec<u8>)> {
     let whole = &field.whole;
     let forward = || (SHIFT.of(state), encode_displacement(whole, |v| field.forward_at(v)));
     let back = || (SHIFT_BACK.of(state), encode_displacement(whole, |v| field.inverse_at(v)));
