@@ -11,9 +11,9 @@ pub enum Place {
     Free,
 }
 
-/// Sweeps on the finest level; each coarser one, where they cost an eighth, gets twice as many, the coarsest many more. The
-/// continuation need be smooth, not exact.
-const SWEEPS: usize = 12;
+/// Sweeps on every level; on the coarsest, where they cost nothing, many more. The continuation need be smooth, not
+/// exact.
+const SWEEPS: usize = 24;
 const COARSEST_SWEEPS: usize = 200;
 /// A level is not halved below this many voxels along an axis.
 const SMALLEST: usize = 6;
@@ -31,17 +31,7 @@ pub fn continued<const N: usize>(
     dims: [usize; 3],
     spacing_mm: [f64; 3],
     place: &[Place],
-    values: Vec<[f32; N]>,
-) -> Vec<[f32; N]> {
-    level(dims, spacing_mm, place, values, SWEEPS)
-}
-
-fn level<const N: usize>(
-    dims: [usize; 3],
-    spacing_mm: [f64; 3],
-    place: &[Place],
     mut values: Vec<[f32; N]>,
-    sweeps: usize,
 ) -> Vec<[f32; N]> {
     let free = place.iter().filter(|p| **p == Place::Free).count();
     if free == 0 || free == place.len() {
@@ -51,13 +41,13 @@ fn level<const N: usize>(
     let coarsest = dims.iter().any(|&n| n < 2 * SMALLEST);
     if !coarsest {
         let (coarse_place, coarse_values) = halved(dims, coarse_dims, place, &values);
-        let coarse = level(coarse_dims, spacing_mm.map(|h| 2.0 * h), &coarse_place, coarse_values, 2 * sweeps);
+        let coarse = continued(coarse_dims, spacing_mm.map(|h| 2.0 * h), &coarse_place, coarse_values);
         fill(dims, coarse_dims, place, &coarse, &mut values);
     }
     let lattice = Lattice::new(dims, spacing_mm);
     let colours = lattice.colours(place);
     let mut renewed = Vec::new();
-    let sweeps = if coarsest { COARSEST_SWEEPS } else { sweeps };
+    let sweeps = if coarsest { COARSEST_SWEEPS } else { SWEEPS };
     for sweep in 0..sweeps {
         // The last sweeps without over-relaxation leave no ripples.
         let over = if sweep + 4 < sweeps { OVER } else { 1.0 };

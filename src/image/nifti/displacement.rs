@@ -1,7 +1,7 @@
 //! Displacement fields as ITK, ANTs and 3D Slicer read them: five dimensions, the intent "vector" (1007), components in mm
 //! along left, posterior, superior. docs/FIELDS.md has the conventions side by side.
 
-use super::encode::plain_vectors;
+use super::encode::{DISPLACEMENT, plain_vectors};
 use super::error::{NiftiError, NiftiProblem};
 use super::header::{HEADER_BYTES, Header};
 use super::{check_extension, gzip, orientation, refused, voxels};
@@ -10,8 +10,6 @@ use crate::image::{Grid, Volume};
 
 /// `NIFTI_INTENT_VECTOR`: ITK takes the numbers as they are, in its own frame (LPS).
 const VECTOR: i16 = 1007;
-/// `NIFTI_INTENT_DISPVECT`: components along the axes of NIfTI's frame (RAS); ITK from 5.3 on turns them.
-pub(super) const DISPLACEMENT: i16 = 1006;
 
 /// A displacement (mm, RAS, by voxel (i, j, k)) as `.nii.gz` bytes.
 ///

@@ -1,12 +1,14 @@
 //! Volumes to NIfTI bytes: one deterministic `.nii.gz`, without a word about the patient, the machine or the time.
 
-use super::displacement::DISPLACEMENT;
 use super::gzip;
 use super::orientation::shear;
 use crate::geometry::Frame;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use rayon::prelude::*;
+
+/// `NIFTI_INTENT_DISPVECT`: components along the axes of NIfTI's frame (RAS); ITK from 5.3 on turns them.
+pub(super) const DISPLACEMENT: i16 = 1006;
 
 /// 32-bit floats as `.nii.gz` bytes.
 pub fn encode_f32<F: Frame>(volume: &Volume<f32, F>) -> Vec<u8> {

@@ -139,6 +139,16 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<MeshWithFields, ReadError> {
     Ok(MeshWithFields { mesh, point_fields, cell_fields })
 }
 
+/// One field of the points of a VTU file, without what else it holds; `None` where there is none of that name.
+///
+/// # Errors
+/// [`ReadError`] for a damaged file.
+pub fn decode_point_field(bytes: &[u8], name: &str, field: &str) -> Result<Option<Field>, ReadError> {
+    let file = File::parse(bytes, name)?;
+    let raw = file.arrays.iter().find(|a| a.section == "PointData" && a.name == field);
+    raw.map_or(Ok(None), |raw| file.field(raw, file.points))
+}
+
 /// A `DataArray` as it stands in the file.
 #[derive(Debug, Default)]
 struct RawArray {
@@ -490,6 +500,17 @@ mod tests {
         );
         assert_eq!((back.point_fields, back.cell_fields), (vec![u, e], vec![j]));
         assert_eq!(encode(&mesh, &[], &[]), encode(&mesh, &[], &[]));
+    }
+
+    #[test]
+    fn a_field_alone_is_the_one_that_is_read_with_all_else() {
+        let fields = [Field::vector("u", &[[0.1, -0.2, 1e-300]; 6]), Field::scalar("w", vec![0.5; 6])];
+        let bytes = encode(&two_tets(), &fields, &[]).unwrap();
+        for field in &fields {
+            assert_eq!(decode_point_field(&bytes, "a.vtu", &field.name).unwrap().as_ref(), Some(field));
+        }
+        assert_eq!(decode_point_field(&bytes, "a.vtu", "label").unwrap(), None);
+        assert!(decode_point_field(&bytes[..bytes.len() / 2], "a.vtu", "u").is_err());
     }
 
     #[test]

@@ -179,8 +179,8 @@ impl<'a> CaseShift<'a> {
         let (case, mut sums) = (self.case, vec![([0.0; 3], 0.0); mean.len()]);
         let read = |id: &String| -> Result<Vec<[f64; 3]>, WorkflowError> {
             let file = SAMPLE_STATE.of(id);
-            let state = vtu::decode(&case.read(&file)?, &file)?;
-            Ok(state.point_field("displacement").and_then(Field::vectors).unwrap_or_default())
+            let field = vtu::decode_point_field(&case.read(&file)?, &file, "displacement")?;
+            Ok(field.as_ref().and_then(Field::vectors).unwrap_or_default())
         };
         let read: Vec<_> = self.samples.par_iter().map(read).collect();
         let mut count = 0.0;
