@@ -19,6 +19,8 @@ const COARSEST_SWEEPS: usize = 200;
 const SMALLEST: usize = 6;
 /// Voxels that one thread does alone, and those of a chunk of memory.
 const FEW: usize = 1 << 14;
+/// Every neighbour lies on the grid.
+const ALL: u8 = 63;
 /// Over-relaxation of a sweep.
 const OVER: f32 = 1.9;
 
@@ -63,8 +65,8 @@ struct Lattice {
     dims: [usize; 3],
     stride: [usize; 3],
     weight: [f32; 3],
-    /// The weights together, by which neighbours there are.
-    total: [f32; 64],
+    /// One over the weights together, by which neighbours there are.
+    share: [f32; 64],
 }
 
 /// Free voxels no two of which are neighbours, in the order of memory.
@@ -80,8 +82,11 @@ struct Colour {
 impl Lattice {
     fn new(dims: [usize; 3], spacing_mm: [f64; 3]) -> Self {
         let weight = spacing_mm.map(|h| (1.0 / (h * h)) as f32);
-        let of = |neighbours: usize| (0..6).filter(|bit| neighbours >> bit & 1 == 1).map(|bit| weight[bit / 2]).sum();
-        Self { dims, stride: [1, dims[0], dims[0] * dims[1]], weight, total: std::array::from_fn(of) }
+        let of = |neighbours: usize| -> f32 {
+            let total: f32 = (0..6).filter(|bit| neighbours >> bit & 1 == 1).map(|bit| weight[bit / 2]).sum();
+            1.0 / total
+        };
+        Self { dims, stride: [1, dims[0], dims[0] * dims[1]], weight, share: std::array::from_fn(of) }
     }
 
     fn colours(&self, place: &[Place]) -> [Colour; 2] {
@@ -103,8 +108,18 @@ impl Lattice {
     /// One sweep over a colour; `renewed` is its memory.
     fn relax<const N: usize>(&self, colour: &Colour, over: f32, values: &mut [[f32; N]], renewed: &mut Vec<[f32; N]>) {
         let renew = |(&n, &neighbours): (&u32, &u8)| -> [f32; N] {
-            let n = n as usize;
+            let (n, share) = (n as usize, over * self.share[usize::from(neighbours)]);
             let mut sum = [0f32; N];
+            if neighbours == ALL {
+                // Nearly all voxels: without a question for each neighbour.
+                for a in 0..3 {
+                    let (low, high) = (&values[n - self.stride[a]], &values[n + self.stride[a]]);
+                    for c in 0..N {
+                        sum[c] += self.weight[a] * (low[c] + high[c]);
+                    }
+                }
+                return std::array::from_fn(|c| values[n][c] * (1.0 - over) + share * sum[c]);
+            }
             for a in 0..3 {
                 let mut add = |m: usize| {
                     for (s, x) in sum.iter_mut().zip(&values[m]) {
@@ -118,8 +133,7 @@ impl Lattice {
                     add(n + self.stride[a]);
                 }
             }
-            let total = self.total[usize::from(neighbours)];
-            std::array::from_fn(|c| values[n][c] + over * (sum[c] / total - values[n][c]))
+            std::array::from_fn(|c| values[n][c] * (1.0 - over) + share * sum[c])
         };
         // Few are done before other threads have woken.
         if colour.voxels.len() < FEW {
