@@ -91,7 +91,7 @@ pub struct Estimate {
     pub seen: Vec<MovedNode>,
     /// The tissues' materials at the mode, by tissue.
     pub materials: BTreeMap<String, Material>,
-    /// The unknowns' numbers at the mode, as [`Problem::start`] takes them.
+    /// The unknowns' numbers at the mode, as [`super::Problem::start`] takes them.
     pub numbers: Vec<f64>,
 }
 
