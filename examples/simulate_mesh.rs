@@ -10,7 +10,6 @@ use hgm::image::{Grid, LabelMap};
 use hgm::material::law::Material;
 use hgm::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use hgm::segment::label;
-use nalgebra::Point3;
 use std::error::Error;
 
 /// The largest displacement of a ball of grey matter of 30 mm that lies on its lowest nodes, mm.
@@ -19,7 +18,7 @@ use std::error::Error;
 /// A mesh or a scenario that the solver refuses.
 pub fn run() -> Result<f64, Box<dyn Error>> {
     let grid = Grid::<Native>::axis_aligned([40, 40, 40], [2.0; 3], [-40.0; 3]);
-    let inside = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.coords.norm() < 30.0;
+    let inside = |n: usize| grid.centre(grid.voxel(n)).mm.coords.norm() < 30.0;
     let ball = LabelMap::from_data(grid, (0..grid.len()).map(|n| u8::from(inside(n)) * label::GREY_MATTER).collect());
 
     let settings = MeshSettings { size: MeshSize::Cells(2000), ..MeshSettings::default() };

@@ -192,7 +192,7 @@ impl Stage {
         for name in old.iter().flat_map(|old| old.outputs.keys()).filter(|name| !made(name)) {
             remove_output(&self.folder, name);
         }
-        // The disk is waited for once, not file by file.
+        // Side by side: while one waits for the disk, another is hashed.
         let written = |(name, bytes): &(String, Vec<u8>)| {
             write_whole(&self.folder.join(name), bytes)?;
             Ok::<_, WriteError>((name.clone(), OutputRecord { sha256: sha256_hex(bytes) }))

@@ -95,7 +95,7 @@ mod tests {
         let largest = u.iter().flatten().fold(0f64, |m, v| m.max(v.abs()));
         let mut within = 0;
         for (n, d) in field.data.iter().enumerate() {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+            let p = grid.centre(grid.voxel(n)).mm;
             assert!(d.iter().all(|v| v.abs() <= largest + 1e-6), "no mean exceeds what it is a mean of: {d:?}");
             let bounds = mesh.nodes_mm().iter().fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |(low, high), x| {
                 ([0, 1, 2].map(|a| low[a].min(x[a])), [0, 1, 2].map(|a| high[a].max(x[a])))

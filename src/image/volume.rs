@@ -74,21 +74,14 @@ impl<T: Copy, F: Frame> Volume<T, F> {
     where
         T: Default + Send,
     {
-        let mut volume = Self::filled(grid, T::default());
-        volume.each_voxel(|v, value| *value = f(v));
-        volume
-    }
-
-    /// Calls a function with every voxel (i, j, k) and its value, a row of the memory after the other and rows side by side.
-    pub fn each_voxel(&mut self, f: impl Fn([usize; 3], &mut T) + Sync + Send)
-    where
-        T: Send,
-    {
-        let [nx, ny, _] = self.grid.dims;
-        self.data.par_chunks_mut(nx.max(1)).enumerate().for_each(|(row, values)| {
+        let [nx, ny, _] = grid.dims;
+        let mut data = vec![T::default(); grid.len()];
+        // By rows: a voxel's place in memory need not be taken apart.
+        data.par_chunks_mut(nx.max(1)).enumerate().for_each(|(row, values)| {
             let (j, k) = (row % ny, row / ny);
-            values.iter_mut().enumerate().for_each(|(i, value)| f([i, j, k], value));
+            values.iter_mut().enumerate().for_each(|(i, value)| *value = f([i, j, k]));
         });
+        Self { grid, data }
     }
 
     /// The same voxels in another frame: for a caller that has learnt what a `Native` image is.

@@ -172,7 +172,7 @@ mod tests {
         let mut mixed = solid.clone();
         mixed.triangles[3].swap(0, 1);
         let expected = Mask::from_fn(grid(), |n| {
-            let p = grid().position(nalgebra::Point3::from(grid().voxel(n).map(|v| v as f64))).mm;
+            let p = grid().centre(grid().voxel(n)).mm;
             (1.5..11.5).contains(&p.x) && (2.5..8.5).contains(&p.y) && (3.5..7.5).contains(&p.z)
         });
         assert_eq!(expected.count(), 10 * 6 * 4);

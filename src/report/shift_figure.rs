@@ -123,7 +123,7 @@ fn slice_through(mesh: &TetMesh, node: usize) -> Grid<Mni> {
 }
 
 fn place(grid: &Grid<Mni>, n: usize) -> Position<Mni> {
-    grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)))
+    grid.centre(grid.voxel(n))
 }
 
 /// The size of vectors as colour over the scan, with lines along them where they are shifts.

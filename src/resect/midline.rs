@@ -2,7 +2,6 @@
 
 use crate::geometry::{Mni, Position};
 use crate::register::deformable::DisplacementField;
-use nalgebra::Point3;
 
 /// The septum pellucidum of the MNI152 template between the frontal horns, above and before the foramina of Monro, the
 /// level at which radiologists measure: ranges of x, y, z in mm.
@@ -15,7 +14,7 @@ pub fn midline_shift_mm(sag: &DisplacementField<Mni>, template_from_patient: &Di
     let grid = sag.grid();
     let (mut sum, mut count) = (0.0, 0usize);
     for n in 0..grid.len() {
-        let at: Position<Mni> = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+        let at: Position<Mni> = grid.centre(grid.voxel(n));
         let like = template_from_patient.apply(at);
         if SEPTUM_MM.iter().enumerate().all(|(axis, [low, high])| (*low..=*high).contains(&like.mm[axis])) {
             sum += sag.apply(at).mm.x - at.mm.x;
@@ -49,7 +48,7 @@ mod tests {
         let grid = Grid::<Mni>::axis_aligned([40, 50, 40], [2.0; 3], [-40.0, -40.0, -30.0]);
         let mut sag = Volume::filled(grid, [0f32; 3]);
         for n in 0..grid.len() {
-            if grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.x > 10.0 {
+            if grid.centre(grid.voxel(n)).mm.x > 10.0 {
                 sag.data[n] = [3.0, 0.0, 0.0];
             }
         }

@@ -7,7 +7,7 @@ use super::atlas_labels::derive_labels;
 use crate::geometry::{AffineTransform, Mni, Position};
 use crate::image::resample::{Interpolation, resample, resample_nearest};
 use crate::image::{Grid, LabelMap, Mask, Volume};
-use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use std::io::Read;
 use std::sync::OnceLock;
 
@@ -135,7 +135,7 @@ pub fn deep_grey() -> Mask<Mni> {
         if !bright(t1.data[n]) {
             return false;
         }
-        let p = t1.grid.position(Point3::from(t1.grid.voxel(n).map(|v| v as f64))).mm;
+        let p = t1.grid.centre(t1.grid.voxel(n)).mm;
         NUCLEI.iter().any(|(centre, radii, outwards, range)| {
             let x = p.x.abs() - centre[0] + outwards * (p.y - centre[1]);
             let along = [x / radii[0], (p.y - centre[1]) / radii[1], (p.z - centre[2]) / radii[2]];

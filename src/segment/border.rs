@@ -97,7 +97,7 @@ mod tests {
     fn priors(grid: &Grid<Mni>, nucleus: impl Fn(Position<Mni>) -> bool + Sync + Send) -> AtlasPriors {
         let nothing = Volume::filled(*grid, 0f32);
         let deep = |n: usize| {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+            let p = grid.centre(grid.voxel(n));
             f32::from(u8::from(nucleus(p)))
         };
         AtlasPriors {
@@ -171,7 +171,7 @@ mod tests {
         let scan = Volume::filled(grid, BRIGHT);
         let inside = |p: Position<Mni>| p.mm.coords.norm() < 10.0;
         let labels = Volume::from_fn(grid, |n| {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+            let p = grid.centre(grid.voxel(n));
             if p.mm.coords.norm() < 8.0 { GREY_MATTER } else { WHITE_MATTER }
         });
         let with = |priors: &AtlasPriors| with_the_scans_border(labels.clone(), &scan, &pose, &model(&working), priors);

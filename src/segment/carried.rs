@@ -331,7 +331,7 @@ mod tests {
             0.0,
         );
         let shaded = Volume::from_fn(grid, |n| {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+            let p = grid.centre(grid.voxel(n)).mm;
             seen.volume.data[n] * (0.004 * p.x + 0.002 * p.z).exp() as f32
         });
         (shaded, pose)

@@ -92,7 +92,7 @@ fn sloping(
     let seen = in_blocks(grid, |n| if inside(n) { t1.data[n] / usual } else { 0.0 });
     let wanted = in_blocks(grid, |n| if inside(n) { expected(n) } else { 0.0 });
     let blocks = seen.grid;
-    let place = |n: usize| blocks.position(Point3::from(blocks.voxel(n).map(|v| v as f64))).mm.coords;
+    let place = |n: usize| blocks.centre(blocks.voxel(n)).mm.coords;
     let sum = |value: &(dyn Fn(usize, &Vector3<f64>) -> f64 + Sync)| {
         gaussian(&Volume::from_fn(blocks, |n| value(n, &place(n)) as f32), SIGMA_MM)
     };
@@ -147,7 +147,7 @@ pub(super) fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync) -
 
 /// The coarse volume at a voxel of the fine grid, linearly; its border is repeated outwards.
 pub(super) fn clamped(coarse: &Volume<f32, Mni>, grid: &Grid<Mni>, n: usize) -> f32 {
-    let voxel = coarse.grid.voxel_at(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))));
+    let voxel = coarse.grid.voxel_at(grid.centre(grid.voxel(n)));
     let inside = Point3::from([0, 1, 2].map(|a| voxel[a].clamp(0.0, coarse.grid.dims[a] as f64 - 1.0)));
     coarse.trilinear(coarse.grid.position(inside)).unwrap_or(0.0)
 }
@@ -165,7 +165,7 @@ mod tests {
         // Four times as bright 90 mm above as at the middle.
         let coil = |strength: f64| {
             Volume::from_fn(grid, |n| {
-                let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+                let p = grid.centre(grid.voxel(n)).mm;
                 template.data[n] * (strength * p.z / 90.0).exp() as f32
             })
         };
@@ -189,14 +189,14 @@ mod tests {
         let (grid, known) = (template.grid, template.map(|_| true));
         let priors = AtlasPriors::rigid(&grid);
         // e times as bright 50 mm above, and something of one brightness around the brain.
-        let gain = |n: usize| (grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.z / 50.0).exp() as f32;
+        let gain = |n: usize| (grid.centre(grid.voxel(n)).mm.z / 50.0).exp() as f32;
         let around = Volume::from_fn(grid, |n| if template.data[n] > 0.0 { template.data[n] } else { 100.0 });
         let seen = Volume::from_fn(grid, |n| around.data[n] * gain(n));
         let (flat, _) = without_strong_gain(&seen, &known, &priors).unwrap();
         let left = |wanted: &dyn Fn(f32, f64) -> bool| {
             let (mut sum, mut count) = (0.0, 0.0);
             for n in 0..grid.len() {
-                let z = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.z;
+                let z = grid.centre(grid.voxel(n)).mm.z;
                 if wanted(priors.brain_mm.data[n], z) {
                     sum += f64::from(flat.data[n] / around.data[n]).ln();
                     count += 1.0;

@@ -149,19 +149,8 @@ fn estimated(
         let prior = unknown.prior(1000f64.ln(), 3.0);
         (unknown, prior)
     };
-    let problem = Problem {
-        mesh,
-        template: scenario,
-        unknowns: Tissue::grey_and_white().into_iter().map(unknown).collect(),
-        poisson_ratio: 0.45,
-        observation: Observation::Nodes(observed),
-        errors: Errors::Independent { share: 1.0 },
-        model_log_sd: 0.0,
-        body_log_sd: 0.0,
-        coarser: None,
-        body_known: true,
-        start,
-        instrument: None,
-    };
+    let unknowns = Tissue::grey_and_white().into_iter().map(unknown).collect();
+    let seen = (Observation::Nodes(observed), Errors::Independent { share: 1.0 });
+    let problem = Problem { start, ..Problem::new(mesh, scenario, unknowns, 0.45, seen) };
     solve_problem(problem, &EstimateSettings { noise_mm, ..EstimateSettings::default() }).unwrap()
 }

@@ -245,7 +245,7 @@ fn disagreement_mm(
 
 fn points(mask: &Mask<Pre>) -> Vec<Point3<f64>> {
     let inside = (0..mask.data.len()).filter(|&n| mask.data[n]).step_by(37);
-    inside.map(|n| mask.grid.position(Point3::from(mask.grid.voxel(n).map(|v| v as f64))).mm).collect()
+    inside.map(|n| mask.grid.centre(mask.grid.voxel(n)).mm).collect()
 }
 
 /// The larger of the two 95th percentiles of the distances between the masks' outermost voxels.

@@ -49,7 +49,7 @@ fn field(u: impl Fn([f64; 3]) -> [f64; 3]) -> ShiftField {
     let displacement: Vec<[f64; 3]> = nodes.iter().map(|x| u(*x)).collect();
     let mni_from_pre = pre_from_mni.inverse();
     let grid = grid();
-    let at = |n: usize| mni_from_pre.apply(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)))).mm;
+    let at = |n: usize| mni_from_pre.apply(grid.centre(grid.voxel(n))).mm;
     let around = Surroundings {
         brain: Mask::from_fn(grid, |n| at(n).iter().all(|x| x.abs() < 56.0)),
         resected: Mask::from_fn(grid, |n| (at(n) - Point3::new(40.0, 40.0, 40.0)).norm() < 15.0),

@@ -7,7 +7,7 @@ use hgm::image::nifti::decode_displacement;
 use hgm::register::deformable::DisplacementField;
 use hgm::register::transform_text::rigid_from_text;
 use hgm::resect::midline_shift_mm;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 #[test]
 fn slow_the_midline_shift_that_is_seen_is_the_one_that_went_in() {
@@ -37,7 +37,7 @@ fn slow_the_midline_shift_that_is_seen_is_the_one_that_went_in() {
     let truth = decode_displacement(&read("scans/truth/displacement_pre.nii.gz"), "displacement_pre.nii.gz").unwrap();
     let truth: Volume<[f32; 3], Pre> = truth.relabelled();
     let went_in = (0..grid.len()).map(|n| {
-        let at = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+        let at = grid.centre(grid.voxel(n));
         let before = mni_from_pre.inverse().apply(at);
         let moved = truth.nearest(before).unwrap_or([0.0; 3]).map(f64::from);
         let after = mni_from_pre.apply(Position::from_point(before.mm + Vector3::from(moved)));

@@ -17,9 +17,7 @@ fn grid<F: Frame>(name: &str) -> Grid<F> {
 /// A ball where no ventricle is by chance: what the program would find by itself looks otherwise.
 fn ball<F: Frame>(grid: Grid<F>, centre: Position<F>) -> Mask<F> {
     const RADIUS_MM: f64 = 11.0;
-    Mask::from_fn(grid, |n| {
-        grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).distance_mm(&centre) < RADIUS_MM
-    })
+    Mask::from_fn(grid, |n| grid.centre(grid.voxel(n)).distance_mm(&centre) < RADIUS_MM)
 }
 
 /// A point in the white matter of the right hemisphere, which was not operated on.
@@ -27,8 +25,7 @@ fn in_white_matter() -> Position<Pre> {
     let bytes = std::fs::read(sample("truth/brain_pre.nii.gz")).unwrap();
     let (brain, _) = decode_mask(&bytes, "brain_pre.nii.gz", &ReadOptions::default()).unwrap();
     let inside = (0..brain.data.len()).filter(|&n| brain.data[n]);
-    let sum: nalgebra::Vector3<f64> =
-        inside.map(|n| brain.grid.position(Point3::from(brain.grid.voxel(n).map(|v| v as f64))).mm.coords).sum();
+    let sum: nalgebra::Vector3<f64> = inside.map(|n| brain.grid.centre(brain.grid.voxel(n)).mm.coords).sum();
     let middle = Point3::from(sum / brain.count() as f64);
     Position::from_point(middle + nalgebra::Vector3::new(25.0, 0.0, 15.0))
 }

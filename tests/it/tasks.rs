@@ -89,7 +89,7 @@ fn with_a_tumour() -> LabelMap<Pre> {
     let bytes = std::fs::read(finished_pair().join("anat/pre_space-native_dseg.nii.gz")).unwrap();
     let (labels, _) = decode_labels(&bytes, "dseg.nii.gz", &ReadOptions::default()).unwrap();
     let mut labels: LabelMap<Pre> = labels.relabelled();
-    let place = |n: usize| labels.grid.position(Point3::from(labels.grid.voxel(n).map(|v| v as f64))).mm;
+    let place = |n: usize| labels.grid.centre(labels.grid.voxel(n)).mm;
     let brain: Vec<usize> = (0..labels.data.len()).filter(|&n| labels.data[n] != label::BACKGROUND).collect();
     let middle = brain.iter().map(|&n| place(n).coords).sum::<nalgebra::Vector3<f64>>() / brain.len() as f64;
     let centre = Point3::from(middle + nalgebra::Vector3::new(25.0, 0.0, 15.0));

@@ -47,3 +47,29 @@ pub struct Problem<'a> {
     /// The measurement behind nodes' displacements, where its own error is to be taken out, and how many times.
     pub instrument: Option<(&'a Instrument<'a>, usize)>,
 }
+
+impl<'a> Problem<'a> {
+    /// A body that is known exactly, seen by an instrument whose own error stays in; from the prior's mean.
+    pub fn new(
+        mesh: &'a TetMesh,
+        template: &'a Scenario,
+        unknowns: Vec<(Unknown, LogPrior)>,
+        poisson_ratio: f64,
+        (observation, errors): (Observation, Errors),
+    ) -> Self {
+        Self {
+            mesh,
+            template,
+            unknowns,
+            poisson_ratio,
+            observation,
+            errors,
+            model_log_sd: 0.0,
+            body_log_sd: 0.0,
+            coarser: None,
+            body_known: true,
+            start: Vec::new(),
+            instrument: None,
+        }
+    }
+}

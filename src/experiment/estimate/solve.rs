@@ -155,20 +155,9 @@ mod tests {
             let prior = unknown.prior(7.0, 2.0);
             (unknown, prior)
         };
-        Problem {
-            mesh,
-            template: scenario,
-            unknowns: Tissue::grey_and_white().into_iter().map(unknown).collect(),
-            poisson_ratio: 0.45,
-            observation: Observation::Nodes(observed),
-            errors: Errors::Independent { share: 1.0 },
-            model_log_sd: 0.0,
-            body_log_sd: 0.0,
-            coarser: None,
-            body_known: true,
-            start: vec![2299f64.ln(), 1195f64.ln()],
-            instrument: None,
-        }
+        let unknowns = Tissue::grey_and_white().into_iter().map(unknown).collect();
+        let seen = (Observation::Nodes(observed), Errors::Independent { share: 1.0 });
+        Problem { start: vec![2299f64.ln(), 1195f64.ln()], ..Problem::new(mesh, scenario, unknowns, 0.45, seen) }
     }
 
     fn settings() -> PhantomSettings {

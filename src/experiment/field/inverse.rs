@@ -94,7 +94,7 @@ mod tests {
         let centre = grid.position(Point3::new(20.0, 18.0, 12.0)).mm;
         let bump = |p: Point3<f64>| (-(p - centre).norm_squared() / 400.0).exp();
         let field = Volume::from_fn(grid, |n| {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+            let p = grid.centre(grid.voxel(n)).mm;
             [6.0, -4.0, 3.0].map(|x| (x * bump(p)) as f32)
         });
         let back = inverse(&field);

@@ -84,7 +84,7 @@ mod tests {
         }
         let mut inside = 0;
         for (n, value) in found.iter().enumerate() {
-            let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+            let p = grid.centre(grid.voxel(n)).mm;
             let deep = (0..3).all(|a| p[a] > low[a] + 1e-6 && p[a] < high[a] - 1e-6);
             let out = (0..3).any(|a| p[a] < low[a] - 1e-6 || p[a] > high[a] + 1e-6);
             assert!(value.is_some() || !deep, "{p}");

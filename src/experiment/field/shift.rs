@@ -277,7 +277,7 @@ mod tests {
             Vector3::new(5.0, 0.0, -4.0),
         );
         let whole = Grid::<Pre>::new(dims, to_pre.to_matrix() * grid.mm_from_voxel).unwrap();
-        let at = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+        let at = |n: usize| grid.centre(grid.voxel(n)).mm;
         let around = Surroundings {
             brain: Mask::from_fn(whole, |n| (0..3).all(|a| at(n)[a] > low[a] - 6.0 && at(n)[a] < high[a] + 6.0)),
             resected: Mask::from_fn(whole, |n| (0..3).all(|a| at(n)[a] < low[a] + 14.0 && at(n)[a] > low[a])),
@@ -311,7 +311,7 @@ mod tests {
         assert!(inner.count() > 1000);
         for (n, _) in inner.data.iter().enumerate().filter(|(_, b)| **b).step_by(97) {
             let grid = &field.forward.grid;
-            let p: [f64; 3] = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.into();
+            let p: [f64; 3] = grid.centre(grid.voxel(n)).mm.into();
             let there = carried(&field.forward, p).unwrap();
             let home = carried(&field.inverse, there).unwrap();
             assert!((0..3).all(|a| (home[a] - p[a]).abs() < 0.05), "{p:?} {home:?}");

@@ -4,7 +4,6 @@ use crate::geometry::Frame;
 use crate::image::components::{Connectivity, components};
 use crate::image::{Grid, LabelMap, Mask};
 use crate::segment::label;
-use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -99,7 +98,7 @@ fn second_largest<F: Frame>(mask: &Mask<F>) -> usize {
 /// The voxels of a grid whose centre lies in an ellipsoid along the axes of its frame, mm.
 pub fn ellipsoid_mask<F: Frame>(grid: &Grid<F>, centre_mm: [f64; 3], half_axes_mm: [f64; 3]) -> Mask<F> {
     Mask::from_fn(*grid, |n| {
-        let p = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm;
+        let p = grid.centre(grid.voxel(n)).mm;
         (0..3).map(|a| ((p[a] - centre_mm[a]) / half_axes_mm[a]).powi(2)).sum::<f64>() <= 1.0
     })
 }

@@ -137,7 +137,7 @@ impl Enhancement {
     pub fn new(head: &Head, seed: u64) -> Self {
         let grid = head.t1.grid;
         let course = SmoothNoise::new(CounterRng::new(seed, 501), 30.0);
-        let point = |n: usize| -> [f64; 3] { grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.into() };
+        let point = |n: usize| -> [f64; 3] { grid.centre(grid.voxel(n)).mm.into() };
         let nothing = (f64::NEG_INFINITY, 0.0);
         let deepest = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
         let dural = Layer::new(grid, |n| {
@@ -205,7 +205,7 @@ mod tests {
     fn rigid_error_mm(pre_from_post: &RigidTransform<Post, Pre>, patient: &SyntheticPatient) -> f64 {
         let brain = &patient.brain_pre;
         let errors = (0..brain.data.len()).filter(|&n| brain.data[n]).step_by(37).map(|n| {
-            let p = brain.grid.position(Point3::from(brain.grid.voxel(n).map(|v| v as f64)));
+            let p = brain.grid.centre(brain.grid.voxel(n));
             pre_from_post.apply(patient.post_from_pre.apply(p)).distance_mm(&p)
         });
         let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), e| (sum + e, count + 1.0));

@@ -21,7 +21,7 @@ impl Field {
 
     /// The field of a function of position, sampled on `grid`.
     pub fn sampled(grid: Grid<Patient>, at: impl Fn(Point3<f64>) -> Vector3<f64> + Sync) -> Self {
-        let value = |n: usize| at(grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm).into();
+        let value = |n: usize| at(grid.centre(grid.voxel(n)).mm).into();
         let data = (0..grid.len()).into_par_iter().map(value).collect();
         Self { mm: Volume::from_data(grid, data) }
     }
@@ -138,7 +138,7 @@ mod tests {
         assert!((1.5..6.0).contains(&length(&a)) && (1.5..6.0).contains(&length(&b)), "{} {}", length(&a), length(&b));
         assert!((a.at(Point3::origin()) - b.at(Point3::origin())).norm() > 0.1);
         for n in 0..grid().len() {
-            let p = grid().position(Point3::from(grid().voxel(n).map(|v| v as f64))).mm;
+            let p = grid().centre(grid().voxel(n)).mm;
             let h = 1.0;
             let jacobian = nalgebra::Matrix3::from_columns(&[0, 1, 2].map(|axis| {
                 let step = Vector3::ith(axis, h);

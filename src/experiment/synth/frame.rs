@@ -14,5 +14,5 @@ impl Frame for Patient {
 
 /// Centre of voxel number `n`.
 pub fn centre<F: Frame>(grid: &Grid<F>, n: usize) -> Point3<f64> {
-    grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm
+    grid.centre(grid.voxel(n)).mm
 }

@@ -16,7 +16,6 @@ use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::material::random::CounterRng;
 use crate::register::deformable::DisplacementField;
 use crate::segment::atlas::Atlas;
-use nalgebra::Point3;
 use rayon::prelude::*;
 
 /// White matter in the head's units.
@@ -240,7 +239,7 @@ pub fn head_around(atlas: &Atlas, seed: u64) -> Head {
         strand: noise(104, 13.0),
     };
     let fluid_layer = |p: [f64; 3]| 2.3 + 0.9 * noises.thickness.at([p[0], p[1] - 500.0, p[2]]);
-    let point = |n: usize| -> [f64; 3] { grid.position(Point3::from(grid.voxel(n).map(|v| v as f64))).mm.into() };
+    let point = |n: usize| -> [f64; 3] { grid.centre(grid.voxel(n)).mm.into() };
 
     let intracranial = Mask::from_data(
         grid,

@@ -4,7 +4,7 @@ use super::SyntheticPatient;
 use crate::geometry::{Position, Pre};
 use crate::material::random::CounterRng;
 use crate::segment::label;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 /// Where a point is before and after, mm.
 type Pair = ([f64; 3], [f64; 3]);
@@ -28,7 +28,7 @@ impl SyntheticPatient {
         chosen.dedup();
         let of = |at: usize| {
             let n = places[at.min(places.len() - 1)];
-            let x: Position<Pre> = grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+            let x: Position<Pre> = grid.centre(grid.voxel(n));
             let moved = x.mm + Vector3::from(self.displacement_pre.data[n].map(f64::from));
             let y = self.post_from_pre.apply(Position::from_point(moved));
             (x.mm.into(), y.mm.into())

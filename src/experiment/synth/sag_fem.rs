@@ -84,7 +84,7 @@ mod tests {
     use crate::fem::Support;
     use crate::geometry::Position;
     use crate::image::distance::signed_distance_mm;
-    use nalgebra::{Point3, Vector3};
+    use nalgebra::Vector3;
 
     #[test]
     fn slow_a_brain_that_slides_moves_where_one_that_is_held_does_not_and_stays_in_its_skull() {
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(held.brain_pre.data, sliding.brain_pre.data, "the same head");
         let (brain, grid) = (&held.brain_pre, held.brain_pre.grid);
         let outside_mm = signed_distance_mm(brain);
-        let place = |n: usize| grid.position(Point3::from(grid.voxel(n).map(|v| v as f64)));
+        let place = |n: usize| grid.centre(grid.voxel(n));
         let moved = |u: [f32; 3]| f64::from(u[0].hypot(u[1]).hypot(u[2]));
         // The cortex that is far from where anything was taken out.
         let taken = signed_distance_mm(&held.resected_pre);

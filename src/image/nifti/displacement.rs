@@ -3,8 +3,8 @@
 
 use super::encode::{DISPLACEMENT, plain_vectors};
 use super::error::{NiftiError, NiftiProblem};
-use super::header::{HEADER_BYTES, Header};
-use super::{check_extension, gzip, orientation, refused, voxels};
+use super::header::Header;
+use super::{check_extension, gzip, head_of, orientation, refused, voxels};
 use crate::geometry::{Frame, Native};
 use crate::image::{Grid, Volume};
 
@@ -39,8 +39,7 @@ pub fn decode_displacement(bytes: &[u8], name: &str) -> Result<Volume<[f32; 3], 
 
 fn read(bytes: &[u8]) -> Result<Volume<[f32; 3], Native>, NiftiProblem> {
     let packed = gzip::is_gzip(bytes);
-    let head = if packed { gzip::head(bytes, HEADER_BYTES)? } else { bytes[..bytes.len().min(HEADER_BYTES)].to_vec() };
-    let header = Header::parse(&head)?;
+    let header = Header::parse(&head_of(bytes)?)?;
     let layout = header.layout(Some(0))?;
     let size = |n: usize| if header.dim[0] >= n as i64 { header.dim[n] } else { 1 };
     if size(4) != 1 || size(5) != 3 || (6..8).any(|n| size(n) != 1) {

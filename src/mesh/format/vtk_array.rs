@@ -44,7 +44,7 @@ impl NumberType {
         }
     }
 
-    /// Numbers one after the other. The types that this program writes take the short way.
+    /// Numbers one after the other; the types that most bytes are of take the short way.
     fn read_all(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
         match self {
             Self::Float32 if !big_endian => {

@@ -102,7 +102,7 @@ impl<F: Frame> DisplacementField<F> {
     /// of a mm, far below what a registration is worth, so that it packs well.
     pub fn displacement_mm(&self) -> Volume<[f32; 3], F> {
         let value = |n: usize| {
-            let p = self.grid.position(Point3::from(self.grid.voxel(n).map(|v| v as f64)));
+            let p = self.grid.centre(self.grid.voxel(n));
             let d = self.apply(p).mm - p.mm;
             [d.x, d.y, d.z].map(|x| ((x * 64.0).round() / 64.0) as f32)
         };

@@ -325,18 +325,8 @@ impl Bodies {
         let (_, errors, noise_mm) = self.observation(body, input, options);
         let nodes = options.displacement.observed(bare, |x| moved_by(&shift.seen, x));
         let problem = Problem {
-            mesh: &coarse,
-            template: &scenario,
-            unknowns,
-            poisson_ratio: input.poisson_ratio,
-            observation: Observation::Nodes(nodes),
-            errors,
-            model_log_sd: 0.0,
-            body_log_sd: 0.0,
-            coarser: None,
             body_known: !matches!(body.reference, Reference::Surfaces(_)),
-            start: Vec::new(),
-            instrument: None,
+            ..Problem::new(&coarse, &scenario, unknowns, input.poisson_ratio, (Observation::Nodes(nodes), errors))
         };
         let settings = EstimateSettings { noise_mm, decrement_tolerance: NEARLY, ..options.descent.clone() };
         Ok(solve_problem(problem, &settings).ok())
@@ -368,18 +358,13 @@ impl Bodies {
         });
         let coarser = self.coarser_of(body)?;
         let problem = Problem {
-            mesh,
-            template: &scenario,
-            unknowns,
-            poisson_ratio: input.poisson_ratio,
-            observation,
-            errors,
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             body_log_sd: if patient { body.log_sd(options) } else { 0.0 },
             coarser: coarser.as_ref(),
             body_known: !patient,
             start: rough.map_or_else(Vec::new, |found| found.numbers),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
+            ..Problem::new(mesh, &scenario, unknowns, input.poisson_ratio, (observation, errors))
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         Ok(solve_problem(problem, &settings)?)
@@ -400,20 +385,9 @@ impl Bodies {
         let body = make()?;
         let (unknowns, scenario) = Self::posed(work, &body, tissues, prior)?;
         let (_, errors, noise_mm) = self.observation(&body, input, options);
-        let problem = Problem {
-            mesh: &body.mesh,
-            template: &scenario,
-            unknowns,
-            poisson_ratio: input.poisson_ratio,
-            observation: Observation::Nodes(seen.to_vec()),
-            errors,
-            model_log_sd: 0.0,
-            body_log_sd: 0.0,
-            coarser: None,
-            body_known: false,
-            start: Vec::new(),
-            instrument: None,
-        };
+        let seen = (Observation::Nodes(seen.to_vec()), errors);
+        let problem =
+            Problem { body_known: false, ..Problem::new(&body.mesh, &scenario, unknowns, input.poisson_ratio, seen) };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         let stuck = solve_problem(problem, &settings).map(|found| found.outcome.verdict);
         let stuck = stuck.unwrap_or_else(|_| Verdict::new(Finding::NoShift, None, Vec::new(), Vec::new()));
