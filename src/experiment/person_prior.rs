@@ -5,10 +5,11 @@ use crate::material::Task;
 use crate::material::generative::{SampleSettings, SampledMaterial};
 use crate::material::literature::{Curves, table};
 use crate::material::study_level::{
-    Evidence, FitError, MeanPosterior, Of, Spreads, Studies, StudyLevelPrior, drawn_materials, materials_at_levels,
-    predict, refit,
+    Evidence, FitError, MeanPosterior, ModuliPrior, Of, Spreads, Studies, StudyLevelPrior, drawn_materials,
+    materials_at_levels, predict, predict_jointly, refit,
 };
 use crate::material::task::stretches;
+use nalgebra::DMatrix;
 use std::sync::OnceLock;
 
 /// A fitted model: spreads of highest posterior density, and the tasks' means under them.
@@ -25,16 +26,20 @@ fn fitted(curves: Curves) -> Fitted {
     Ok((spreads, evidence.means))
 }
 
+fn known(curves: Curves) -> Result<&'static (Spreads, MeanPosterior), FitError> {
+    let known = match curves {
+        Curves::Published => &PUBLISHED,
+        Curves::Corrected => &CORRECTED,
+    };
+    known.get_or_init(|| fitted(curves)).as_ref().map_err(Clone::clone)
+}
+
 /// The prediction for one task at `points` stretches over its window, from the embedded studies.
 ///
 /// # Errors
 /// [`FitError`] where the embedded studies cannot be fitted.
 pub fn person_prior(task: Task, curves: Curves, points: usize) -> Result<StudyLevelPrior, FitError> {
-    let known = match curves {
-        Curves::Published => &PUBLISHED,
-        Curves::Corrected => &CORRECTED,
-    };
-    let (spreads, means) = known.get_or_init(|| fitted(curves)).as_ref().map_err(Clone::clone)?;
+    let (spreads, means) = known(curves)?;
     let [low, high] = task.stretch_window();
     Ok(predict(means, spreads, task, Of::Person, &stretches(low, high, points)))
 }
@@ -67,4 +72,20 @@ pub fn person_materials(
         Ok(SampledMaterial { sd_level: *level, ..material })
     };
     sd_levels.iter().map(at).collect()
+}
+
+/// How ln(shear modulus) of several tasks goes together in persons nobody has measured: correlations, row by row.
+///
+/// # Errors
+/// [`FitError`], also for a law that cannot be fitted.
+pub fn person_correlations(
+    tasks: &[Task],
+    points: usize,
+    settings: &SampleSettings,
+) -> Result<DMatrix<f64>, FitError> {
+    let (spreads, means) = known(settings.curves)?;
+    let joint = predict_jointly(means, spreads, tasks, Of::Person, points);
+    let moduli = ModuliPrior::from_draws(&joint, PERSONS, 0, settings)?;
+    let (sds, covariance) = (moduli.sds_ln(), moduli.covariance_ln);
+    Ok(DMatrix::from_fn(tasks.len(), tasks.len(), |i, j| covariance[i][j] / (sds[i] * sds[j])))
 }

@@ -2,7 +2,7 @@
 
 use super::estimate::{Average, LogPrior, Scale, Unknown};
 use super::moments::mean_and_sd;
-use super::person_prior::{person_materials, person_prior};
+use super::person_prior::{person_correlations, person_materials, person_prior};
 use super::population::PopulationPrior;
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{
@@ -127,13 +127,17 @@ fn materials_of_task(
     if levels.is_empty() {
         return Err(PriorError::NoLevels);
     }
-    let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
-    let settings = SampleSettings { model: prior.law, ..settings };
+    let settings = sample_settings(prior);
     match prior.model {
         GenerativeModel::Published => sample_shear_moduli(task, levels, &settings)
             .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source }),
         GenerativeModel::StudyLevel => Ok(person_materials(task, levels, DRAWN_STRETCHES, &settings)?),
     }
+}
+
+fn sample_settings(prior: &PriorSettings) -> SampleSettings {
+    let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
+    SampleSettings { model: prior.law, ..settings }
 }
 
 /// The material of a tissue that is not varied: the mean of its prior. A lesion is too small a part of what moves for two
@@ -236,19 +240,67 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// average of the studies. Those curves share their shape far more than studies do, so an exponent's mean and spread are those
 /// of the published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
-/// as another. What a cohort has taught takes the place of mean and spread.
+/// as another. A person's tissues go together (a laboratory that finds one soft finds the other soft): how stiff they are is known
+/// to a factor, how much stiffer one is than the other far better. What a cohort has taught takes the place of mean and
+/// spread, tissue by tissue.
 ///
 /// # Errors
 /// [`PriorError`].
-pub fn law_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
-    let mut known = literature_priors(tissue, prior)?;
+pub fn law_priors(tissues: &[Tissue], prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
+    let mut known = Vec::new();
+    for tissue in tissues {
+        known.extend(literature_priors(tissue, prior)?.into_iter().map(|of_law| (tissue, of_law)));
+    }
     if prior.model == GenerativeModel::StudyLevel {
         let papers = PriorSettings { model: GenerativeModel::Published, ..prior.clone() };
-        for ((_, known), (_, average)) in known.iter_mut().zip(literature_priors(tissue, &papers)?) {
+        let mut averages = Vec::new();
+        for tissue in tissues {
+            averages.extend(literature_priors(tissue, &papers)?);
+        }
+        for ((_, (_, known)), (_, average)) in known.iter_mut().zip(averages) {
             known.average = average.sd.map(|sd| Average { mean: average.mean, sd });
         }
+        if tissues.len() > 1 {
+            of_one_person(&mut known, prior)?;
+        }
     }
-    Ok(known.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))).collect())
+    Ok(known.into_iter().map(|(_, (unknown, known))| (unknown, prior.learnt(known))).collect())
+}
+
+/// Parameters of a law in each of several tissues, which are one person's: the moduli go together as the study-level model draws
+/// them, anything else of a law only through the modulus beside it.
+fn of_one_person(known: &mut [(&Tissue, (Unknown, LogPrior))], prior: &PriorSettings) -> Result<(), PriorError> {
+    let mut tasks = Vec::new();
+    for (tissue, _) in &*known {
+        let task = task_of(tissue, prior.study)?;
+        if !tasks.contains(&task) {
+            tasks.push(task);
+        }
+    }
+    let moduli = person_correlations(&tasks, DRAWN_STRETCHES, &sample_settings(prior))?;
+    let taught = |known: &LogPrior| prior.learnt(known.clone()) != *known;
+    // How far each goes along with its own tissue's modulus; not at all where a cohort knows better.
+    let along: Vec<(usize, f64)> = known
+        .iter()
+        .map(|(tissue, (unknown, known))| {
+            let place = task_of(tissue, prior.study).ok().and_then(|task| tasks.iter().position(|t| *t == task));
+            let along = match unknown {
+                _ if taught(known) => 0.0,
+                Unknown::ShearModulus(_) => 1.0,
+                _ => known.correlation.first().copied().unwrap_or(0.0),
+            };
+            (place.unwrap_or(0), along)
+        })
+        .collect();
+    for late in 0..known.len() {
+        let own = known[late].1.1.correlation.clone();
+        let with = |early: usize| {
+            let ((i, a), (j, b)) = (along[late], along[early]);
+            if i == j { own.get(late - early - 1).copied().unwrap_or(0.0) } else { a * b * moduli[(i, j)] }
+        };
+        known[late].1.1.correlation = (0..late).rev().map(with).collect();
+    }
+    Ok(())
 }
 
 /// The same as the literature alone has it.
@@ -258,8 +310,7 @@ fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unkn
         return Ok(vec![(modulus, log_prior(tissue, prior)?)]);
     }
     let law = if prior.law == MetaModel::OGDEN { MetaModel::OGDEN_HIGH } else { prior.law };
-    let settings = if prior.published { SampleSettings::published() } else { SampleSettings::default() };
-    let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..settings };
+    let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..sample_settings(prior) };
     let task = task_of(tissue, prior.study)?;
     let draws = match prior.model {
         GenerativeModel::Published => {
@@ -302,6 +353,7 @@ fn exponents_of_studies(law: MetaModel) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::estimate::{joint_precision, prior_correlation};
 
     #[test]
     fn nine_levels_of_two_tissues_are_the_papers_81_samples() {
@@ -373,7 +425,7 @@ mod tests {
         let (mean, sd) = (known.mean[at_rest.unwrap()], known.sd[at_rest.unwrap()]);
         assert!((own.mean - mean).abs() < 0.5 * sd, "{} beside {mean} +- {sd}", own.mean);
         assert!((own.sd.unwrap() / sd - 1.0).abs() < 0.4, "{own:?} beside {sd}");
-        let two = law_priors(&tissue, &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
+        let two = law_priors(std::slice::from_ref(&tissue), &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
         assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));
     }
 
@@ -382,10 +434,34 @@ mod tests {
         let tissue = &Tissue::grey_and_white()[0];
         let papers = PriorSettings::default();
         let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
-        let [average, started] = [&papers, &person].map(|prior| law_priors(tissue, prior).unwrap().remove(0).1);
+        let [average, started] = [&papers, &person].map(|prior| law_priors(std::slice::from_ref(tissue), prior).unwrap().remove(0).1);
         assert_eq!(average, log_prior(tissue, &papers).unwrap());
         assert_eq!(started.average, average.sd.map(|sd| Average { mean: average.mean, sd }));
         assert!(started.sd.unwrap() > 2.0 * average.sd.unwrap(), "{started:?}");
+    }
+
+    #[test]
+    fn a_persons_tissues_go_together() {
+        let tissues = Tissue::grey_and_white();
+        for law in [MetaModel::NEO_HOOKEAN, MetaModel::OGDEN, MetaModel::MOONEY_RIVLIN] {
+            let person = PriorSettings { model: GenerativeModel::StudyLevel, law, ..PriorSettings::default() };
+            let priors: Vec<LogPrior> = law_priors(&tissues, &person).unwrap().into_iter().map(|(_, p)| p).collect();
+            let white = priors.len() / 2;
+            let [grey_sd, white_sd] = [0, white].map(|n| priors[n].sd.unwrap());
+            // What is known of how much stiffer one is than the other.
+            let together = prior_correlation(&priors, 0, white) * grey_sd * white_sd;
+            let ratio_sd = (grey_sd * grey_sd + white_sd * white_sd - 2.0 * together).sqrt();
+            assert!(ratio_sd < 0.6 * grey_sd.min(white_sd), "{law:?}: {ratio_sd} of {grey_sd}, {white_sd}");
+            // The parameters of one law go together as they do where there is one tissue, and all of them are possible.
+            let alone = law_priors(&tissues[1..], &person).unwrap();
+            for n in 0..alone.len() {
+                for m in 0..n {
+                    let own = prior_correlation(&[alone[m].1.clone(), alone[n].1.clone()], 0, 1);
+                    assert_eq!(prior_correlation(&priors, white + m, white + n), own, "{law:?}");
+                }
+            }
+            assert!(joint_precision(&priors).cholesky().is_some(), "{law:?}: {priors:?}");
+        }
     }
 
     #[test]
@@ -411,8 +487,8 @@ mod tests {
     #[test]
     fn the_joint_prior_of_ogdens_law_has_an_exponent_off_its_bound_and_a_modulus_near_the_neo_hookean_one() {
         let tissue = &Tissue::grey_and_white()[0];
-        let ogden = law_priors(tissue, &PriorSettings { law: MetaModel::OGDEN, ..PriorSettings::default() }).unwrap();
-        let neo = law_priors(tissue, &PriorSettings::default()).unwrap();
+        let ogden = law_priors(std::slice::from_ref(tissue), &PriorSettings { law: MetaModel::OGDEN, ..PriorSettings::default() }).unwrap();
+        let neo = law_priors(std::slice::from_ref(tissue), &PriorSettings::default()).unwrap();
         assert_eq!((ogden.len(), neo.len()), (2, 1));
         assert!((ogden[0].1.mean - neo[0].1.mean).abs() < 0.5 * neo[0].1.sd.unwrap(), "{ogden:?} {neo:?}");
         assert!(ogden[1].1.mean < -6.0 && ogden[1].1.sd.unwrap() > 0.1, "{ogden:?}");

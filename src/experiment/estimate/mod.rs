@@ -125,11 +125,13 @@ impl LogPrior {
         self.sd.map_or(0.0, |sd| 1.0 / (sd * sd))
     }
 
-    /// The average of the studies as a prior, where there is one beside this.
+    /// The average of the studies as a prior, where there is one beside this; it knows each parameter by itself.
     #[must_use]
     pub fn of_average(&self) -> Self {
         match self.average {
-            Some(Average { mean, sd }) => Self { mean, sd: Some(sd), average: None, ..self.clone() },
+            Some(Average { mean, sd }) => {
+                Self { mean, sd: Some(sd), average: None, correlation: Vec::new(), ..self.clone() }
+            }
             None => self.clone(),
         }
     }

@@ -462,7 +462,7 @@ mod tests {
         let prior = PriorSettings { law, ..PriorSettings::default() };
         let brain = Tissue::whole_brain().remove(0);
         let problem = Problem {
-            unknowns: law_priors(&brain, &prior).unwrap(),
+            unknowns: law_priors(std::slice::from_ref(&brain), &prior).unwrap(),
             start: Vec::new(),
             ..problem(&mesh, &scenario, observed)
         };

@@ -61,10 +61,8 @@ impl PredictSettings {
         let mut add = |unknown: Unknown, prior: LogPrior, cause| {
             list.push(Uncertain { unknown, prior, cause, levels_mm: Vec::new() });
         };
-        for tissue in self.tissue_list() {
-            for (unknown, prior) in law_priors(&tissue, prior)? {
-                add(unknown, prior, Cause::Stiffness);
-            }
+        for (unknown, prior) in law_priors(&self.tissue_list(), prior)? {
+            add(unknown, prior, Cause::Stiffness);
         }
         if own.csf.is_none() {
             let density = Unknown::Density.prior(own.density_kg_per_m3.ln(), self.density_log_sd);

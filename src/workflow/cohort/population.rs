@@ -129,7 +129,7 @@ fn literature(name: &str, settings: &Settings) -> Result<Literature, PriorError>
     };
     let tissue = Tissue { name: tissue.to_owned(), labels: Vec::new() };
     let prior = PriorSettings { population: None, ..settings.prior.clone() };
-    let known = law_priors(&tissue, &prior)?;
+    let known = law_priors(&[tissue], &prior)?;
     let modulus = known.into_iter().map(|(_, known)| known).find(|known| known.name == name);
     Ok(modulus.map_or((0.0, 1.0), |known| (known.mean, known.sd.unwrap_or(1.0))))
 }

@@ -284,10 +284,7 @@ impl Bodies {
         prior: &PriorSettings,
     ) -> Result<(Vec<(Unknown, LogPrior)>, Scenario), WorkflowError> {
         let options = &work.settings.estimate;
-        let mut unknowns = Vec::new();
-        for tissue in tissues {
-            unknowns.extend(law_priors(tissue, prior)?);
-        }
+        let mut unknowns = law_priors(tissues, prior)?;
         let loads = options.unknown_loads(&body.scenario.loads);
         unknowns.extend(loads.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))));
         unknowns.extend(body.unknown_room());
