@@ -78,11 +78,7 @@ pub fn person_materials(
 ///
 /// # Errors
 /// [`FitError`], also for a law that cannot be fitted.
-pub fn person_correlations(
-    tasks: &[Task],
-    points: usize,
-    settings: &SampleSettings,
-) -> Result<DMatrix<f64>, FitError> {
+pub fn person_correlations(tasks: &[Task], points: usize, settings: &SampleSettings) -> Result<DMatrix<f64>, FitError> {
     let (spreads, means) = known(settings.curves)?;
     let joint = predict_jointly(means, spreads, tasks, Of::Person, points);
     let moduli = ModuliPrior::from_draws(&joint, PERSONS, 0, settings)?;

@@ -425,7 +425,8 @@ mod tests {
         let (mean, sd) = (known.mean[at_rest.unwrap()], known.sd[at_rest.unwrap()]);
         assert!((own.mean - mean).abs() < 0.5 * sd, "{} beside {mean} +- {sd}", own.mean);
         assert!((own.sd.unwrap() / sd - 1.0).abs() < 0.4, "{own:?} beside {sd}");
-        let two = law_priors(std::slice::from_ref(&tissue), &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
+        let two =
+            law_priors(std::slice::from_ref(&tissue), &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
         assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));
     }
 
@@ -434,7 +435,8 @@ mod tests {
         let tissue = &Tissue::grey_and_white()[0];
         let papers = PriorSettings::default();
         let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
-        let [average, started] = [&papers, &person].map(|prior| law_priors(std::slice::from_ref(tissue), prior).unwrap().remove(0).1);
+        let [average, started] =
+            [&papers, &person].map(|prior| law_priors(std::slice::from_ref(tissue), prior).unwrap().remove(0).1);
         assert_eq!(average, log_prior(tissue, &papers).unwrap());
         assert_eq!(started.average, average.sd.map(|sd| Average { mean: average.mean, sd }));
         assert!(started.sd.unwrap() > 2.0 * average.sd.unwrap(), "{started:?}");
@@ -487,7 +489,11 @@ mod tests {
     #[test]
     fn the_joint_prior_of_ogdens_law_has_an_exponent_off_its_bound_and_a_modulus_near_the_neo_hookean_one() {
         let tissue = &Tissue::grey_and_white()[0];
-        let ogden = law_priors(std::slice::from_ref(tissue), &PriorSettings { law: MetaModel::OGDEN, ..PriorSettings::default() }).unwrap();
+        let ogden = law_priors(
+            std::slice::from_ref(tissue),
+            &PriorSettings { law: MetaModel::OGDEN, ..PriorSettings::default() },
+        )
+        .unwrap();
         let neo = law_priors(std::slice::from_ref(tissue), &PriorSettings::default()).unwrap();
         assert_eq!((ogden.len(), neo.len()), (2, 1));
         assert!((ogden[0].1.mean - neo[0].1.mean).abs() < 0.5 * neo[0].1.sd.unwrap(), "{ogden:?} {neo:?}");
