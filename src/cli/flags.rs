@@ -61,7 +61,7 @@ fn engine(name: &str) -> Result<Engine, String> {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct PriorModelOption {
     /// What the prior is made of: the paper's Gaussian process, or what the spread between studies and people leaves to expect of a
-    /// person (study-level) [default: published]
+    /// person (study-level) [default: a person for estimates, the paper for levels and predictions]
     #[arg(long, help_heading = MATERIAL, value_name = "published|study-level")]
     model: Option<GenerativeModel>,
 }

@@ -24,8 +24,11 @@ use thiserror::Error;
 pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
     pub published: bool,
-    /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person.
-    pub model: GenerativeModel,
+    /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person. Left out:
+    /// estimates start from a person, whom the literature knows far less well than the average of its studies; levels of a
+    /// sweep and predictions are the paper's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<GenerativeModel>,
     /// Whose studies: elastography, linear elasticity or hyperelastic tests.
     pub study: StudyKind,
     /// The law fitted to every sample; its volumetric part takes the experiment's Poisson's ratio.
@@ -41,7 +44,7 @@ impl Default for PriorSettings {
     fn default() -> Self {
         Self {
             published: false,
-            model: GenerativeModel::Published,
+            model: None,
             study: StudyKind::Hyperelastic,
             law: MetaModel::NEO_HOOKEAN,
             population: None,
@@ -50,6 +53,28 @@ impl Default for PriorSettings {
 }
 
 impl PriorSettings {
+    /// Of whom levels and predictions are.
+    fn model_of_levels(&self) -> GenerativeModel {
+        self.model.unwrap_or(GenerativeModel::Published)
+    }
+
+    /// What an estimate starts from. Who asks for the published program's choices gets its prior.
+    fn model_of_estimates(&self) -> GenerativeModel {
+        let own = if self.published { GenerativeModel::Published } else { GenerativeModel::StudyLevel };
+        self.model.unwrap_or(own)
+    }
+
+    /// The same with the model that levels and predictions are of, where none is named.
+    #[must_use]
+    pub fn for_predictions(&self) -> Self {
+        Self { model: Some(self.model_of_levels()), ..self.clone() }
+    }
+
+    /// The same with the model that an estimate starts from, where none is named.
+    fn for_estimates(&self) -> Self {
+        Self { model: Some(self.model_of_estimates()), ..self.clone() }
+    }
+
     /// Refuses a population that is not of patients like this one.
     ///
     /// # Errors
@@ -128,7 +153,7 @@ fn materials_of_task(
         return Err(PriorError::NoLevels);
     }
     let settings = sample_settings(prior);
-    match prior.model {
+    match prior.model_of_levels() {
         GenerativeModel::Published => sample_shear_moduli(task, levels, &settings)
             .map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source }),
         GenerativeModel::StudyLevel => Ok(person_materials(task, levels, DRAWN_STRETCHES, &settings)?),
@@ -247,12 +272,13 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// # Errors
 /// [`PriorError`].
 pub fn law_priors(tissues: &[Tissue], prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
+    let prior = &prior.for_estimates();
     let mut known = Vec::new();
     for tissue in tissues {
         known.extend(literature_priors(tissue, prior)?.into_iter().map(|of_law| (tissue, of_law)));
     }
-    if prior.model == GenerativeModel::StudyLevel {
-        let papers = PriorSettings { model: GenerativeModel::Published, ..prior.clone() };
+    if prior.model == Some(GenerativeModel::StudyLevel) {
+        let papers = PriorSettings { model: Some(GenerativeModel::Published), ..prior.clone() };
         let mut averages = Vec::new();
         for tissue in tissues {
             averages.extend(literature_priors(tissue, &papers)?);
@@ -312,7 +338,7 @@ fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unkn
     let law = if prior.law == MetaModel::OGDEN { MetaModel::OGDEN_HIGH } else { prior.law };
     let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..sample_settings(prior) };
     let task = task_of(tissue, prior.study)?;
-    let draws = match prior.model {
+    let draws = match prior.model_of_levels() {
         GenerativeModel::Published => {
             draw_materials(&joint_tissue_prior(task, &table(), &settings), DRAWS, 0, Spread::Study, &settings)
         }
@@ -414,7 +440,7 @@ mod tests {
     #[test]
     fn the_study_level_prior_is_that_of_a_person_and_wider_than_the_papers() {
         let tissue = Tissue::whole_brain().remove(0);
-        let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
+        let person = PriorSettings { model: Some(GenerativeModel::StudyLevel), ..PriorSettings::default() };
         let [papers, own] = [&PriorSettings::default(), &person].map(|prior| log_prior(&tissue, prior).unwrap());
         assert!(own.sd.unwrap() > 1.5 * papers.sd.unwrap(), "{own:?} beside {papers:?}");
         // The law fitted to ln g at the mean has about the modulus that ln g has at rest.
@@ -431,22 +457,24 @@ mod tests {
     }
 
     #[test]
-    fn a_persons_prior_keeps_the_papers_average_beside_it() {
-        let tissue = &Tissue::grey_and_white()[0];
-        let papers = PriorSettings::default();
-        let person = PriorSettings { model: GenerativeModel::StudyLevel, ..PriorSettings::default() };
-        let [average, started] =
-            [&papers, &person].map(|prior| law_priors(std::slice::from_ref(tissue), prior).unwrap().remove(0).1);
-        assert_eq!(average, log_prior(tissue, &papers).unwrap());
-        assert_eq!(started.average, average.sd.map(|sd| Average { mean: average.mean, sd }));
-        assert!(started.sd.unwrap() > 2.0 * average.sd.unwrap(), "{started:?}");
+    fn an_estimate_starts_from_a_person_and_keeps_the_papers_average_beside_it() {
+        let tissue = &Tissue::grey_and_white()[..1];
+        let own = PriorSettings::default();
+        let [started, predicted] = [&own, &own.for_predictions()].map(|p| law_priors(tissue, p).unwrap().remove(0).1);
+        let papers = log_prior(&tissue[0], &own).unwrap();
+        assert_eq!(started.average, papers.sd.map(|sd| Average { mean: papers.mean, sd }));
+        assert_eq!(predicted, papers);
+        assert!(started.sd.unwrap() > 2.0 * papers.sd.unwrap(), "{started:?}");
+        // Who asks for the published program gets its prior.
+        let published = PriorSettings { published: true, ..PriorSettings::default() };
+        assert_eq!(law_priors(tissue, &published).unwrap()[0].1, log_prior(&tissue[0], &published).unwrap());
     }
 
     #[test]
     fn a_persons_tissues_go_together() {
         let tissues = Tissue::grey_and_white();
         for law in [MetaModel::NEO_HOOKEAN, MetaModel::OGDEN, MetaModel::MOONEY_RIVLIN] {
-            let person = PriorSettings { model: GenerativeModel::StudyLevel, law, ..PriorSettings::default() };
+            let person = PriorSettings { model: Some(GenerativeModel::StudyLevel), law, ..PriorSettings::default() };
             let priors: Vec<LogPrior> = law_priors(&tissues, &person).unwrap().into_iter().map(|(_, p)| p).collect();
             let white = priors.len() / 2;
             let [grey_sd, white_sd] = [0, white].map(|n| priors[n].sd.unwrap());

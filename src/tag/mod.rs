@@ -5,6 +5,7 @@
 //! survive `TetMesh::restricted` to it. Load and compare by facet area, never by node count: areas hardly change
 //! with resolution, counts do.
 
+mod fissure;
 mod landmark;
 mod midline;
 mod section;
@@ -12,6 +13,7 @@ mod section;
 use crate::mesh::TetMesh;
 use crate::mesh::engine::MidplaneSplit;
 use crate::segment::label;
+pub use fissure::with_closed_fissure;
 use landmark::{above_falx_edge, above_tentorium_mm, below_base_line};
 pub use midline::Midline;
 use nalgebra::Vector3;

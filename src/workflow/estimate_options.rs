@@ -45,6 +45,10 @@ pub struct EstimateOptions {
     pub labels_log_sd: f64,
     /// The same where the body slides on a wall, which is not everywhere where it is taken to be (docs/evidence/estimate.md).
     pub wall_log_sd: f64,
+    /// How far the segmented outline of a patient's brain may be off, mm: standard deviation everywhere, and of what changes from
+    /// end to end of the head. It is estimated along with the moduli, in the mesh that `two_meshes` asks for; 0 to take it as it
+    /// is (docs/evidence/estimate.md).
+    pub outline_mm: f64,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -73,6 +77,7 @@ impl Default for EstimateOptions {
             two_meshes: true,
             labels_log_sd: 0.08,
             wall_log_sd: 0.15,
+            outline_mm: 0.5,
             density: false,
             density_log_sd: 0.56,
             gravity_direction: false,
@@ -106,6 +111,7 @@ impl EstimateOptions {
             ("model_log_sd", self.model_log_sd),
             ("labels_log_sd", self.labels_log_sd),
             ("wall_log_sd", self.wall_log_sd),
+            ("outline_mm", self.outline_mm),
         ];
         if let Some((name, value)) = not_below.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
             return Err(format!("`{name}` is {value}: it must be 0 or more"));

@@ -4,10 +4,12 @@
 use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
+use super::nuisance::{Nuisance, Weighted};
+use super::outline::{OUTLINE, Outline};
 use super::process::{Factor, Process, spread_out};
 use super::projection::Projection;
 use super::re_registration::{Instrument, MovedNode, without_own_error};
-use super::rigid_remainder::{RIGID, RigidModes, Weighted, with_remainder};
+use super::rigid_remainder::{RIGID, RigidModes};
 use super::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
 };
@@ -45,8 +47,9 @@ const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 struct Fit<'b, 'a> {
     body: &'b mut Body<'a>,
     places_mm: Vec<[f64; 3]>,
-    rigid: RigidModes,
-    /// Priors of the model's own parameters and of the rigid remainder behind them.
+    /// The rigid remainder, and the body's outline where it is not known.
+    nuisance: Nuisance,
+    /// Priors of the model's own parameters and of those amounts behind them.
     prior: Vec<LogPrior>,
     own: usize,
 }
@@ -60,12 +63,12 @@ impl Fit<'_, '_> {
         settings: &EstimateSettings,
     ) -> Result<Descent, ProblemError> {
         let settings = EstimateSettings { noise_mm: 1.0, ..settings.clone() };
-        let mut weighted = Weighted { model: &mut *self.body, rigid: &self.rigid, projection, plain: Vec::new() };
+        let mut weighted = Weighted { model: &mut *self.body, nuisance: &self.nuisance, projection, plain: Vec::new() };
         let mut descent = estimate(&mut weighted, &self.prior, start, &settings)?;
         let (own, amounts) = descent.log_parameters.split_at(self.own);
         let plain = weighted.plain.iter().rev().find(|(at, _)| at == own);
         if let Some((_, plain)) = plain {
-            descent.linearisation = with_remainder(plain, &self.rigid, amounts);
+            descent.linearisation = self.nuisance.added_to(plain, amounts);
         }
         Ok(descent)
     }
@@ -76,7 +79,7 @@ impl Fit<'_, '_> {
         let plain = self.body.linearise(own).map_err(|e| EstimateError::Start(e.to_string()))?;
         Ok(Descent {
             log_parameters: parameters.to_vec(),
-            linearisation: with_remainder(&plain, &self.rigid, amounts),
+            linearisation: self.nuisance.added_to(&plain, amounts),
             costs: Vec::new(),
             evaluations: 0,
             convergence: Convergence::IterationsExhausted,
@@ -133,7 +136,7 @@ impl Fit<'_, '_> {
     }
 }
 
-/// Finds the parameters, the rigid remainder and the discrepancy together.
+/// Finds the parameters, the rigid remainder, the outline and the discrepancy together.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -142,7 +145,7 @@ pub(super) fn fit(
     errors: &CorrelatedErrors,
     prior: &[LogPrior],
     start: &[f64],
-    instrument: Option<(&Instrument<'_>, usize)>,
+    (instrument, outline): (Option<(&Instrument<'_>, usize)>, Option<&Outline<'_>>),
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
     let seen = body.observed_nodes().to_vec();
@@ -156,17 +159,25 @@ pub(super) fn fit(
     let pick = |list: &[MovedNode]| -> Vec<MovedNode> { chosen.iter().map(|&n| list[n]).collect() };
     let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
     let rigid = RigidModes::new(&places_mm, errors.rigid_mm);
-    let prior: Vec<LogPrior> = prior.iter().cloned().chain(rigid.priors()).collect();
     let seen_there = pick(&seen);
     body.observe(Observation::Nodes(seen_there.clone()));
-    let mut fit = Fit { body, places_mm, rigid, prior, own };
+    let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
+    let moved = above_noise(&seen_mm, errors.noise);
+    let nuisance = Nuisance::rigid(&rigid);
+    // A body moved a little that has no equilibrium says nothing of what its outline does: then it is taken as it is.
+    let outline = outline.filter(|_| moved).and_then(|o| Some((o, o.columns_mm(start, &places_mm).ok()?)));
+    let nuisance = match &outline {
+        Some((outline, columns_mm)) => nuisance.with(columns_mm, outline.priors()),
+        None => nuisance,
+    };
+    let prior: Vec<LogPrior> = prior.iter().chain(&nuisance.priors).cloned().collect();
+    let amounts = nuisance.count();
+    let mut fit = Fit { body, places_mm, nuisance, prior, own };
 
     let iterations = settings.iterations.min(ROUGH_ITERATIONS);
     let rough = EstimateSettings { decrement_tolerance: ROUGH, iterations, ..settings.clone() };
-    let from: Vec<f64> = start.iter().copied().chain([0.0; RIGID]).collect();
+    let from: Vec<f64> = start.iter().copied().chain(std::iter::repeat_n(0.0, amounts)).collect();
     let start = fit.at(&from)?;
-    let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
-    let moved = above_noise(&seen_mm, errors.noise);
     // What has not moved says nothing of how the registration sees what moves, and a bound needs no minimum.
     let instrument = instrument.filter(|(_, rounds)| moved && *rounds > 0);
     let mut descent = if moved {
@@ -250,14 +261,23 @@ fn independent(factor: &Factor, places_mm: &[[f64; 3]], sd_mm: f64) -> f64 {
 }
 
 impl Fit<'_, '_> {
+    /// The rigid remainder's patterns.
+    fn rigid(&self) -> DMatrix<f64> {
+        self.nuisance.columns_mm.columns(0, RIGID).into_owned()
+    }
+
+    fn rigid_precision(&self) -> Vec<f64> {
+        self.prior[self.own..self.own + RIGID].iter().map(LogPrior::precision).collect()
+    }
+
     /// What was seen as a rigid remainder and noise alone, and with a smooth movement of any kind.
     fn without_mechanics(&self, seen_mm: &DVector<f64>, noise: Process) -> Result<[Evidence; 2], ProblemError> {
         let unmoved = -seen_mm;
-        let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
+        let precision = self.rigid_precision();
         let still = LinearModel {
             places_mm: &self.places_mm,
             residuals_mm: &unmoved,
-            jacobian_mm: &self.rigid.columns_mm,
+            jacobian_mm: &self.rigid(),
             away: DVector::zeros(RIGID),
             precision: DMatrix::from_diagonal(&DVector::from_column_slice(&precision)),
         };
@@ -280,7 +300,7 @@ impl Fit<'_, '_> {
         // Model, any movement and none are held against the same: what was seen without the instrument's own error. As it was
         // seen that error would speak for a movement, and only the model would have been spared it.
         let seen_mm = flat(&|n| self.body.observed_nodes()[n].1);
-        let precision: Vec<f64> = self.prior[self.own..].iter().map(LogPrior::precision).collect();
+        let (rigid, precision) = (self.rigid(), self.rigid_precision());
         let [nothing, anything] = self.without_mechanics(&seen_mm, errors.noise)?;
         let model = evidence.log_evidence.max(exact.log_evidence);
         let odds = Odds {
@@ -300,14 +320,7 @@ impl Fit<'_, '_> {
         // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
         let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
         let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
-        let columns =
-            DMatrix::from_fn(
-                rows,
-                1 + RIGID,
-                |r, c| {
-                    if c == 0 { pattern[r] } else { self.rigid.columns_mm[(r, c - 1)] }
-                },
-            );
+        let columns = DMatrix::from_fn(rows, 1 + RIGID, |r, c| if c == 0 { pattern[r] } else { rigid[(r, c - 1)] });
         let white = factor.whiten(&columns);
         let target = factor.whiten(&DMatrix::from_column_slice(rows, 1, seen_mm.as_slice()));
         let mut normal = white.transpose() * &white;
@@ -317,7 +330,8 @@ impl Fit<'_, '_> {
             let share = normal.solve(&(white.transpose() * target))[(0, 0)];
             (share, normal.inverse()[(0, 0)].sqrt())
         });
-        let remainder = &self.rigid.columns_mm * DVector::from_column_slice(&descent.log_parameters[self.own..]);
+        let (remainder, outline) = descent.log_parameters[self.own..].split_at(RIGID);
+        let remainder = rigid * DVector::from_column_slice(remainder);
         let residuals = &descent.linearisation.residuals_mm;
         let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
         let shifted = &seen_mm - &remainder;
@@ -333,6 +347,7 @@ impl Fit<'_, '_> {
             measured_noise: errors.noise,
             odds,
             rigid_remainder_mm: rms(&remainder),
+            outline_mm: <[f64; OUTLINE]>::try_from(outline).ok(),
             shift: Shift {
                 seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),

@@ -91,6 +91,9 @@ pub struct Findings {
     pub odds: Odds,
     /// Size of the rigid remainder, mm.
     pub rigid_remainder_mm: f64,
+    /// How much farther out the outline is taken to be, mm: everywhere, and at the right, front and upper end; `None` where it is
+    /// taken as it is.
+    pub outline_mm: Option<[f64; 4]>,
     /// The shift.
     pub shift: Shift,
     /// The places that were looked at, mm, and their nodes.

@@ -73,6 +73,10 @@ pub struct EstimateOutcome {
     /// Root mean square of the rigid registration's remainder over the observed nodes, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rigid_remainder_mm: Option<f64>,
+    /// How much farther out than segmented the brain's outline most probably is, mm: everywhere, and on top of that at the right,
+    /// front and upper end (as much less at the other ends).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outline_mm: Option<[f64; 4]>,
 }
 
 /// The estimate with the state behind it and how sure that state is.

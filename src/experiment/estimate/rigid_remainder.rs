@@ -3,8 +3,7 @@
 //! Rigid registration of whole heads takes up a part of the brain's shift (docs/evidence/choices.md), and no later step takes that
 //! out.
 
-use super::projection::Projection;
-use super::{Forward, Linearisation, LogPrior, Scale};
+use super::{LogPrior, Scale};
 use nalgebra::{DMatrix, DVector, Matrix3x6, Vector3};
 
 /// The six rigid movements of some places about their middle.
@@ -64,48 +63,6 @@ fn column(k: usize, arm: &Vector3<f64>) -> Vector3<f64> {
     let mut unit = Vector3::zeros();
     unit[k % 3] = 1.0;
     if k < 3 { unit } else { unit.cross(arm) }
-}
-
-/// A model held against the part of what was seen that it could do itself, with the rigid remainder behind its own
-/// parameters: residuals are independent and of standard deviation 1.
-pub struct Weighted<'a, M> {
-    /// The model.
-    pub model: &'a mut M,
-    /// The remainder.
-    pub rigid: &'a RigidModes,
-    /// What it could do.
-    pub projection: &'a Projection,
-    /// The model's own parameters and linearisations, in mm, in the order they were asked for.
-    pub plain: Vec<(Vec<f64>, Linearisation)>,
-}
-
-/// A model's residuals and Jacobian with the rigid remainder's added, in mm.
-pub fn with_remainder(plain: &Linearisation, rigid: &RigidModes, amounts: &[f64]) -> Linearisation {
-    let own = plain.jacobian_mm.ncols();
-    let residuals_mm = &plain.residuals_mm + &rigid.columns_mm * DVector::from_column_slice(amounts);
-    let jacobian_mm = DMatrix::from_fn(plain.jacobian_mm.nrows(), own + RIGID, |r, c| {
-        if c < own { plain.jacobian_mm[(r, c)] } else { rigid.columns_mm[(r, c - own)] }
-    });
-    Linearisation { residuals_mm, jacobian_mm }
-}
-
-/// The same, independent and of standard deviation 1.
-fn whitened(linear: &Linearisation, projection: &Projection) -> Linearisation {
-    let residuals = DMatrix::from_column_slice(linear.residuals_mm.len(), 1, linear.residuals_mm.as_slice());
-    let residuals_mm = projection.whiten(&residuals).column(0).into_owned();
-    Linearisation { residuals_mm, jacobian_mm: projection.whiten(&linear.jacobian_mm) }
-}
-
-impl<M: Forward> Forward for Weighted<'_, M> {
-    type Error = M::Error;
-
-    fn linearise(&mut self, parameters: &[f64]) -> Result<Linearisation, M::Error> {
-        let (own, amounts) = parameters.split_at(parameters.len() - RIGID);
-        let plain = self.model.linearise(own)?;
-        let white = whitened(&with_remainder(&plain, self.rigid, amounts), self.projection);
-        self.plain.push((own.to_vec(), plain));
-        Ok(white)
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use super::findings::ProblemError;
 use super::independent::fit_independent;
 use super::mesh_error::{at_places, left_of_difference};
 use super::outcome::{Estimate, EstimateOutcome};
+use super::outline::Outline;
 use super::problem::{Errors, Problem};
 use super::spread::spread;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
@@ -36,8 +37,18 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let unknown = unknowns.clone();
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
     let start = body.start(&start);
+    let outline = problem.coarser.filter(|_| problem.outline_mm > 0.0).map(|mesh| Outline {
+        mesh,
+        template: problem.template,
+        unknowns: &unknown,
+        poisson_ratio: problem.poisson_ratio,
+        sd_mm: problem.outline_mm,
+    });
     let fitted = match &problem.errors {
-        Errors::Correlated(errors) => correlated::fit(&mut body, errors, &prior, &start, problem.instrument, settings)?,
+        Errors::Correlated(errors) => {
+            let others = (problem.instrument, outline.as_ref());
+            correlated::fit(&mut body, errors, &prior, &start, others, settings)?
+        }
         Errors::Independent { share } => {
             fit_independent(&mut body, *share, &prior, &start, problem.instrument, settings)?
         }
@@ -109,6 +120,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
         rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
+        outline_mm: correlated.as_ref().and_then(|c| c.outline_mm),
         shift: correlated.map(|c| c.shift),
         posterior,
         prior,

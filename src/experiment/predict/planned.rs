@@ -61,7 +61,7 @@ impl PredictSettings {
         let mut add = |unknown: Unknown, prior: LogPrior, cause| {
             list.push(Uncertain { unknown, prior, cause, levels_mm: Vec::new() });
         };
-        for (unknown, prior) in law_priors(&self.tissue_list(), prior)? {
+        for (unknown, prior) in law_priors(&self.tissue_list(), &prior.for_predictions())? {
             add(unknown, prior, Cause::Stiffness);
         }
         if own.csf.is_none() {

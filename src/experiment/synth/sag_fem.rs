@@ -17,7 +17,7 @@ use crate::image::LabelMap;
 use crate::material::law::Material;
 use crate::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use crate::segment::{SULCUS_MM, label, with_closed_sulci};
-use crate::tag::{BASE, FALX, Midline, TagSettings, falx_sheet, tag_boundary_sets_with};
+use crate::tag::{BASE, FALX, Midline, TagSettings, falx_sheet, tag_boundary_sets_with, with_closed_fissure};
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ const GRAVITY_M_PER_S2: f64 = 9.80665;
 /// The displacement of the brain after the resection, held at the falx and as the settings say at the skull.
 pub fn by_finite_elements(
     labels: &LabelMap<Patient>,
-    template: impl Fn(Point3<f64>) -> Position<Mni>,
+    template: impl Fn(Point3<f64>) -> Position<Mni> + Sync,
     resection: &Resection,
     settings: &SynthSettings,
 ) -> Result<Field, SynthError> {
@@ -43,8 +43,9 @@ pub fn by_finite_elements(
         MeshSettings { size: MeshSize::Cells(settings.cells), split: Some(falx_sheet()), ..MeshSettings::default() };
     let template = |p: [f64; 3]| <[f64; 3]>::from(template(Point3::from(p)).mm);
     let midline = Midline::of(template);
-    let (mut mesh, _) = mesh_labels(&midline.straightened(&map), &mesh_settings, &EnginePrograms::default())
-        .map_err(|e| failed(e.to_string()))?;
+    let straight = with_closed_fissure(&midline.straightened(&map), |p| template(midline.bent(p)));
+    let (mut mesh, _) =
+        mesh_labels(&straight, &mesh_settings, &EnginePrograms::default()).map_err(|e| failed(e.to_string()))?;
     tag_boundary_sets_with(&mut mesh, &TagSettings::default(), |p| template(midline.bent(p)))
         .map_err(|e| failed(e.to_string()))?;
     let mesh = mesh.moved(|p| midline.bent(p)).map_err(|e| failed(e.to_string()))?;

@@ -296,6 +296,7 @@ mod tests {
             odds: None,
             shift: None,
             rigid_remainder_mm: None,
+            outline_mm: None,
         }
     }
 

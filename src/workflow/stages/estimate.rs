@@ -28,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 19;
+const VERSION: u32 = 20;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -357,6 +357,7 @@ impl Bodies {
         let problem = Problem {
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             body_log_sd: if patient { body.log_sd(options) } else { 0.0 },
+            outline_mm: if patient { options.outline_mm } else { 0.0 },
             coarser: coarser.as_ref(),
             body_known: !patient,
             start: rough.map_or_else(Vec::new, |found| found.numbers),

@@ -14,7 +14,7 @@ use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
 use crate::segment::{SULCUS_MM, label, with_closed_sulci};
-use crate::tag::{Midline, TagReport, falx_sheet, tag_boundary_sets_with};
+use crate::tag::{Midline, TagReport, falx_sheet, tag_boundary_sets_with, with_closed_fissure};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
@@ -25,7 +25,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const NAME: StageName = StageName::Mesh;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 const LARGE_ISLAND_MM3: f64 = 500.0;
@@ -115,11 +115,12 @@ fn tagged(
     };
     // The falx is a sheet in the plane x = 0 of a brain whose midline has been made straight.
     let midline = template_from_labels.filter(|_| settings.split.is_some()).map(|_| Midline::of(in_template));
-    let straight = midline.as_ref().map(|midline| midline.straightened(body));
+    let bent = |p: [f64; 3]| midline.as_ref().map_or(p, |midline| midline.bent(p));
+    let straight =
+        midline.as_ref().map(|midline| with_closed_fissure(&midline.straightened(body), |p| in_template(bent(p))));
     let failed = |source| WorkflowError::Engine { labels: labels.to_owned(), source };
     let meshed = mesh_labels(straight.as_ref().unwrap_or(body), settings, &work.place.programs.engines());
     let (mut whole, record) = meshed.map_err(failed)?;
-    let bent = |p: [f64; 3]| midline.as_ref().map_or(p, |midline| midline.bent(p));
     let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, |p| in_template(bent(p)))?;
     let engine = record.engine.name();
     let whole = whole.moved(bent).map_err(|source| failed(EngineError::Invalid { engine, source }))?;
