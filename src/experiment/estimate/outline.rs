@@ -106,7 +106,9 @@ fn with_outline_moved(mesh: &TetMesh, by_mm: impl Fn(Vector3<f64>) -> f64) -> Te
         let [a, b, c] = triangle.map(corner);
         // As long as twice the triangle is large.
         let normal = (b - a).cross(&(c - a));
-        triangle.iter().for_each(|n| normals[*n as usize] += normal);
+        for n in triangle {
+            normals[*n as usize] += normal;
+        }
     }
     let to = |x: [f64; 3]| -> [f64; 3] {
         let hit = tree.find(x);
