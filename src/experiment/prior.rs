@@ -265,8 +265,8 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// average of the studies. Those curves share their shape far more than studies do, so an exponent's mean and spread are those
 /// of the published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
-/// as another. A person's tissues go together (a laboratory that finds one soft finds the other soft): how stiff they are is known
-/// to a factor, how much stiffer one is than the other far better. What a cohort has taught takes the place of mean and
+/// as another. A person's tissues go together (a laboratory that finds one soft finds the other soft): how much stiffer one is
+/// than the other is known better than how stiff they are. What a cohort has taught takes the place of mean and
 /// spread, tissue by tissue.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
 //! How far the body's outline may be off, and what that does to its displacement.
 //!
-//! A brain that slides on the skull has nothing but its outline to lean on: half a millimetre of it is worth half the stiffness
-//! of a tissue (docs/evidence/estimate.md). A segmentation is no better than that, so the outline is estimated along with the moduli:
-//! out or in by one amount everywhere, and by amounts that change from side to side. What they do is found on a coarse mesh
-//! of the body, moved so far and solved again.
+//! A brain that slides on the skull has nothing but its outline to lean on: labels wider by about a millimetre made grey matter a
+//! fifth stiffer and white matter an eighth softer (docs/evidence/estimate.md). A segmentation is good to about half of that, so
+//! the outline is estimated along with the moduli: out or in by one amount everywhere, and by amounts that change from side to
+//! side. What they do is found on a coarse mesh of the body, moved so far and solved again.
 
 use super::body::{Body, BodyError, Observation, Unknown};
 use super::mesh_error::at_places;
