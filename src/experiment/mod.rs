@@ -1,6 +1,7 @@
 //! Phantom, resection, sweep, estimation: scenario in, outcome out.
 
 pub mod compare;
+pub mod depth;
 pub mod estimate;
 pub mod field;
 pub mod landmarks;

@@ -25,23 +25,14 @@ pub fn with_stuck_cortex(held: &Scenario) -> Scenario {
 /// The mesh with [`STUCK`]: nodes of the cortex ([`PIAL`]) whose outward normal is within 60 degrees of gravity.
 #[must_use]
 pub fn with_stuck_set(mut mesh: TetMesh, skull: &SkullSettings, gravity_m_per_s2: [f64; 3]) -> TetMesh {
-    let nodes = mesh.nodes_mm();
-    let mut normals = vec![Vector3::zeros(); nodes.len()];
     let tagged = with_sliding_sets(&mesh, skull);
-    for facet in tagged.facet_sets.get(PIAL).map_or(&[][..], Vec::as_slice) {
-        let [a, b, c] = facet.map(|n| Vector3::from(nodes[n as usize]));
-        // As long as twice the facet is large.
-        let normal = (b - a).cross(&(c - a));
-        for n in facet {
-            normals[*n as usize] += normal;
-        }
-    }
+    let normals = mesh.node_normals_mm2(tagged.facet_sets.get(PIAL).map_or(&[][..], Vec::as_slice));
     let down = Vector3::from(gravity_m_per_s2).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
     let pressed = |n: &u32| {
         let normal = normals[*n as usize];
         normal.dot(&down) > PRESSED_COSINE * normal.norm()
     };
-    let stuck = (0..nodes.len() as u32).filter(pressed).collect();
+    let stuck = (0..normals.len() as u32).filter(pressed).collect();
     mesh.node_sets.insert(STUCK.to_owned(), stuck);
     mesh
 }

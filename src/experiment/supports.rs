@@ -24,22 +24,15 @@ pub fn with_sliding_sets(mesh: &TetMesh, skull: &SkullSettings) -> TetMesh {
     let lowest = mesh.nodes_mm().iter().map(|x| x[2]).fold(f64::INFINITY, f64::min);
     let cut = lowest + skull.brainstem_cut_mm;
     let held: Vec<u32> = (0..mesh.nodes_mm().len() as u32).filter(|&n| mesh.nodes_mm()[n as usize][2] <= cut).collect();
-    let sorted = |mut facet: [u32; 3]| {
-        facet.sort_unstable();
-        facet
-    };
-    let of = |set: &str| mesh.facet_sets.get(set).map_or(&[][..], Vec::as_slice);
-    let mut others: Vec<[u32; 3]> =
-        of(VENTRICLE).iter().chain(of(MARGIN)).chain(of(FALX)).copied().map(sorted).collect();
-    others.sort_unstable();
-    let (margin, _) = TriMesh::from_facets(mesh.nodes_mm(), of(MARGIN));
+    let margin = mesh.facet_sets.get(MARGIN).map_or(&[][..], Vec::as_slice);
+    let (margin, _) = TriMesh::from_facets(mesh.nodes_mm(), margin);
     let cavity = ClosestPoint::new(&margin).filter(|_| skull.opening_mm > 0.0);
     let open =
         |n: u32| cavity.as_ref().is_some_and(|c| c.find(mesh.nodes_mm()[n as usize]).distance_mm < skull.opening_mm);
-    let mut pial = mesh.boundary_facets(|_| true);
+    let mut pial = mesh.outside_without(&[VENTRICLE, MARGIN, FALX]);
     pial.retain(|facet| {
         let held = facet.iter().all(|n| held.binary_search(n).is_ok());
-        !held && others.binary_search(&sorted(*facet)).is_err() && !facet.iter().any(|&n| open(n))
+        !held && !facet.iter().any(|&n| open(n))
     });
     mesh.facet_sets.insert(PIAL.to_owned(), pial);
     mesh.node_sets.insert(BRAINSTEM.to_owned(), held);

@@ -16,6 +16,32 @@ impl TetMesh {
         ((a + b + c) / 3.0).into()
     }
 
+    /// The facets of the outside that are in none of these facet sets, outward, in order of tetrahedron.
+    pub fn outside_without(&self, sets: &[&str]) -> Vec<[u32; 3]> {
+        let sorted = |mut facet: [u32; 3]| {
+            facet.sort_unstable();
+            facet
+        };
+        let of = sets.iter().filter_map(|set| self.facet_sets.get(*set)).flatten();
+        let mut left_out: Vec<[u32; 3]> = of.copied().map(sorted).collect();
+        left_out.sort_unstable();
+        let mut outside = self.boundary_facets(|_| true);
+        outside.retain(|facet| left_out.binary_search(&sorted(*facet)).is_err());
+        outside
+    }
+
+    /// Normals of the nodes of a surface, mm2: the sum of the area vectors of the facets around each; zero for a node of none.
+    pub fn node_normals_mm2(&self, facets: &[[u32; 3]]) -> Vec<Vector3<f64>> {
+        let mut normals = vec![Vector3::zeros(); self.nodes_mm().len()];
+        for facet in facets {
+            let area = self.area_vector_mm2(*facet);
+            for n in facet {
+                normals[*n as usize] += area;
+            }
+        }
+        normals
+    }
+
     /// The area that belongs to each node of `facets`, a third of every facet it is a corner of: `(node, mm2)`, nodes
     /// ascending. The areas sum to the whole, so a force shared by them is the same at every resolution.
     ///

@@ -195,12 +195,20 @@ pub fn take_pair_apart(
     let known_tissue = both(&tissue, &post_on_mni.inside);
     // Ratios of gain are those of the scans as they are; turning back is turning again.
     let as_scanned = before.t1_mni.map(|x| scale.of(x));
-    let post_t1 = on_the_scale_of(
-        &as_scanned,
-        &post_on_mni.volume.map(|x| x.max(0.0)),
-        &known_tissue,
-        settings.cavity.bias_sigma_mm,
-    );
+    let post_raw = post_on_mni.volume.map(|x| x.max(0.0));
+    let alike = |pre: &Volume<f32, Mni>| on_the_scale_of(pre, &post_raw, &known_tissue, settings.cavity.bias_sigma_mm);
+    let post_t1 = if given.labels.is_some() {
+        alike(&as_scanned)
+    } else {
+        // What was taken out of one scan goes out of the other, around the brain as within it: a skull that is bright on one of
+        // them alone would draw the brain to it, or away.
+        let pre_on_mni = resample(pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        let raw = pre_on_mni.volume.map(|x| x.max(0.0));
+        let post = alike(&raw);
+        Volume::from_fn(grid, |n| {
+            if raw.data[n] > 0.0 { post.data[n] * (as_scanned.data[n] / raw.data[n]) } else { post.data[n] }
+        })
+    };
     let post_t1 = if scale.turned_at.is_some() { post_t1.map(|x| scale.of(x)) } else { post_t1 };
     let computed = by_hand.is_none();
     let mut finding = if let Some(finding) = by_hand {

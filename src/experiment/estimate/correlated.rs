@@ -5,7 +5,7 @@ use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::nuisance::{Nuisance, Weighted};
-use super::outline::{OUTLINE, Outline};
+use super::outline::{Outline, OutlineAmounts};
 use super::process::{Factor, Process, spread_out};
 use super::projection::Projection;
 use super::re_registration::{Instrument, MovedNode, without_own_error};
@@ -165,7 +165,7 @@ pub(super) fn fit(
     let moved = above_noise(&seen_mm, errors.noise);
     let nuisance = Nuisance::rigid(&rigid);
     // A body moved a little that has no equilibrium says nothing of what its outline does: then it is taken as it is.
-    let outline = outline.filter(|_| moved).and_then(|o| Some((o, o.columns_mm(start, &places_mm).ok()?)));
+    let outline = outline.filter(|_| moved).and_then(|o| Some((o, o.columns_mm(start, &places_mm)?)));
     let nuisance = match &outline {
         Some((outline, columns_mm)) => nuisance.with(columns_mm, outline.priors()),
         None => nuisance,
@@ -347,7 +347,7 @@ impl Fit<'_, '_> {
             measured_noise: errors.noise,
             odds,
             rigid_remainder_mm: rms(&remainder),
-            outline_mm: <[f64; OUTLINE]>::try_from(outline).ok(),
+            outline_mm: OutlineAmounts::try_from(outline).ok(),
             shift: Shift {
                 seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),

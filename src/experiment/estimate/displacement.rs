@@ -5,8 +5,9 @@
 //! smoothness ties what moves to what does not.
 
 use super::{CorrelatedErrors, Process};
+use crate::experiment::depth::depth_mm;
 use crate::experiment::setting::{SettingError, first_broken};
-use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
+use crate::mesh::TetMesh;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,25 +67,10 @@ impl DisplacementSettings {
 
     /// The nodes deep enough, each with its displacement (mm) by `seen`, a map from the rest position (mm).
     pub fn observed(&self, mesh: &TetMesh, seen: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Vec<(u32, [f64; 3])> {
-        // The ventricles' wall is seen well and moves with the tissue.
-        let wall = mesh.facet_sets.get(crate::tag::VENTRICLE).map_or(&[][..], Vec::as_slice);
-        let sorted = |mut facet: [u32; 3]| {
-            facet.sort_unstable();
-            facet
-        };
-        let mut wall: Vec<[u32; 3]> = wall.iter().copied().map(sorted).collect();
-        wall.sort_unstable();
-        let mut outside = mesh.boundary_facets(|_| true);
-        outside.retain(|&facet| wall.binary_search(&sorted(facet)).is_err());
-        let (surface, _) = TriMesh::from_facets(mesh.nodes_mm(), &outside);
-        let Some(tree) = ClosestPoint::new(&surface) else { return Vec::new() };
-        (0..mesh.nodes_mm().len() as u32)
-            .into_par_iter()
-            .filter_map(|n| {
-                let x = mesh.nodes_mm()[n as usize];
-                (tree.find(x).distance_mm >= self.depth_mm).then(|| (n, seen(x)))
-            })
-            .collect()
+        let depths_mm = depth_mm(mesh);
+        let deep = |n: &usize| depths_mm[*n] >= self.depth_mm;
+        let nodes: Vec<usize> = (0..mesh.nodes_mm().len()).filter(deep).collect();
+        nodes.into_par_iter().map(|n| (n as u32, seen(mesh.nodes_mm()[n]))).collect()
     }
 
     /// How far the displacements are believed, when the rigid registration is expected to be off by `rigid_mm`.

@@ -3,6 +3,7 @@
 use super::body::BodyError;
 use super::evidence::Unexplained;
 use super::mesh_error::made_up_by;
+use super::outline::OutlineAmounts;
 use super::process::{Factor, Process};
 use super::projection::Projection;
 use super::re_registration::InstrumentError;
@@ -93,7 +94,7 @@ pub struct Findings {
     pub rigid_remainder_mm: f64,
     /// How much farther out the outline is taken to be, mm: everywhere, and at the right, front and upper end; `None` where it is
     /// taken as it is.
-    pub outline_mm: Option<[f64; 4]>,
+    pub outline_mm: Option<OutlineAmounts>,
     /// The shift.
     pub shift: Shift,
     /// The places that were looked at, mm, and their nodes.

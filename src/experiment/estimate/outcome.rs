@@ -2,6 +2,7 @@
 
 use super::evidence::Unexplained;
 use super::findings::{Odds, Shift};
+use super::outline::OutlineAmounts;
 use super::re_registration::MovedNode;
 use super::{Convergence, LogPrior, Posterior, Process, Z_95};
 use crate::experiment::verdict::Verdict;
@@ -76,7 +77,7 @@ pub struct EstimateOutcome {
     /// How much farther out than segmented the brain's outline most probably is, mm: everywhere, and on top of that at the right,
     /// front and upper end (as much less at the other ends).
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outline_mm: Option<[f64; 4]>,
+    pub outline_mm: Option<OutlineAmounts>,
 }
 
 /// The estimate with the state behind it and how sure that state is.

@@ -5,7 +5,7 @@
 //! the outline is estimated along with the moduli: out or in by one amount everywhere, and by amounts that change from side to
 //! side. What they do is found on a coarse mesh of the body, moved so far and solved again.
 
-use super::body::{Body, BodyError, Observation, Unknown};
+use super::body::{Body, Observation, Unknown};
 use super::mesh_error::at_places;
 use super::{LogPrior, Scale};
 use crate::fem::Scenario;
@@ -19,6 +19,12 @@ const NAMES: [&str; 4] = ["everywhere", "from left to right", "from back to fron
 
 /// How many they are.
 pub const OUTLINE: usize = NAMES.len();
+
+/// The amounts, mm: everywhere, and on top of that at the right, front and upper end.
+pub type OutlineAmounts = [f64; OUTLINE];
+
+/// How often a step is halved at most where a mesh does not bear it.
+const HALVINGS: i32 = 8;
 
 /// Tissue deeper than this stays where it is, mm.
 const DEPTH_MM: f64 = 10.0;
@@ -51,80 +57,78 @@ impl Outline<'_> {
         })
     }
 
-    /// Displacement of the places per mm of each amount, three rows a place, at these parameters.
-    ///
-    /// # Errors
-    /// [`BodyError`] where the body has no equilibrium there, before or after.
-    pub fn columns_mm(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Result<DMatrix<f64>, BodyError> {
-        let at = |mesh: &TetMesh| -> Result<Vec<[f64; 3]>, BodyError> {
+    /// Displacement of the places per mm of each amount, three rows a place, at these parameters; `None` where the body has no
+    /// equilibrium there, before or after, or its outline cannot be moved.
+    pub fn columns_mm(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Option<DMatrix<f64>> {
+        let at = |mesh: &TetMesh| -> Option<Vec<[f64; 3]>> {
             let nothing = Observation::Nodes(Vec::new());
-            let mut body = Body::new(mesh, self.template, self.unknowns.to_vec(), self.poisson_ratio, nothing)?;
-            let found = body.equilibrium(parameters)?;
-            Ok(at_places(mesh, &found.displacement_mm, places_mm))
+            let mut body = Body::new(mesh, self.template, self.unknowns.to_vec(), self.poisson_ratio, nothing).ok()?;
+            let found = body.equilibrium(parameters).ok()?;
+            Some(at_places(mesh, &found.displacement_mm, places_mm))
         };
-        let bodies: Vec<TetMesh> =
-            (0..=OUTLINE).map(|n| n.checked_sub(1).map_or_else(|| self.mesh.clone(), |k| self.moved(k))).collect();
-        let found = bodies.par_iter().map(at).collect::<Result<Vec<_>, _>>()?;
-        Ok(DMatrix::from_fn(3 * places_mm.len(), OUTLINE, |row, k| {
+        let surface = Surface::new(self.mesh)?;
+        let mut bodies = vec![(self.mesh.clone(), 0.0)];
+        bodies.extend((0..OUTLINE).map(|k| self.moved(&surface, k)).collect::<Option<Vec<_>>>()?);
+        let found: Vec<_> = bodies.par_iter().map(|(mesh, _)| at(mesh)).collect::<Option<_>>()?;
+        Some(DMatrix::from_fn(3 * places_mm.len(), OUTLINE, |row, k| {
             let of = |n: usize| found[n][row / 3][row % 3];
-            (of(k + 1) - of(0)) / self.sd_mm
+            (of(k + 1) - of(0)) / bodies[k + 1].1
         }))
     }
 
-    /// The mesh with its outline moved by one standard deviation of an amount.
-    fn moved(&self, amount: usize) -> TetMesh {
-        let nodes = self.mesh.nodes_mm();
+    /// The mesh with its outline moved by an amount, and by how much of it, mm: by one standard deviation, or by less where that
+    /// would turn a tetrahedron inside out.
+    fn moved(&self, surface: &Surface, amount: usize) -> Option<(TetMesh, f64)> {
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        for x in nodes {
+        for x in self.mesh.nodes_mm() {
             (low, high) = (low.inf(&Vector3::from(*x)), high.sup(&Vector3::from(*x)));
         }
         let share = |x: Vector3<f64>| match amount.checked_sub(1) {
             None => 1.0,
             Some(axis) => 2.0 * (x[axis] - low[axis]) / (high[axis] - low[axis]) - 1.0,
         };
-        with_outline_moved(self.mesh, |x| self.sd_mm * share(x))
+        let mut steps_mm = (0..HALVINGS).map(|n| self.sd_mm * 0.5f64.powi(n));
+        steps_mm.find_map(|step_mm| Some((surface.moved(self.mesh, |x| step_mm * share(x))?, step_mm)))
     }
 }
 
-/// The mesh with its outline moved outwards by so many mm, what lies below it by less the deeper it lies. A wall of a ventricle or a
-/// cavity is no outline. Where that turned a tetrahedron inside out the mesh is as it was.
-fn with_outline_moved(mesh: &TetMesh, by_mm: impl Fn(Vector3<f64>) -> f64) -> TetMesh {
-    let sorted = |mut facet: [u32; 3]| {
-        facet.sort_unstable();
-        facet
-    };
-    let walls = [VENTRICLE, MARGIN].into_iter().filter_map(|set| mesh.facet_sets.get(set)).flatten();
-    let mut walls: Vec<[u32; 3]> = walls.copied().map(sorted).collect();
-    walls.sort_unstable();
-    let mut outside = mesh.boundary_facets(|_| true);
-    outside.retain(|facet| walls.binary_search(&sorted(*facet)).is_err());
-    let (surface, _) = TriMesh::from_facets(mesh.nodes_mm(), &outside);
-    let Some(tree) = ClosestPoint::new(&surface) else { return mesh.clone() };
-    let corner = |n: u32| Vector3::from(surface.nodes_mm[n as usize]);
-    let mut normals = vec![Vector3::zeros(); surface.nodes_mm.len()];
-    for triangle in &surface.triangles {
-        let [a, b, c] = triangle.map(corner);
-        // As long as twice the triangle is large.
-        let normal = (b - a).cross(&(c - a));
-        for n in triangle {
-            normals[*n as usize] += normal;
-        }
+/// The outline of a body: what it ends at, walls of a ventricle or a cavity apart.
+struct Surface {
+    outside: TriMesh,
+    tree: ClosestPoint,
+    /// Outward, one a node of the outside.
+    normals: Vec<Vector3<f64>>,
+}
+
+impl Surface {
+    /// `None` for a body without an outside.
+    fn new(mesh: &TetMesh) -> Option<Self> {
+        let facets = mesh.outside_without(&[VENTRICLE, MARGIN]);
+        let (outside, nodes) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
+        let normals = mesh.node_normals_mm2(&facets);
+        let normals = nodes.into_iter().map(|n| normals[n as usize].normalize()).collect();
+        Some(Self { tree: ClosestPoint::new(&outside)?, outside, normals })
     }
-    let to = |x: [f64; 3]| -> [f64; 3] {
-        let hit = tree.find(x);
-        let share = 1.0 - hit.distance_mm / DEPTH_MM;
-        if share <= 0.0 {
-            return x;
-        }
-        let corners = surface.triangles[hit.triangle as usize];
-        // From corner to corner the normal turns smoothly.
-        let near = |n: u32| 1.0 / ((corner(n) - hit.point_mm.coords).norm() + 1e-9);
-        let normal: Vector3<f64> =
-            corners.iter().map(|&n| normals[n as usize].normalize() * near(n)).sum::<Vector3<f64>>();
-        let out = normal.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
-        (Vector3::from(x) + out * (share * by_mm(hit.point_mm.coords))).into()
-    };
-    mesh.clone().moved(to).unwrap_or_else(|_| mesh.clone())
+
+    /// The mesh with its outline moved outwards by so many mm, what lies below it by less the deeper it lies; `None` where that
+    /// turns a tetrahedron inside out.
+    fn moved(&self, mesh: &TetMesh, by_mm: impl Fn(Vector3<f64>) -> f64) -> Option<TetMesh> {
+        let corner = |n: u32| Vector3::from(self.outside.nodes_mm[n as usize]);
+        let to = |x: [f64; 3]| -> [f64; 3] {
+            let hit = self.tree.find(x);
+            let share = 1.0 - hit.distance_mm / DEPTH_MM;
+            if share <= 0.0 {
+                return x;
+            }
+            // From corner to corner the normal turns smoothly.
+            let near = |n: u32| 1.0 / ((corner(n) - hit.point_mm.coords).norm() + 1e-9);
+            let corners = self.outside.triangles[hit.triangle as usize];
+            let normal: Vector3<f64> = corners.iter().map(|&n| self.normals[n as usize] * near(n)).sum();
+            let out = normal.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
+            (Vector3::from(x) + out * (share * by_mm(hit.point_mm.coords))).into()
+        };
+        mesh.clone().moved(to).ok()
+    }
 }
 
 #[cfg(test)]
@@ -136,6 +140,10 @@ mod tests {
         (0..mesh.tets().len()).map(|t| mesh.volume_mm3(t)).sum()
     }
 
+    fn moved(mesh: &TetMesh, by_mm: f64) -> TetMesh {
+        Surface::new(mesh).unwrap().moved(mesh, |_| by_mm).unwrap()
+    }
+
     #[test]
     fn an_outline_moved_out_encloses_what_it_has_swept() {
         let mesh = block(8);
@@ -145,13 +153,13 @@ mod tests {
             let at = |n: u32| Vector3::from(surface.nodes_mm[n as usize]);
             surface.triangles.iter().map(|t| 0.5 * (at(t[1]) - at(t[0])).cross(&(at(t[2]) - at(t[0]))).norm()).sum()
         };
-        let swept = volume_mm3(&with_outline_moved(&mesh, |_| step)) - volume_mm3(&mesh);
+        let swept = volume_mm3(&moved(&mesh, step)) - volume_mm3(&mesh);
         // Edges and corners move along their mean normals: less than the faces beside them.
         assert!((0.75..1.0).contains(&(swept / (area * step))), "{swept} of {}", area * step);
-        let back = volume_mm3(&with_outline_moved(&mesh, |_| -step)) - volume_mm3(&mesh);
+        let back = volume_mm3(&moved(&mesh, -step)) - volume_mm3(&mesh);
         assert!((swept + back).abs() < 0.05 * swept, "{swept} {back}");
         // The middle of the block lies deeper than the outline reaches.
-        let moved = with_outline_moved(&mesh, |_| step);
+        let moved = moved(&mesh, step);
         let deep =
             mesh.nodes_mm().iter().zip(moved.nodes_mm()).filter(|(a, _)| a.iter().all(|x| (12.0..28.0).contains(x)));
         assert!(deep.clone().count() > 0 && deep.into_iter().all(|(a, b)| a == b));
@@ -167,7 +175,7 @@ mod tests {
             .collect();
         assert!(!floor.is_empty());
         mesh.facet_sets.insert(VENTRICLE.to_owned(), floor);
-        let moved = with_outline_moved(&mesh, |_| 0.5);
+        let moved = moved(&mesh, 0.5);
         let change = |n: usize| mesh.nodes_mm()[n][2] - moved.nodes_mm()[n][2];
         let inner =
             |n: usize| mesh.nodes_mm()[n][2] < 1e-9 && (0..2).all(|a| (12.0..28.0).contains(&mesh.nodes_mm()[n][a]));

@@ -5,7 +5,6 @@
 //! smooth and can be inverted, and the mask says that nothing is known there.
 
 mod carry;
-mod depth;
 mod explained;
 mod fused;
 mod harmonic;
@@ -18,7 +17,6 @@ mod shift;
 mod vectors;
 
 pub use carry::{Between, looks_like_labels, seen_through};
-pub use depth::depth_mm;
 pub use explained::{Explained, explained};
 pub use fused::{Fused, Left, fused};
 pub use harmonic::{Place, continued};

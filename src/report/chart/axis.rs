@@ -62,7 +62,11 @@ impl Axis {
             for m in multiples {
                 let v = m * 10f64.powi(power);
                 if v >= self.low && v <= self.high {
-                    let text = if decades > 4.0 { power_of_ten(power) } else { number(v, 1) };
+                    let text = match *m {
+                        _ if decades <= 4.0 && v >= 1e-3 => number(v, 1),
+                        1.0 => power_of_ten(power),
+                        m => format!("{m}\u{b7}{}", power_of_ten(power)),
+                    };
                     marks.push((v, text));
                 }
             }
@@ -157,6 +161,13 @@ mod tests {
         let axis = Axis { low: 1.0, high: 1000.0, log: true, pixels: [0.0, 300.0] };
         assert!((axis.at(10.0) - 100.0).abs() < 1e-9 && (axis.at(100.0) - 200.0).abs() < 1e-9);
         assert_eq!(power_of_ten(-12), "10\u{207b}\u{b9}\u{b2}");
+    }
+
+    #[test]
+    fn small_numbers_are_powers_of_ten() {
+        let axis = Axis::over([6e-7, 3e-6].into_iter(), true, false, [0.0, 300.0]);
+        let said: Vec<String> = axis.ticks(5).into_iter().map(|(_, text)| text).collect();
+        assert_eq!(said, ["10\u{207b}\u{2076}", "2\u{b7}10\u{207b}\u{2076}"]);
     }
 
     #[test]

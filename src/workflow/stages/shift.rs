@@ -1,10 +1,11 @@
 //! The brain shift of a case in any of its states, from what its folder holds.
 
 use super::registration::transforms;
+use crate::experiment::depth::depth_mm;
 use crate::experiment::estimate::{CorrelatedErrors, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
-    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, depth_mm, explained,
-    fused, shift_field,
+    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused,
+    shift_field,
 };
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
