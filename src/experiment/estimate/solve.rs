@@ -463,47 +463,6 @@ mod tests {
         assert!(found.shift.unwrap().seen, "{:?}", found.odds);
     }
 
-    /// The block under its weight, of known stiffness, seen of one that is larger by .6 mm on every side.
-    #[test]
-    fn an_outline_that_is_off_is_told_where_the_moduli_are_known() {
-        let (mesh, coarse, truth) = (block(6), block(3), settings());
-        let mut scenario = truth.scenario();
-        scenario.loads = crate::fem::Loads {
-            gravity_m_per_s2: [0.0, -9.81, 0.0],
-            density_kg_per_m3: 300.0,
-            ..crate::fem::Loads::default()
-        };
-        let seen_of = |by_mm: f64| {
-            let other = mesh.clone().moved(|x| x.map(|x| x + by_mm * (x - 20.0) / 20.0)).unwrap();
-            let posed = scenario_of(&scenario, &truth.tissue_list(), &truth.reference_sample()).unwrap();
-            let u = simulate(&other, &posed, &|_| {}).unwrap().displacement_mm;
-            let observed = every_node(&at_places(&other, &u, mesh.nodes_mm()));
-            let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
-            let known = |(tissue, modulus): (Tissue, f64)| {
-                let unknown = Unknown::ShearModulus(tissue);
-                let prior = unknown.prior(modulus.ln(), 0.01);
-                (unknown, prior)
-            };
-            let moduli = Tissue::grey_and_white().into_iter().zip([1370.0, 990.0]);
-            let problem = Problem {
-                unknowns: moduli.map(known).collect(),
-                errors: Errors::Correlated(CorrelatedErrors {
-                    noise,
-                    corrected_mm: noise.sd_mm,
-                    rigid_mm: 0.1,
-                    places: 150,
-                }),
-                start: Vec::new(),
-                coarser: Some(&coarse),
-                outline_mm: 0.5,
-                ..problem(&mesh, &scenario, observed)
-            };
-            solve_problem(problem, &EstimateSettings::default()).unwrap().outcome.outline_mm.unwrap()[0]
-        };
-        let [smaller, larger] = [seen_of(-0.6), seen_of(0.6)];
-        assert!((0.3..0.8).contains(&larger) && (-0.8..-0.3).contains(&smaller), "{smaller} {larger}");
-    }
-
     /// The block, pushed hard enough that a law's shape shows, with the truth's law and the prior of that law.
     fn of_law(truth: &Material, law: MetaModel) -> (EstimateOutcome, BTreeMap<String, Material>) {
         let mesh = block(4);
