@@ -198,6 +198,7 @@ pub fn take_pair_apart(
     let post_raw = post_on_mni.volume.map(|x| x.max(0.0));
     let alike = |pre: &Volume<f32, Mni>| on_the_scale_of(pre, &post_raw, &known_tissue, settings.cavity.bias_sigma_mm);
     let post_t1 = if given.labels.is_some() {
+        // Where labels were given no gain was looked for.
         alike(&as_scanned)
     } else {
         // What was taken out of one scan goes out of the other, around the brain as within it: a skull that is bright on one of

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 /// Monomials x^a y^b z^c with 1 <= a + b + c <= 3 in coordinates scaled to -1..1 over the image.
 const TERMS: usize = 19;
-/// A coil's gain varies by some 15 %: by how much a term may change the intensity over the brain before anything is seen (standard
-/// deviation, of the term's own over the brain too).
+/// A coil's gain varies by some 15 %: what each term of it is expected to change over the brain before anything is seen (standard
+/// deviations, as a share of the intensity). Measured in docs/evidence/choices.md.
 const USUAL_CHANGE: f64 = 0.15;
 /// Regions of the brain whose tissue has a brightness of its own: four lobes, insula, basal ganglia, thalamus and
 /// cerebellum of either side, and the brain stem. What all voxels of a region say of the gain is one observation. Counting
@@ -142,7 +142,7 @@ fn monomials(dims: [usize; 3], voxel: [usize; 3]) -> [f64; TERMS] {
 mod tests {
     use super::*;
 
-    /// What is left of a gain that changes by 15 % over the brain, beside tissue that differs by 12 % from voxel to voxel.
+    /// How much is found of a gain that changes by 15 % over the brain, beside tissue that differs by 12 % from voxel to voxel.
     #[test]
     fn a_gain_of_any_order_is_believed_alike() {
         let dims = [41; 3];
