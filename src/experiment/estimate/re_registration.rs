@@ -13,7 +13,7 @@ use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
 use crate::register::{RegisterError, RigidMasks, RigidSettings, register_rigid};
-use crate::resect::{SagScans, fit_sag, moved_scan};
+use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of};
 use nalgebra::Vector3;
 use thiserror::Error;
 
@@ -56,10 +56,14 @@ pub fn without_own_error(
 /// The registration of a patient's scans as an instrument. All images lie on one grid in the MNI frame reached rigidly.
 #[derive(Clone, Copy, Debug)]
 pub struct ReRegistration<'a> {
-    /// Pre-operative intensities.
+    /// Pre-operative intensities, as the registration has looked at them: without the coil's gain.
     pub pre: &'a Volume<f32, Mni>,
     /// Brain on the pre-operative scan.
     pub pre_brain: &'a Mask<Mni>,
+    /// The tissue that both scans looked at, by which the post-operative intensities came onto the pre-operative scale.
+    pub tissue: &'a Mask<Mni>,
+    /// How smooth the ratio of the two is, see [`on_the_scale_of`].
+    pub scale_sigma_mm: f64,
     /// Where the post-operative scan looked.
     pub post_known: &'a Mask<Mni>,
     /// The cavity on the post-operative scan.
@@ -98,6 +102,9 @@ impl ReRegistration<'_> {
         let rigid = register_rigid(&moved, self.pre, RigidMasks::default(), self.rigid)?;
         let moved_from_pre = rigid.fixed_from_moving.inverse().to_affine();
         let post = resample(&moved, &self.pre.grid, &moved_from_pre, Interpolation::CubicBSpline, 0.0).volume;
+        // Their intensities were brought onto one scale before the shift was known, too: where tissue has given way to fluid their
+        // ratio is no gain.
+        let post = on_the_scale_of(self.pre, &post.map(|x| x.max(0.0)), self.tissue, self.scale_sigma_mm);
         let scans = SagScans {
             pre: self.pre,
             pre_brain: self.pre_brain,

@@ -11,7 +11,7 @@ use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{
     CAVITY, NATIVE_CAVITY, NATIVE_RESECTED, POST_BRAIN, POST_NATIVE_BRAIN, POST_T1, POST_VENTRICLE, PRE_BRAIN,
-    PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED, SAG, TEMPLATE_DISPLACEMENT,
+    PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED, SAG, TEMPLATE_DISPLACEMENT,
 };
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 13;
+const VERSION: u32 = 14;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -157,6 +157,7 @@ pub(crate) fn anat(
             resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
         write(PRE_T1, encode_i16(&whole_numbers(&pre_t1.volume)));
         write(POST_T1, encode_i16(&whole_numbers(&post_t1.volume)));
+        write(PRE_EVEN_T1, encode_i16(&whole_numbers(&before.t1_mni)));
         write(PRE_NATIVE_T1, encode_intensities(&scans.pre));
         write(PRE_BRAIN, encode_mask(&before.brain_mni));
         write(POST_BRAIN, encode_mask(&post_brain));

@@ -7,7 +7,7 @@ use crate::geometry::{Mni, Post};
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
-use crate::layout::{POST_NATIVE_BRAIN, PRE_BRAIN, PRE_T1};
+use crate::layout::{POST_NATIVE_BRAIN, PRE_BRAIN, PRE_EVEN_T1};
 use crate::register::RigidSettings;
 use crate::register::deformable::{DeformableSettings, DisplacementField};
 use crate::segment::label;
@@ -22,6 +22,8 @@ pub(crate) struct SeenShift {
     pub seen: DisplacementField<Mni>,
     pre: Volume<f32, Mni>,
     pre_brain: Mask<Mni>,
+    tissue: Mask<Mni>,
+    scale_sigma_mm: f64,
     post_known: Mask<Mni>,
     cavity: Mask<Mni>,
     fluid: f32,
@@ -33,7 +35,8 @@ impl SeenShift {
     /// Reads the images of a case. The registrations are posed as they were for the masks: by the case's own settings.
     pub fn read(case: &Case, anatomy: Anatomy, settings: &Settings) -> Result<Self, WorkflowError> {
         let options = ReadOptions::default();
-        let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_T1)?, PRE_T1, &options)?.volume.relabelled();
+        let pre: Volume<f32, Mni> =
+            nifti::decode(&case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &options)?.volume.relabelled();
         let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options)?;
         // On the post-operative scan's own grid: what tells how far that scan looked.
         let (on_post, _) = nifti::decode_mask(&case.read(POST_NATIVE_BRAIN)?, POST_NATIVE_BRAIN, &options)?;
@@ -43,6 +46,8 @@ impl SeenShift {
         let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
         Ok(Self {
             fluid: mean_in_ventricle(&pre, &anatomy.labels),
+            tissue: Mask::from_fn(pre.grid, |n| label::is_tissue(anatomy.labels.data[n]) && post_known.data[n]),
+            scale_sigma_mm: settings.anat.cavity.bias_sigma_mm,
             pre,
             pre_brain: pre_brain.relabelled(),
             post_known,
@@ -59,6 +64,8 @@ impl SeenShift {
         ReRegistration {
             pre: &self.pre,
             pre_brain: &self.pre_brain,
+            tissue: &self.tissue,
+            scale_sigma_mm: self.scale_sigma_mm,
             post_known: &self.post_known,
             cavity: &self.cavity,
             fluid: self.fluid,
