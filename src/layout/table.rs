@@ -233,7 +233,7 @@ pub const TABLE: &[Entry] = &[
     ),
     file(SAG, "displacement from the pre-operative to the post-operative scan, mm", Space::Mni, Maker::Anat),
     file(TEMPLATE_DISPLACEMENT, "displacement from the patient to the template, mm", Space::Mni, Maker::Anat),
-    file(PRE_EVEN_T1, "pre-operative scan without its coil's gain", Space::Mni, Maker::Anat),
+    file(PRE_EVEN_T1, "pre-operative scan without its coil's gain, in units of its own", Space::Mni, Maker::Anat),
     file(TEMPLATE_FIT, "the template's fit, in voxels, of a prediction", Space::Mni, Maker::Anat),
     file(REST_MESH, "undeformed mesh of the tissue with its boundary sets", Space::Mni, Maker::Mesh),
     file(REST_GMSH, "the same for gmsh", Space::Mni, Maker::Mesh),

@@ -11,7 +11,8 @@ use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{
     CAVITY, NATIVE_CAVITY, NATIVE_RESECTED, POST_BRAIN, POST_NATIVE_BRAIN, POST_T1, POST_VENTRICLE, PRE_BRAIN,
-    PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED, SAG, TEMPLATE_DISPLACEMENT,
+    PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED, SAG,
+    TEMPLATE_DISPLACEMENT,
 };
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
@@ -157,7 +158,7 @@ pub(crate) fn anat(
             resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
         write(PRE_T1, encode_i16(&whole_numbers(&pre_t1.volume)));
         write(POST_T1, encode_i16(&whole_numbers(&post_t1.volume)));
-        write(PRE_EVEN_T1, encode_i16(&whole_numbers(&before.t1_mni)));
+        write(PRE_EVEN_T1, encode_i16(&sixteen_bits(&before.t1_mni)));
         write(PRE_NATIVE_T1, encode_intensities(&scans.pre));
         write(PRE_BRAIN, encode_mask(&before.brain_mni));
         write(POST_BRAIN, encode_mask(&post_brain));
@@ -198,6 +199,12 @@ pub(crate) fn anat(
         });
         Ok(produced)
     })
+}
+
+/// Intensities as 16-bit whole numbers, the brightest as 32,000: the scan that is registered again loses nothing to rounding.
+fn sixteen_bits(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
+    let highest = volume.data.iter().copied().fold(1e-6f32, f32::max);
+    volume.map(|x| (x * (32000.0 / highest)).round().clamp(0.0, 32000.0) as i16)
 }
 
 /// Intensities as 16-bit whole numbers, scaled so that the brightest keeps three digits.

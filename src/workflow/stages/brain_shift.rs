@@ -35,8 +35,7 @@ impl SeenShift {
     /// Reads the images of a case. The registrations are posed as they were for the masks: by the case's own settings.
     pub fn read(case: &Case, anatomy: Anatomy, settings: &Settings) -> Result<Self, WorkflowError> {
         let options = ReadOptions::default();
-        let pre: Volume<f32, Mni> =
-            nifti::decode(&case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &options)?.volume.relabelled();
+        let pre: Volume<f32, Mni> = nifti::decode(&case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &options)?.volume.relabelled();
         let (pre_brain, _) = nifti::decode_mask(&case.read(PRE_BRAIN)?, PRE_BRAIN, &options)?;
         // On the post-operative scan's own grid: what tells how far that scan looked.
         let (on_post, _) = nifti::decode_mask(&case.read(POST_NATIVE_BRAIN)?, POST_NATIVE_BRAIN, &options)?;
