@@ -12,6 +12,7 @@ mod dependencies;
 mod docs;
 mod documented;
 mod doubtful_inputs;
+mod even_scan;
 mod examples;
 mod fem;
 mod fields;
