@@ -20,6 +20,8 @@ fn linear_change(image: &Volume<f32, Mni>, voxels: &[usize]) -> f64 {
     (terms * found).norm() / (voxels.len() as f64).sqrt()
 }
 
+const LABELS: &str = "pre_space-MNI_dseg.nii.gz";
+
 /// The sample pair's scans were given a gain of 15 %; what of it lies along a line within white matter is mostly gone.
 #[test]
 fn the_scan_that_is_registered_again_has_no_gain() {
@@ -27,7 +29,7 @@ fn the_scan_that_is_registered_again_has_no_gain() {
     let image = |name: &str| -> Volume<f32, Mni> {
         decode(&read(name), name, &ReadOptions::default()).unwrap().volume.relabelled()
     };
-    let (labels, _) = decode_labels(&read("pre_space-MNI_dseg.nii.gz"), "labels", &ReadOptions::default()).unwrap();
+    let (labels, _) = decode_labels(&read(LABELS), LABELS, &ReadOptions::default()).unwrap();
     let labels: LabelMap<Mni> = labels.relabelled();
     let white: Vec<usize> =
         (0..labels.data.len()).filter(|&n| labels.data[n] == label::WHITE_MATTER).step_by(7).collect();
