@@ -4,6 +4,7 @@ use super::anat::Anatomy;
 use super::registration::transforms;
 use crate::experiment::estimate::ReRegistration;
 use crate::geometry::{Mni, Post};
+use crate::image::morphology::erode;
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
@@ -14,6 +15,12 @@ use crate::segment::label;
 use crate::workflow::Settings;
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
+
+/// How far the wall of a ventricle reaches into an image's fluid, mm.
+const WALL_MM: f64 = 2.0;
+
+/// Voxels that make a mean.
+const LEAST_CORE: usize = 100;
 
 /// What a patient's scans show of the brain shift, and what it takes to show the registration another one.
 #[derive(Debug)]
@@ -44,7 +51,7 @@ impl SeenShift {
         let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
         let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
         Ok(Self {
-            fluid: mean_in_ventricle(&pre, &anatomy.labels),
+            fluid: fluid_in_ventricles(&pre, &anatomy.labels),
             tissue: Mask::from_fn(pre.grid, |n| label::is_tissue(anatomy.labels.data[n]) && post_known.data[n]),
             scale_sigma_mm: settings.anat.cavity.bias_sigma_mm,
             pre,
@@ -74,8 +81,35 @@ impl SeenShift {
     }
 }
 
-fn mean_in_ventricle(t1: &Volume<f32, Mni>, labels: &LabelMap<Mni>) -> f32 {
-    let inside = t1.data.iter().zip(&labels.data).filter(|(_, l)| **l == label::VENTRICLE);
-    let (sum, count) = inside.fold((0.0, 0.0), |(s, c), (t1, _)| (s + f64::from(*t1), c + 1.0));
+/// Intensity of fluid: the mean well within the ventricles, where they are that wide. Beside their walls and the plexus it is mixed,
+/// and half as bright again on the whole.
+fn fluid_in_ventricles(t1: &Volume<f32, Mni>, labels: &LabelMap<Mni>) -> f32 {
+    let ventricles = labels.map(|l| l == label::VENTRICLE);
+    let core = erode(&ventricles, WALL_MM);
+    let inside = if core.count() < LEAST_CORE { ventricles } else { core };
+    let (sum, count) = (t1.data.iter().zip(&inside.data).filter(|(_, inside)| **inside))
+        .fold((0.0, 0.0), |(s, c), (t1, _)| (s + f64::from(*t1), c + 1.0));
     (sum / f64::max(count, 1.0)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    /// A ball of fluid (30) whose outer millimetre and a half is mixed with its wall (60).
+    fn read_of(radius_mm: f64) -> f32 {
+        let grid = Grid::<Mni>::axis_aligned([41; 3], [1.0; 3], [-20.0; 3]);
+        let radius = |n: usize| grid.centre(grid.voxel(n)).mm.coords.norm();
+        let labels = LabelMap::from_fn(grid, |n| if radius(n) < radius_mm { label::VENTRICLE } else { 0 });
+        let t1 = Volume::from_fn(grid, |n| if radius(n) < radius_mm - 1.5 { 30.0 } else { 60.0 });
+        fluid_in_ventricles(&t1, &labels)
+    }
+
+    #[test]
+    fn fluid_is_read_away_from_the_walls_where_there_is_room() {
+        assert_eq!(read_of(12.0), 30.0);
+        let narrow = read_of(3.0);
+        assert!((40.0..60.0).contains(&narrow), "{narrow}");
+    }
 }
