@@ -201,7 +201,7 @@ pub(crate) fn anat(
     })
 }
 
-/// Intensities as 16-bit whole numbers, the brightest as 32,000: the scan that is registered again loses nothing to rounding.
+/// Intensities as 16-bit whole numbers, the brightest as 32,000: rounding is far below the noise of the scan that is registered again.
 fn sixteen_bits(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
     let highest = volume.data.iter().copied().fold(1e-6f32, f32::max);
     volume.map(|x| (x * (32000.0 / highest)).round().clamp(0.0, 32000.0) as i16)

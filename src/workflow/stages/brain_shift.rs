@@ -16,10 +16,10 @@ use crate::workflow::Settings;
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 
-/// How far the wall of a ventricle reaches into an image's fluid, mm.
+/// How far the wall of a ventricle reaches into an image's fluid, mm (docs/evidence/choices.md).
 const WALL_MM: f64 = 2.0;
 
-/// Voxels that make a mean.
+/// Fewer voxels than this are no sample of the fluid.
 const LEAST_CORE: usize = 100;
 
 /// What a patient's scans show of the brain shift, and what it takes to show the registration another one.
@@ -81,8 +81,8 @@ impl SeenShift {
     }
 }
 
-/// Intensity of fluid: the mean well within the ventricles, where they are that wide. Beside their walls and the plexus it is mixed,
-/// and half as bright again on the whole.
+/// Intensity of fluid: the mean well within the ventricles, where they are that wide. Beside their walls and the plexus it is mixed
+/// with tissue, and brighter.
 fn fluid_in_ventricles(t1: &Volume<f32, Mni>, labels: &LabelMap<Mni>) -> f32 {
     let ventricles = labels.map(|l| l == label::VENTRICLE);
     let core = erode(&ventricles, WALL_MM);
