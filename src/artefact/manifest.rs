@@ -2,6 +2,7 @@
 
 use super::reason::Reason;
 use super::write::sha256_hex;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,7 +40,15 @@ impl Manifest {
 
     /// The manifest of a stage, when it has finished in this folder.
     pub fn of_stage(folder: &Path, stage: &str) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(Self::path_of_stage(folder, stage)).ok()?).ok()
+        serde_json::from_str(&std::fs::read_to_string(Self::path_of_stage(folder, stage)).ok()?).ok()
+    }
+
+    /// The figures that a later stage or the report needs. Through their text: of two ways to read a type the compiler makes both.
+    ///
+    /// # Errors
+    /// Figures of another kind.
+    pub fn figures<T: DeserializeOwned>(&self) -> serde_json::Result<T> {
+        serde_json::from_str(&self.facts.to_string())
     }
 
     /// One checksum of everything the stage made: what a later stage takes as its input.

@@ -311,7 +311,7 @@ impl ExperimentOutcome {
         let fail = |reason: String| OutcomeError { name: name.to_owned(), reason };
         let value = serde_json::to_value(self).map_err(|e| fail(e.to_string()))?;
         // serde_json turns NaN into null without a word; reading it back would then fail far from the cause.
-        let again: Result<Self, _> = serde_json::from_value(value.clone());
+        let again: Result<Self, _> = serde_json::from_str(&value.to_string());
         again.map_err(|e| fail(format!("a figure is not a finite number: {e}")))?;
         serde_json::to_string_pretty(&value).map(|text| text + "\n").map_err(|e| fail(e.to_string()))
     }

@@ -18,6 +18,15 @@ pub type LabelMap<F> = Volume<u8, F>;
 /// One truth value per voxel.
 pub type Mask<F> = Volume<bool, F>;
 
+/// Voxels per task.
+const VOXELS_AT_ONCE: usize = 1 << 14;
+
+/// Fills pieces of `data`, `at_once` values each, on all threads; `values` gets a piece and the place in memory of its first value.
+/// One loop for every caller: woven into each function's own it took a tenth of the time that the program takes to compile.
+fn fill<T: Send>(data: &mut [T], at_once: usize, values: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    data.par_chunks_mut(at_once).enumerate().for_each(|(n, piece)| values(n * at_once, piece));
+}
+
 impl<T: Copy, F: Frame> Volume<T, F> {
     /// A volume of one value.
     pub fn filled(grid: Grid<F>, value: T) -> Self {
@@ -54,19 +63,27 @@ impl<T: Copy, F: Frame> Volume<T, F> {
     }
 
     /// Every value through a function.
-    pub fn map<U: Copy + Send>(&self, f: impl Fn(T) -> U + Sync) -> Volume<U, F>
+    pub fn map<U: Copy + Default + Send>(&self, f: impl Fn(T) -> U + Sync) -> Volume<U, F>
     where
         T: Sync,
     {
-        Volume { grid: self.grid, data: self.data.par_iter().map(|&x| f(x)).collect() }
+        let mut data = vec![U::default(); self.data.len()];
+        fill(&mut data, VOXELS_AT_ONCE, &|first, values| {
+            values.iter_mut().zip(&self.data[first..]).for_each(|(value, x)| *value = f(*x));
+        });
+        Volume { grid: self.grid, data }
     }
 
     /// The value of a function of the position in memory at every voxel of a grid.
     pub fn from_fn(grid: Grid<F>, f: impl Fn(usize) -> T + Sync + Send) -> Self
     where
-        T: Send,
+        T: Default + Send,
     {
-        Self { grid, data: (0..grid.len()).into_par_iter().map(f).collect() }
+        let mut data = vec![T::default(); grid.len()];
+        fill(&mut data, VOXELS_AT_ONCE, &|first, values| {
+            values.iter_mut().enumerate().for_each(|(n, value)| *value = f(first + n));
+        });
+        Self { grid, data }
     }
 
     /// The value of a function of the voxel (i, j, k) at every voxel of a grid.
@@ -74,11 +91,11 @@ impl<T: Copy, F: Frame> Volume<T, F> {
     where
         T: Default + Send,
     {
-        let [nx, ny, _] = grid.dims;
+        let [nx, ny, _] = grid.dims.map(|n| n.max(1));
         let mut data = vec![T::default(); grid.len()];
         // By rows: a voxel's place in memory need not be taken apart.
-        data.par_chunks_mut(nx.max(1)).enumerate().for_each(|(row, values)| {
-            let (j, k) = (row % ny, row / ny);
+        fill(&mut data, nx, &|first, values| {
+            let (j, k) = (first / nx % ny, first / nx / ny);
             values.iter_mut().enumerate().for_each(|(i, value)| *value = f([i, j, k]));
         });
         Self { grid, data }

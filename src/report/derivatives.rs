@@ -50,7 +50,8 @@ pub fn subject_files(case: &Path, pre: &RawScan, post: &RawScan) -> Result<Vec<C
     let manifest = |stage: &str| -> Result<Manifest, DerivativesError> {
         let file = format!(".stages/{stage}.manifest.json");
         let bytes = read(file.clone())?;
-        serde_json::from_slice(&bytes).map_err(|source| DerivativesError::Manifest { file, source })
+        let text = String::from_utf8_lossy(&bytes);
+        serde_json::from_str(&text).map_err(|source| DerivativesError::Manifest { file, source })
     };
     let (registration, anat) = (manifest("registration")?, manifest("anat")?);
     let both = [pre.uri(), post.uri()];

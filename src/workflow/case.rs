@@ -157,7 +157,7 @@ impl Case {
         let damaged =
             || CaseError::Damaged { folder: self.folder.clone(), file: file.clone(), subject: self.subject() };
         let manifest = Manifest::of_stage(&self.folder, &stage.to_string()).ok_or_else(damaged)?;
-        let facts = serde_json::from_value(manifest.facts.clone()).map_err(|_| damaged())?;
+        let facts = manifest.figures().map_err(|_| damaged())?;
         Ok((manifest, facts))
     }
 

@@ -118,7 +118,7 @@ pub fn mesh_file(
         StageError::Compute(error) => error,
         StageError::Write(error) => WorkflowError::Write(error),
     })?;
-    Ok(serde_json::from_value(outcome.manifest.facts).map_err(|_| MeshFileError::Noted { file })?)
+    Ok(outcome.manifest.figures().map_err(|_| MeshFileError::Noted { file })?)
 }
 
 /// Meshes and, with `tags`, tags.

@@ -130,11 +130,12 @@ impl Settings {
     /// [`SettingsError`] with table, value and rule.
     pub fn resolve<'a>(layers: impl IntoIterator<Item = &'a toml::Table>) -> Result<Self, SettingsError> {
         // From the defaults of the whole, not of its parts: those of `[anat.sag]` are not those of `[deformable]`.
-        let mut whole = toml::Table::try_from(Self::default()).map_err(|e| unreadable(&e.to_string()))?;
+        // Through their text: reading and writing what stands in no text would be compiled once more for every table.
+        let mut whole: toml::Table = Self::default().to_toml().parse().map_err(|e| unreadable(&e))?;
         for layer in layers {
             lay_over(&mut whole, layer, "");
         }
-        let settings: Self = toml::Value::Table(whole).try_into().map_err(|e| unreadable(&e.to_string()))?;
+        let settings: Self = toml::from_str(&whole.to_string()).map_err(|e| unreadable(&e))?;
         settings.check()?;
         Ok(settings)
     }
@@ -198,8 +199,8 @@ impl Settings {
     }
 }
 
-fn unreadable(said: &str) -> SettingsError {
-    SettingsError { file: None, line: None, table: None, reason: in_words(said) }
+fn unreadable(said: &toml::de::Error) -> SettingsError {
+    SettingsError { file: None, line: None, table: None, reason: in_words(said.message()) }
 }
 
 fn spanned(value: Spanned<DeValue<'_>>) -> ValueDeserializer<'_> {

@@ -54,7 +54,7 @@ pub fn every_setting(settings: &Settings) -> Vec<Setting> {
     let schema = SchemaSettings::draft2020_12().for_deserialize().into_generator().into_root_schema_for::<Settings>();
     let schema = Value::from(schema);
     let json = |settings: &Settings| {
-        let table = toml::Table::try_from(settings).unwrap_or_default();
+        let table: toml::Table = settings.to_toml().parse().unwrap_or_default();
         serde_json::to_value(table).unwrap_or_default()
     };
     let mut all = Vec::new();

@@ -114,7 +114,7 @@ pub fn simulate(
         StageError::Write(error) => error.into(),
     })?;
     let noted = |_| SimulationError::Noted { file: file.clone() };
-    Ok((serde_json::from_value(outcome.manifest.facts).map_err(noted)?, outcome.skipped))
+    Ok((outcome.manifest.figures().map_err(noted)?, outcome.skipped))
 }
 
 /// One deformation, or one motion, of a mesh at hand, from rest or from a displacement (mm) near the answer.

@@ -41,6 +41,9 @@ pub(crate) struct Work<'a> {
     held: OnceCell<Lock>,
 }
 
+/// What a stage does where it is not skipped.
+type Compute<'c> = dyn FnOnce() -> Result<Produced, WorkflowError> + 'c;
+
 /// The manifests of the stages that are there, by name.
 #[derive(Clone, Debug, Default)]
 pub struct Made(BTreeMap<StageName, Manifest>);
@@ -109,19 +112,25 @@ impl<'a> Work<'a> {
         stage: &Stage,
         compute: impl FnOnce() -> Result<Produced, WorkflowError>,
     ) -> Result<Facts, WorkflowError> {
+        let manifest = self.finished(name, stage, Box::new(compute))?;
+        let facts = manifest.figures().map_err(|_| CaseError::Damaged {
+            folder: self.case.folder().to_path_buf(),
+            file: format!(".stages/{name}.manifest.json"),
+            subject: Some(self.subject),
+        })?;
+        made.add(name.clone(), manifest);
+        Ok(facts)
+    }
+
+    /// The same for every kind of figures.
+    fn finished(&self, name: &StageName, stage: &Stage, compute: Box<Compute<'_>>) -> Result<Manifest, WorkflowError> {
         let outcome = stage.run(self.place.force, compute).map_err(|error| match error {
             StageError::Compute(error) => error,
             StageError::Write(error) => error.into(),
         })?;
         let (reasons, warnings) = (&outcome.reasons, &outcome.manifest.warnings);
         self.tell(|p| p.stage(&StageEnded { stage: name, skipped: outcome.skipped, reasons, warnings }));
-        let facts = serde_json::from_value(outcome.manifest.facts.clone()).map_err(|_| CaseError::Damaged {
-            folder: self.case.folder().to_path_buf(),
-            file: format!(".stages/{name}.manifest.json"),
-            subject: Some(self.subject),
-        })?;
-        made.add(name.clone(), outcome.manifest);
-        Ok(facts)
+        Ok(outcome.manifest)
     }
 }
 
