@@ -14,8 +14,10 @@ mod search;
 #[cfg(test)]
 mod synthetic_head;
 pub mod transform_text;
+mod two_scans;
 mod whole_head;
 
 pub use affine::subject_from_mean_head;
 pub use rigid::{FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid};
+pub use two_scans::register_two_scans;
 pub use whole_head::{MeanHead, register_to_mean_head, without_gain};

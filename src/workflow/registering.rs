@@ -10,7 +10,7 @@ use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
 use crate::image::nifti::{self, NiftiImage};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
-use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid};
+use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid, register_two_scans};
 use crate::segment::pose_of_head;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -113,7 +113,12 @@ pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Regi
             }
             let fixed_mask = mask(fixed_mask, &fixed, &mut warnings)?;
             let masks = RigidMasks { moving: moving_mask.as_ref(), fixed: fixed_mask.as_ref() };
-            parts(register_rigid(&moving, &fixed, masks, &settings.register).map_err(refused)?)
+            let found = if masks.moving.is_none() && masks.fixed.is_none() {
+                register_two_scans(&moving, &fixed, &settings.register)
+            } else {
+                register_rigid(&moving, &fixed, masks, &settings.register)
+            };
+            parts(found.map_err(refused)?)
         }
     };
     warnings.extend(doubts.iter().cloned().map(Warning::from));

@@ -2,7 +2,7 @@
 
 use super::side::Side;
 use super::{FitQuality, RegisterError, RigidSettings};
-use crate::geometry::Native;
+use crate::geometry::{Native, Position, RigidTransform};
 use crate::image::{Mask, Volume};
 use crate::register::bfgs::Stopping;
 use crate::register::bspline::prefilter;
@@ -12,6 +12,9 @@ use crate::register::pyramid::{on_grid_of, reduced_to};
 use crate::register::sample::{Draw, draw};
 use crate::register::search::{Freedom, Level, Measure, Optimum, Reach, coarse, optimise, rank, turns_about_axes};
 use nalgebra::Matrix3;
+
+/// Resolution at which a head is told from air, mm.
+const HEAD_MM: f64 = 4.0;
 
 /// An image and its foreground at one resolution.
 struct Reduced {
@@ -41,44 +44,94 @@ fn pyramid(image: &Volume<f32, Native>, levels_mm: &[f64]) -> Vec<Reduced> {
     out
 }
 
-/// The pose that takes the sampled image onto the other one, and how far it can be trusted.
-pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, FitQuality), RegisterError> {
-    let mut levels_mm = vec![settings.start_level_mm];
-    levels_mm.extend(&settings.levels_mm);
-    let (sampled_levels, other_levels) = (pyramid(&sampled.image, &levels_mm), pyramid(&other.image, &levels_mm));
-    let head_of = |side: &Side, levels: &[Reduced]| {
-        side.mask.clone().unwrap_or_else(|| head::foreground(&levels[levels.len().min(2) - 1].image))
-    };
-    let (sampled_head, other_head) = (head_of(sampled, &sampled_levels), head_of(other, &other_levels));
-    let centre = head::centre_mm(&sampled_head);
-    let target = head::centre_mm(&other_head);
+/// Both images at every resolution, with where they count.
+struct Pair<'a> {
+    settings: &'a RigidSettings,
+    sampled: Vec<Reduced>,
+    other: Vec<Reduced>,
+    sampled_head: Mask<Native>,
+    other_head: Mask<Native>,
+    /// A mask of the other image is asked at each of its resolutions.
+    other_masks: Vec<Option<Mask<Native>>>,
+}
 
-    // A mask of the other image is asked at each of its resolutions.
-    let other_masks: Vec<Option<Mask<Native>>> =
-        other_levels.iter().map(|l| other.mask.as_ref().map(|m| on_grid_of(m, &l.image))).collect();
-    let level = |n: usize, most: usize, bins: usize| {
-        let (s, o) = (&sampled_levels[n], &other_levels[n]);
+impl<'a> Pair<'a> {
+    fn new(sampled: &Side, other: &Side, levels_mm: &[f64], settings: &'a RigidSettings) -> Self {
+        let (sampled_levels, other_levels) = (pyramid(&sampled.image, levels_mm), pyramid(&other.image, levels_mm));
+        let head_of = |side: &Side, levels: &[Reduced]| {
+            side.mask.clone().unwrap_or_else(|| head::foreground(&levels[levels.len().min(2) - 1].image))
+        };
+        Self {
+            settings,
+            sampled_head: head_of(sampled, &sampled_levels),
+            other_head: head_of(other, &other_levels),
+            other_masks: other_levels.iter().map(|l| other.mask.as_ref().map(|m| on_grid_of(m, &l.image))).collect(),
+            sampled: sampled_levels,
+            other: other_levels,
+        }
+    }
+
+    /// One resolution; `seed` tells the draws of several apart.
+    fn level(&self, n: usize, seed: u64, most: usize, bins: usize) -> Level<'_> {
+        let (s, o) = (&self.sampled[n], &self.other[n]);
         let spacing = o.image.grid.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
         let request = Draw {
             most,
             other_spacing_mm: spacing,
             bins,
-            range: head::range_inside(&s.image, &sampled_head),
-            centre_mm: centre,
-            seed: settings.seed + n as u64,
+            range: head::range_inside(&s.image, &self.sampled_head),
+            centre_mm: head::centre_mm(&self.sampled_head),
+            seed: self.settings.seed + seed,
         };
         Level {
             measure: Measure::Information,
-            samples: draw(&s.image, &sampled_head, &request),
+            samples: draw(&s.image, &self.sampled_head, &request),
             other: Interpolated {
                 image: &o.coefficients,
-                mask: other_masks[n].as_ref(),
-                range: head::range_inside(&o.image, &other_head),
+                mask: self.other_masks[n].as_ref(),
+                range: head::range_inside(&o.image, &self.other_head),
             },
             bins: Bins { sampled: bins, interpolated: bins + 4 },
             spacing_mm: s.spacing_mm,
         }
-    };
+    }
+
+    fn finest(&self) -> Stopping {
+        let spacing_mm = self.sampled.last().map_or(1.0, |level| level.spacing_mm);
+        Stopping { longest_step_mm: 0.5 * spacing_mm, shortest_step_mm: self.settings.tolerance_mm, evaluations: 60 }
+    }
+}
+
+/// The pose near one that is known (from the sampled image to the other one), at the finest resolution.
+pub(super) fn fit_near(
+    sampled: &Side,
+    other: &Side,
+    near: &RigidTransform<Native, Native>,
+    settings: &RigidSettings,
+) -> Result<Pose, RegisterError> {
+    let finest_mm = settings.levels_mm.last().copied().unwrap_or(1.0);
+    // The head is found on a coarse copy.
+    let levels_mm = [settings.start_level_mm, HEAD_MM.max(finest_mm), finest_mm];
+    let pair = Pair::new(sampled, other, &levels_mm, settings);
+    let finest = levels_mm.len() - 1;
+    let level = pair.level(finest, finest as u64, settings.samples.max(20_000), settings.histogram_bins);
+    if level.samples.len() < 64 {
+        return Err(RegisterError::NoOverlap);
+    }
+    let centre = head::centre_mm(&pair.sampled_head);
+    let target = near.apply(Position::from_point(centre.into())).mm.coords;
+    let start = Pose { linear: *near.rotation.to_rotation_matrix().matrix(), centre, target };
+    Ok(optimise(&level, &start, Freedom::Rigid, None, pair.finest()).pose)
+}
+
+/// The pose that takes the sampled image onto the other one, and how far it can be trusted.
+pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, FitQuality), RegisterError> {
+    let mut levels_mm = vec![settings.start_level_mm];
+    levels_mm.extend(&settings.levels_mm);
+    let pair = Pair::new(sampled, other, &levels_mm, settings);
+    let centre = head::centre_mm(&pair.sampled_head);
+    let target = head::centre_mm(&pair.other_head);
+    let level = |n: usize, most: usize, bins: usize| pair.level(n, n as u64, most, bins);
 
     let bins = settings.histogram_bins;
     let start_level = level(0, 3000, bins.min(24));
@@ -124,11 +177,12 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
         // Half the points per halving of the spacing: coarse levels need to come close, no more.
         let most = (settings.samples >> (levels_mm.len() - 1 - n)).max(20_000);
         let level = level(n, most, bins);
-        let stopping = Stopping {
+        let coarser = Stopping {
             longest_step_mm: 0.5 * level.spacing_mm,
-            shortest_step_mm: if finest { settings.tolerance_mm } else { 0.01 * level.spacing_mm },
+            shortest_step_mm: 0.01 * level.spacing_mm,
             evaluations: 60,
         };
+        let stopping = if finest { pair.finest() } else { coarser };
         let Optimum { pose: found, inverse_hessian: h, evaluations: used } =
             optimise(&level, &pose, Freedom::Rigid, inverse_hessian.take(), stopping);
         pose = found;

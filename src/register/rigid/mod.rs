@@ -14,7 +14,8 @@ pub use settings::RigidSettings;
 
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume};
-use fit::fit;
+use crate::register::mutual_information::Pose;
+use fit::{fit, fit_near};
 use nalgebra::{Rotation3, UnitQuaternion};
 use side::Side;
 pub(super) use side::side;
@@ -67,18 +68,39 @@ pub fn register_rigid<M: Frame, F: Frame>(
     settings.check()?;
     let moving = side("moving", moving, masks.moving)?;
     let fixed = side("fixed", fixed, masks.fixed)?;
-    // The image with the thicker slices is sampled: its slices can be read as they are, and the finer image can be
-    // averaged over their thickness. A mask names the region to sample, so it wins over a small difference.
-    let thickness = |s: &Side| s.image.grid.spacing_mm().into_iter().fold(0.0, f64::max);
-    let ratio = thickness(&moving) / thickness(&fixed);
-    let sample_moving = if fixed.mask.is_some() && moving.mask.is_none() { ratio > 2.0 } else { ratio > 1.2 };
+    let sample_moving = is_moving_sampled(&moving, &fixed);
     let (sampled, other) = if sample_moving { (&moving, &fixed) } else { (&fixed, &moving) };
     let (pose, quality) = fit(sampled, other, settings)?;
-
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.linear));
-    let other_from_sampled: RigidTransform<Native, Native> =
-        RigidTransform::new(rotation, pose.target - rotation * pose.centre);
+    let other_from_sampled = transform_of(&pose);
     let fixed_from_moving = if sample_moving { other_from_sampled } else { other_from_sampled.inverse() };
-
     Ok(RigidFit { fixed_from_moving: fixed_from_moving.relabelled(), quality, warnings: quality.warnings() })
+}
+
+/// The rigid motion near one that is known already, from the moving to the fixed image, at the finest resolution.
+pub(super) fn refine_rigid(
+    moving: &Volume<f32, Native>,
+    fixed: &Volume<f32, Native>,
+    near: &RigidTransform<Native, Native>,
+    settings: &RigidSettings,
+) -> Result<RigidTransform<Native, Native>, RegisterError> {
+    let (moving, fixed) = (side("moving", moving, None)?, side("fixed", fixed, None)?);
+    Ok(if is_moving_sampled(&moving, &fixed) {
+        transform_of(&fit_near(&moving, &fixed, near, settings)?)
+    } else {
+        transform_of(&fit_near(&fixed, &moving, &near.inverse(), settings)?).inverse()
+    })
+}
+
+/// The image with the thicker slices is sampled: its slices can be read as they are, and the finer image can be averaged over
+/// their thickness. A mask names the region to sample, so it wins over a small difference.
+fn is_moving_sampled(moving: &Side, fixed: &Side) -> bool {
+    let thickness = |s: &Side| s.image.grid.spacing_mm().into_iter().fold(0.0, f64::max);
+    let ratio = thickness(moving) / thickness(fixed);
+    if fixed.mask.is_some() && moving.mask.is_none() { ratio > 2.0 } else { ratio > 1.2 }
+}
+
+/// From the sampled image to the other one.
+fn transform_of(pose: &Pose) -> RigidTransform<Native, Native> {
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.linear));
+    RigidTransform::new(rotation, pose.target - rotation * pose.centre)
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::geometry::{Mni, Position, Post, Pre};
 use crate::image::Grid;
+use crate::register::register_two_scans;
 use crate::register::synthetic_head::head_value;
 use nalgebra::{Matrix4, Point3, Vector3};
 
@@ -65,6 +66,60 @@ fn the_same_image_twice_stays_where_it_is_on_any_number_of_threads() {
     assert_eq!(one.quality, three.quality);
     let error = largest_error_mm(&one.fixed_from_moving, &RigidTransform::identity());
     assert!(error <= 0.01, "{error} mm");
+}
+
+/// Three times as bright at one end of the head as at the other.
+fn through_a_coil<F: Frame>(scan: &Volume<f32, F>, towards: [f64; 3]) -> Volume<f32, F> {
+    let gain = |n: usize| {
+        let x = scan.grid.centre(scan.grid.voxel(n)).mm;
+        ((0..3).map(|a| towards[a] * x[a]).sum::<f64>() * 3f64.ln() / 200.0).exp() as f32
+    };
+    Volume::from_fn(scan.grid, |n| scan.data[n] * gain(n))
+}
+
+#[test]
+fn another_coils_gain_moves_no_pose_of_two_scans() {
+    let (head_from_pre, head_from_post) = known_motion();
+    let pre = scan(&ras(3.0, [99.0, 120.0, 105.0]), &head_from_pre, 1.0, 7);
+    let post = scan(&ras(3.0, [102.0, 123.0, 108.0]), &head_from_post, 1.0, 8);
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], ..RigidSettings::default() };
+    let truth = head_from_post.then(&head_from_pre.inverse());
+    let (mut as_they_come, mut without) = (0.0f64, 0.0f64);
+    for towards in [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.7, 0.0, 0.7]] {
+        let post = through_a_coil(&post, towards);
+        let error = |fit: RigidFit<Post, Pre>| largest_error_mm(&fit.fixed_from_moving, &truth);
+        as_they_come = as_they_come.max(error(register_rigid(&post, &pre, RigidMasks::default(), &settings).unwrap()));
+        without = without.max(error(register_two_scans(&post, &pre, &settings).unwrap()));
+    }
+    assert!(without < 0.5 * as_they_come && without < 0.1, "{without} mm, {as_they_come} mm as they come");
+}
+
+#[test]
+fn two_scans_of_two_contrasts_have_no_common_gain_and_still_their_pose() {
+    let (head_from_pre, head_from_post) = known_motion();
+    let pre = scan(&ras(3.0, [99.0, 120.0, 105.0]), &head_from_pre, 1.0, 7);
+    let post = scan(&ras(3.0, [102.0, 123.0, 108.0]), &head_from_post, 1.0, 8);
+    // What is bright is dark, but for the air.
+    let inverted = post.map(|x| if x > 60.0 { 1000.0 - 0.8 * x } else { x });
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], ..RigidSettings::default() };
+    let truth = head_from_post.then(&head_from_pre.inverse());
+    let error = |fit: RigidFit<Post, Pre>| largest_error_mm(&fit.fixed_from_moving, &truth);
+    let as_they_come = error(register_rigid(&inverted, &pre, RigidMasks::default(), &settings).unwrap());
+    let found = error(register_two_scans(&inverted, &pre, &settings).unwrap());
+    assert!(found < as_they_come + 0.1, "{found} mm, {as_they_come} mm as they come");
+}
+
+#[test]
+fn the_pose_of_two_scans_is_the_same_on_any_number_of_threads() {
+    let (head_from_pre, _) = known_motion();
+    let pre = scan(&ras(3.0, [99.0, 120.0, 105.0]), &head_from_pre, 1.0, 7);
+    let post: Volume<f32, Post> = through_a_coil(&pre, [0.0, 0.0, 1.0]).relabelled();
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], ..RigidSettings::default() };
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| register_two_scans(&post, &pre, &settings)).unwrap().fixed_from_moving
+    };
+    assert_eq!(on(1), on(3));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Volume};
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
-use crate::register::{RigidFit, RigidMasks, register_rigid};
+use crate::register::{RigidFit, register_two_scans};
 use crate::segment::{pose_of_head, pose_of_labels};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
@@ -21,7 +21,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const NAME: StageName = StageName::Registration;
 /// What the pose is called, and how what is odd about it begins.
 pub(crate) const OF_POSE: &str = "pre to MNI";
@@ -57,7 +57,7 @@ pub(crate) fn registration(
         work.tell(|p| p.begin("registration", 2));
         work.tell(|p| p.doing("post to pre"));
         let refused = |what| move |source| WorkflowError::Registration { what, source };
-        let pre_from_post = register_rigid(&scans.post, &scans.pre, RigidMasks::default(), settings)
+        let pre_from_post = register_two_scans(&scans.post, &scans.pre, settings)
             .map_err(refused("the post-operative scan (moving) onto the pre-operative one (fixed)"))?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing(OF_POSE));
