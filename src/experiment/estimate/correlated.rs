@@ -185,7 +185,7 @@ pub(super) fn fit(
     } else {
         Descent { convergence: Convergence::NotSought, ..start }
     };
-    let mut taken_out_rms_mm = None;
+    let (mut taken_out_rms_mm, mut taken_up) = (None, None);
     if let Some((instrument, rounds)) = instrument {
         let mut shown: Option<Vec<[f64; 3]>> = None;
         for round in 0..rounds + AGAIN {
@@ -195,8 +195,9 @@ pub(super) fn fit(
                 break;
             }
             let corrected = without_own_error(&seen, &known, instrument)?;
-            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected));
-            fit.body.observe(Observation::Nodes(pick(&corrected)));
+            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected.nodes));
+            fit.body.observe(Observation::Nodes(pick(&corrected.nodes)));
+            taken_up = Some(corrected.taken_up);
             descent = fit.settle(descent, errors.noise, &rough)?;
             shown = Some(known);
         }
@@ -231,6 +232,7 @@ pub(super) fn fit(
         residual_rms_mm,
         observations,
         taken_out_rms_mm,
+        taken_up,
         correlated: Some(findings),
         descent: Descent { linearisation: plain, ..descent },
     })

@@ -8,6 +8,7 @@ use super::process::{Factor, Process};
 use super::projection::Projection;
 use super::re_registration::InstrumentError;
 use super::{Descent, EstimateError};
+use crate::geometry::{Mni, RigidTransform};
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,8 @@ pub(super) struct Fitted {
     pub observations: usize,
     /// What was taken out of one observation, mm.
     pub taken_out_rms_mm: Option<f64>,
+    /// What the rigid registration follows of the state.
+    pub taken_up: Option<RigidTransform<Mni, Mni>>,
     /// What correlated errors say.
     pub correlated: Option<Findings>,
 }

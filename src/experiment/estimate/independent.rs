@@ -22,14 +22,15 @@ pub(super) fn fit_independent(
     let rough = EstimateSettings { decrement_tolerance: ROUGH, ..descent_settings.clone() };
     let first = if instrument.is_some_and(|(_, rounds)| rounds > 0) { &rough } else { &descent_settings };
     let mut descent = estimate(body, prior, start, first)?;
-    let mut taken_out_rms_mm = None;
+    let (mut taken_out_rms_mm, mut taken_up) = (None, None);
     if let Some((instrument, rounds)) = instrument {
         let seen = body.observed_nodes().to_vec();
         for round in 1..=rounds {
             let known = body.solve(&descent.log_parameters)?.outcome.displacement_mm;
             let corrected = without_own_error(&seen, &known, instrument)?;
-            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected));
-            body.observe(Observation::Nodes(corrected));
+            taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected.nodes));
+            body.observe(Observation::Nodes(corrected.nodes));
+            taken_up = Some(corrected.taken_up);
             let settings = if round < rounds { &rough } else { &descent_settings };
             descent = estimate(body, prior, &descent.log_parameters, settings)?;
         }
@@ -46,6 +47,7 @@ pub(super) fn fit_independent(
         residual_rms_mm,
         observations: residuals.len(),
         taken_out_rms_mm,
+        taken_up,
         correlated: None,
         descent,
     })

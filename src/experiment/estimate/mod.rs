@@ -39,7 +39,7 @@ pub use posterior::{
 };
 pub use problem::{Errors, Problem};
 pub use process::{Factor, Process, spread_out};
-pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, moved_by};
+pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, Shown, moved_by};
 pub use rigid_remainder::RigidModes;
 pub use solve::solve_problem;
 

@@ -48,6 +48,10 @@ pub struct EstimateOutcome {
     /// Root mean square of the measurement's own error that was taken out of one observation, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken_out_rms_mm: Option<f64>,
+    /// What rigid registration follows of the estimate's own state, MNI: rows of the matrix from where that state carries a point
+    /// (x, y, z, 1; mm) to where the scans, brought onto each other, show it. The identity where it follows nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rigid_taken_up: Option<[[f64; 4]; 4]>,
     /// How the descent ended.
     pub convergence: Convergence,
     /// Equilibria solved.

@@ -7,12 +7,12 @@
 //! found again.
 
 use crate::experiment::nodal_field::on_grid;
-use crate::geometry::{Mni, Position};
+use crate::geometry::{Mni, Position, RigidTransform};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
-use crate::register::{RegisterError, RigidMasks, RigidSettings, register_rigid};
+use crate::register::{RegisterError, RigidSettings, register_two_scans};
 use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of};
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -20,9 +20,25 @@ use thiserror::Error;
 /// A node and its displacement, mm.
 pub type MovedNode = (u32, [f64; 3]);
 
-/// What a measurement shows of nodes that have moved by a known displacement: all nodes' displacement in, the observed
-/// nodes' out, mm.
-pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Vec<MovedNode>, InstrumentError> + 'a;
+/// What a measurement shows of nodes that have moved by a known displacement, mm: all nodes' displacement in, the observed
+/// nodes' out.
+pub type Instrument<'a> = dyn Fn(&[[f64; 3]]) -> Result<Shown, InstrumentError> + 'a;
+
+/// What an instrument shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// The observed nodes, mm.
+    pub nodes: Vec<MovedNode>,
+    /// What its rigid half follows of the displacement: from where a point has gone to where it seems to be.
+    pub taken_up: RigidTransform<Mni, Mni>,
+}
+
+/// By an instrument without a rigid half.
+impl From<Vec<MovedNode>> for Shown {
+    fn from(nodes: Vec<MovedNode>) -> Self {
+        Self { nodes, taken_up: RigidTransform::identity() }
+    }
+}
 
 /// Why a known displacement cannot be measured.
 #[derive(Debug, Error, PartialEq)]
@@ -35,7 +51,7 @@ pub enum InstrumentError {
     Deformable(#[from] DeformableError),
 }
 
-/// What was seen, without what the instrument adds to a displacement that is known.
+/// What was seen, without what the instrument adds to a displacement that is known, and what its rigid half follows of that.
 ///
 /// # Errors
 /// The instrument's.
@@ -43,14 +59,14 @@ pub fn without_own_error(
     seen: &[MovedNode],
     known_mm: &[[f64; 3]],
     instrument: &Instrument<'_>,
-) -> Result<Vec<MovedNode>, InstrumentError> {
-    let shown = instrument(known_mm)?;
+) -> Result<Shown, InstrumentError> {
+    let Shown { nodes: shown, taken_up } = instrument(known_mm)?;
     let corrected = |(&(n, seen), (m, shown)): (&MovedNode, &MovedNode)| {
         assert_eq!(n, *m, "an instrument shows the nodes that were seen, in their order");
         let known = known_mm[n as usize];
         (n, [0, 1, 2].map(|a| seen[a] - (shown[a] - known[a])))
     };
-    Ok(seen.iter().zip(&shown).map(corrected).collect())
+    Ok(Shown { nodes: seen.iter().zip(&shown).map(corrected).collect(), taken_up })
 }
 
 /// The registration of a patient's scans as an instrument. All images lie on one grid in the MNI frame reached rigidly.
@@ -77,8 +93,8 @@ pub struct ReRegistration<'a> {
 }
 
 impl ReRegistration<'_> {
-    /// The displacement that the registration sees when the nodes of `mesh` have moved by `displacement_mm`; `like` is a
-    /// displacement on the registration's grid.
+    /// The displacement that the registration sees when the nodes of `mesh` have moved by `displacement_mm`, and what its rigid
+    /// half has followed of it; `like` is a displacement on the registration's grid.
     ///
     /// # Errors
     /// [`InstrumentError`] when too little of the brain is known.
@@ -87,7 +103,7 @@ impl ReRegistration<'_> {
         mesh: &TetMesh,
         displacement_mm: &[[f64; 3]],
         like: &DisplacementField<Mni>,
-    ) -> Result<DisplacementField<Mni>, InstrumentError> {
+    ) -> Result<(DisplacementField<Mni>, RigidTransform<Mni, Mni>), InstrumentError> {
         let moved: Vec<[f64; 3]> = mesh
             .nodes_mm()
             .iter()
@@ -99,7 +115,7 @@ impl ReRegistration<'_> {
         let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
         let moved = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
         // Rigid registration follows a part of the shift, and the patient's scans went through it too.
-        let rigid = register_rigid(&moved, self.pre, RigidMasks::default(), self.rigid)?;
+        let rigid = register_two_scans(&moved, self.pre, self.rigid)?;
         let moved_from_pre = rigid.fixed_from_moving.inverse().to_affine();
         let post = resample(&moved, &self.pre.grid, &moved_from_pre, Interpolation::CubicBSpline, 0.0).volume;
         // Their intensities were brought onto one scale before the shift was known, too: where tissue has given way to fluid their
@@ -112,7 +128,7 @@ impl ReRegistration<'_> {
             post_known: self.post_known,
             cavity: self.cavity,
         };
-        Ok(fit_sag(&scans, self.settings)?.subject_from_atlas)
+        Ok((fit_sag(&scans, self.settings)?.subject_from_atlas, rigid.fixed_from_moving))
     }
 }
 

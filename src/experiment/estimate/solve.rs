@@ -110,6 +110,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         noise_mm: fitted.noise_mm,
         residual_rms_mm: fitted.residual_rms_mm,
         taken_out_rms_mm: fitted.taken_out_rms_mm,
+        rigid_taken_up: fitted.taken_up.map(|taken_up| taken_up.to_matrix().transpose().into()),
         convergence: fitted.descent.convergence,
         solves: body.solves,
         tangent_solves: body.tangent_solves,
@@ -151,7 +152,7 @@ fn tissue_materials(unknowns: &[Unknown], values: &[f64], poisson_ratio: f64) ->
 mod tests {
     use super::*;
     use crate::experiment::estimate::{
-        Average, CorrelatedErrors, Instrument, InstrumentError, Process, Scale, Turn, material,
+        Average, CorrelatedErrors, Instrument, InstrumentError, Process, Scale, Shown, Turn, material,
     };
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
@@ -272,14 +273,15 @@ mod tests {
     #[test]
     fn an_instruments_own_error_does_not_reach_the_moduli() {
         let (mesh, scenario, observed) = phantom(4);
-        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> {
+        let shown = |u: &[[f64; 3]]| -> Result<Shown, InstrumentError> {
             let drift = |n: usize| 0.002 * mesh.nodes_mm()[n][0];
-            Ok(u.iter().enumerate().map(|(n, u)| (n as u32, [u[0], u[1] + drift(n), 0.9 * u[2]])).collect())
+            let seen = u.iter().enumerate().map(|(n, u)| (n as u32, [u[0], u[1] + drift(n), 0.9 * u[2]]));
+            Ok(seen.collect::<Vec<_>>().into())
         };
         let truth: Vec<[f64; 3]> = observed.iter().map(|(_, u)| *u).collect();
         let noise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
         let off = |times| {
-            let seen = shown(&truth).unwrap();
+            let seen = shown(&truth).unwrap().nodes;
             let posed = Problem { instrument: Some((&shown, times)), ..problem(&mesh, &scenario, seen) };
             let found = solve_problem(posed, &noise).unwrap().outcome;
             let mode = &found.posterior.mode;
@@ -415,15 +417,15 @@ mod tests {
     fn an_instruments_own_error_at_rest_is_no_shift() {
         let (mesh, scenario) = (block(5), settings().scenario());
         let own = |x: [f64; 3]| [0.05 * (0.2 * x[1]).sin(), 0.05 * (0.15 * x[2]).cos(), 0.05 * (0.25 * x[0]).sin()];
-        let shown = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> {
+        let shown = |u: &[[f64; 3]]| -> Result<Shown, InstrumentError> {
             let seen = |(n, u): (usize, &[f64; 3])| {
                 let error = own(mesh.nodes_mm()[n]);
                 (n as u32, [0, 1, 2].map(|a| u[a] + error[a]))
             };
-            Ok(u.iter().enumerate().map(seen).collect())
+            Ok(u.iter().enumerate().map(seen).collect::<Vec<_>>().into())
         };
         let at_rest = vec![[0.0; 3]; mesh.nodes_mm().len()];
-        let observed: Vec<[f64; 3]> = shown(&at_rest).unwrap().into_iter().map(|(_, u)| u).collect();
+        let observed: Vec<[f64; 3]> = shown(&at_rest).unwrap().nodes.into_iter().map(|(_, u)| u).collect();
         let found = estimated(&mesh, &scenario, &observed, Some((&shown, 2))).outcome;
         assert!(found.taken_out_rms_mm.is_some_and(|mm| mm > 0.02), "{:?}", found.taken_out_rms_mm);
         assert_eq!(found.verdict.finding, Finding::NoShift, "{:?}", found.verdict);
@@ -442,7 +444,7 @@ mod tests {
             [0, 1, 2].map(|a| u[a] + left[a])
         };
         let observed: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&u).map(with_wave).collect();
-        let exact = |u: &[[f64; 3]]| -> Result<Vec<(u32, [f64; 3])>, InstrumentError> { Ok(every_node(u)) };
+        let exact = |u: &[[f64; 3]]| -> Result<Shown, InstrumentError> { Ok(every_node(u).into()) };
         let noise = Process { sd_mm: 0.05, length_mm: 7.5 };
         let told = |corrected_mm: f64, rounds: usize| {
             let errors = CorrelatedErrors { noise, corrected_mm, rigid_mm: 0.1, places: 150 };

@@ -5,10 +5,14 @@
 //! alike over another: the most probable ones are found as an estimate finds them ([`LinearModel`]), and model, remainder
 //! and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with
 //! explicit basis functions).
+//!
+//! What was seen has been put right by showing the model's own state to the registration, whose rigid half follows a part of any
+//! shift. That part is known, and goes back into the field after all: beside the registration of the scans it is missing.
 
 use crate::experiment::estimate::{
     CorrelatedErrors, Factor, LinearModel, MovedNode, Process, RigidModes, Unexplained, spread_out,
 };
+use crate::geometry::{Mni, Position, RigidTransform};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -39,13 +43,14 @@ pub struct Left {
     pub unexplained: Unexplained,
     /// Standard deviation of the noise as it was stated, mm.
     pub stated_noise_mm: f64,
-    /// Size of the rigid remainder over the places, mm.
+    /// Size over the places of all that the rigid registration has left or taken up, mm.
     pub rigid_mm: f64,
     /// Places that were looked at.
     pub places: usize,
 }
 
-/// The model's displacement with the most probable remainder and discrepancy added. `model_sd_mm`: of every node, from the
+/// The model's displacement with the most probable remainder and discrepancy added, carried by what the rigid registration is known
+/// to follow of it (`taken_up`: from where a point has gone to where the scans show it). `model_sd_mm`: of every node, from the
 /// posterior. Where too little was seen, the model stands with its own spread.
 pub fn fused(
     nodes_mm: &[[f64; 3]],
@@ -53,15 +58,21 @@ pub fn fused(
     model_sd_mm: &[f64],
     seen: &[MovedNode],
     errors: &CorrelatedErrors,
+    taken_up: &RigidTransform<Mni, Mni>,
 ) -> Fused {
-    let Some(rest) = Rest::of(nodes_mm, model_mm, seen, errors) else {
+    let Some(rest) = Rest::of(nodes_mm, model_mm, seen, (errors, taken_up)) else {
         let sd = model_sd_mm.to_vec();
         return Fused { displacement_mm: model_mm.to_vec(), sd_mm: sd.clone(), model_sd_mm: sd, left: None };
     };
     let Unexplained { noise, discrepancy } = rest.left.unexplained;
     let (moved, variance_mm2): (Vec<[f64; 3]>, Vec<f64>) =
         nodes_mm.par_chunks(NODES_AT_ONCE).flat_map_iter(|points| rest.at(points)).unzip();
-    let displacement_mm = model_mm.iter().zip(&moved).map(|(u, d)| [0, 1, 2].map(|a| u[a] + d[a])).collect();
+    let put_right = |((x, u), d): ((&[f64; 3], &[f64; 3]), &[f64; 3])| {
+        let there = [0, 1, 2].map(|a| u[a] + d[a]);
+        let followed = followed_mm(taken_up, [0, 1, 2].map(|a| x[a] + there[a]));
+        [0, 1, 2].map(|a| there[a] + followed[a])
+    };
+    let displacement_mm = nodes_mm.iter().zip(model_mm).zip(&moved).map(put_right).collect();
     // Whether noise or model is at fault for what is left like noise, nobody can tell: it is the model's spread too.
     let noise_mm2 = 3.0 * noise.sd_mm.powi(2);
     let with = |more_mm2: f64| move |model: &f64| (model * model + more_mm2).sqrt();
@@ -84,6 +95,12 @@ impl Fused {
     }
 }
 
+/// How far rigid registration carries what has gone to `y`, mm.
+fn followed_mm(taken_up: &RigidTransform<Mni, Mni>, y: [f64; 3]) -> [f64; 3] {
+    let y = Position::new(y[0], y[1], y[2]);
+    (taken_up.apply(y).mm - y.mm).into()
+}
+
 /// What is left, conditioned on what was seen.
 struct Rest {
     left: Left,
@@ -100,7 +117,12 @@ struct Rest {
 
 impl Rest {
     /// `None` where too little was seen.
-    fn of(nodes_mm: &[[f64; 3]], model_mm: &[[f64; 3]], seen: &[MovedNode], errors: &CorrelatedErrors) -> Option<Self> {
+    fn of(
+        nodes_mm: &[[f64; 3]],
+        model_mm: &[[f64; 3]],
+        seen: &[MovedNode],
+        (errors, taken_up): (&CorrelatedErrors, &RigidTransform<Mni, Mni>),
+    ) -> Option<Self> {
         let positions: Vec<[f64; 3]> = seen.iter().map(|(n, _)| nodes_mm[*n as usize]).collect();
         let chosen = spread_out(&positions, errors.places);
         let places_mm: Vec<[f64; 3]> = chosen.iter().map(|&n| positions[n]).collect();
@@ -140,10 +162,15 @@ impl Rest {
         let moved = &rigid.columns_mm * &amounts;
         let remains = &left_mm - &moved;
         let weights = factor.solve(&DMatrix::from_column_slice(remains.len(), 1, remains.as_slice()));
+        let followed = places_mm.iter().zip(&chosen).flat_map(|(x, &n)| {
+            let u = model_mm[seen[n].0 as usize];
+            followed_mm(taken_up, [0, 1, 2].map(|a| x[a] + u[a]))
+        });
+        let followed = DVector::from_iterator(3 * places_mm.len(), followed);
         let left = Left {
             unexplained,
             stated_noise_mm: errors.noise.sd_mm,
-            rigid_mm: (moved.norm_squared() / places_mm.len() as f64).sqrt(),
+            rigid_mm: ((moved + followed).norm_squared() / places_mm.len() as f64).sqrt(),
             places: places_mm.len(),
         };
         Some(Self { left, places_mm, factor, rigid, amounts, covariance, weights, weights_of_rigid })
@@ -215,7 +242,8 @@ mod tests {
         let nodes = mesh.nodes_mm();
         let truth: Vec<[f64; 3]> = nodes.iter().map(|x| [0.0, 0.02 * x[1], -3.0 + 0.03 * x[2]]).collect();
         let model: Vec<[f64; 3]> = truth.iter().map(|u| u.map(|x| 0.5 * x)).collect();
-        let found = fused(nodes, &model, &vec![0.1; nodes.len()], &every_fourth(&truth), &ERRORS);
+        let found =
+            fused(nodes, &model, &vec![0.1; nodes.len()], &every_fourth(&truth), &ERRORS, &RigidTransform::identity());
         let off = rms(&found.displacement_mm, &truth);
         assert!(off < 0.1 * rms(&model, &truth), "{off} {}", rms(&model, &truth));
         let left = found.left.unwrap();
@@ -227,7 +255,8 @@ mod tests {
     fn a_model_that_explains_all_is_left_as_it_is() {
         let mesh = block(4);
         let u: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| [0.01 * x[2], 0.0, 1.0]).collect();
-        let found = fused(mesh.nodes_mm(), &u, &vec![0.2; u.len()], &every_fourth(&u), &ERRORS);
+        let found =
+            fused(mesh.nodes_mm(), &u, &vec![0.2; u.len()], &every_fourth(&u), &ERRORS, &RigidTransform::identity());
         assert!(found.displacement_mm == u && found.left.unwrap().unexplained.discrepancy.sd_mm == 0.0);
         assert!(found.sd_mm.iter().all(|sd| (0.2..0.21).contains(sd)));
     }
@@ -239,16 +268,41 @@ mod tests {
         let model: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| [0.01 * x[2], 0.0, 1.0]).collect();
         let turned = |x: &[f64; 3], u: &[f64; 3]| [u[0] + 0.06 - 1e-3 * x[1], u[1] + 1e-3 * x[0], u[2]];
         let truth: Vec<[f64; 3]> = mesh.nodes_mm().iter().zip(&model).map(|(x, u)| turned(x, u)).collect();
-        let found = fused(mesh.nodes_mm(), &model, &vec![0.0; model.len()], &every_fourth(&truth), &ERRORS);
+        let found = fused(
+            mesh.nodes_mm(),
+            &model,
+            &vec![0.0; model.len()],
+            &every_fourth(&truth),
+            &ERRORS,
+            &RigidTransform::identity(),
+        );
         let [after, before] = [rms(&found.displacement_mm, &truth), rms(&model, &truth)];
         assert!(after < 0.2 * before && found.left.unwrap().rigid_mm > 0.5 * before, "{after} of {before}");
+    }
+
+    /// What rigid registration is known to follow of the model is missing beside the scans, whatever was seen of it.
+    #[test]
+    fn what_the_rigid_registration_follows_goes_back_into_the_field() {
+        let mesh = block(4);
+        let model: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| [0.01 * x[2], 0.0, 1.0]).collect();
+        let turn = nalgebra::Vector3::new(0.0, 0.0, 2e-3);
+        let taken_up = RigidTransform::about(nalgebra::Point3::origin(), turn, nalgebra::Vector3::new(0.05, 0.0, -0.1));
+        let found = fused(mesh.nodes_mm(), &model, &vec![0.0; model.len()], &every_fourth(&model), &ERRORS, &taken_up);
+        for ((x, u), there) in mesh.nodes_mm().iter().zip(&model).zip(&found.displacement_mm) {
+            let apparent = taken_up.apply(Position::new(x[0] + u[0], x[1] + u[1], x[2] + u[2]));
+            let there = Position::<Mni>::new(x[0] + there[0], x[1] + there[1], x[2] + there[2]);
+            assert!(there.distance_mm(&apparent) < 1e-9);
+        }
+        // The model alone lacks it.
+        let left = found.left.unwrap();
+        assert!(left.rigid_mm > 0.1 && found.model_sd_mm.iter().all(|sd| *sd >= left.rigid_mm), "{left:?}");
     }
 
     #[test]
     fn nothing_seen_leaves_the_model_alone() {
         let mesh = block(3);
         let u = vec![[1.0, 0.0, 0.0]; mesh.nodes_mm().len()];
-        let found = fused(mesh.nodes_mm(), &u, &vec![0.3; u.len()], &[], &ERRORS);
+        let found = fused(mesh.nodes_mm(), &u, &vec![0.3; u.len()], &[], &ERRORS, &RigidTransform::identity());
         assert!(found.displacement_mm == u && found.sd_mm == found.model_sd_mm && found.left.is_none());
     }
 
@@ -276,7 +330,7 @@ mod tests {
             };
             let truth = add(&model, 2 * stream, 0.4, 30.0);
             let seen = every_fourth(&add(&truth, 2 * stream + 1, 0.05, 8.0));
-            let found = fused(nodes, &model, &vec![0.0; nodes.len()], &seen, &ERRORS);
+            let found = fused(nodes, &model, &vec![0.0; nodes.len()], &seen, &ERRORS, &RigidTransform::identity());
             for (n, u) in found.displacement_mm.iter().enumerate() {
                 let reach = 1.96 * found.sd_mm[n] / 3f64.sqrt();
                 inside += (0..3).filter(|&a| (u[a] - truth[n][a]).abs() < reach).count();

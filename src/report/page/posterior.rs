@@ -286,6 +286,7 @@ mod tests {
             noise_mm: 0.1,
             residual_rms_mm: 0.1,
             taken_out_rms_mm: None,
+            rigid_taken_up: None,
             convergence: Convergence::StepBelowTolerance,
             solves: 5,
             tangent_solves: 8,

@@ -5,7 +5,7 @@ use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
     Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, MovedNode, Observation, Problem,
-    SEEN_AT, SEEN_DISPLACEMENT, Turn, Unknown, moved_by, solve_problem,
+    SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
@@ -28,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 21;
+const VERSION: u32 = 22;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -349,8 +349,8 @@ impl Bodies {
         let instrument = input.shift.filter(|_| options.observed == Observed::Displacement).map(|shift| {
             move |known: &[[f64; 3]]| {
                 work.tell(|p| p.doing("registering the estimate"));
-                let shown = shift.registration().sees(mesh, known, &shift.seen)?;
-                Ok(self.deep.iter().map(|(n, x)| (*n, moved_by(&shown, *x))).collect())
+                let (shown, taken_up) = shift.registration().sees(mesh, known, &shift.seen)?;
+                Ok(Shown { nodes: self.deep.iter().map(|(n, x)| (*n, moved_by(&shown, *x))).collect(), taken_up })
             }
         });
         let coarser = self.coarser_of(body)?;

@@ -2,7 +2,7 @@
 
 use super::registration::transforms;
 use crate::experiment::depth::depth_mm;
-use crate::experiment::estimate::{CorrelatedErrors, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
+use crate::experiment::estimate::{CorrelatedErrors, EstimateOutcome, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
     BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused,
     shift_field,
@@ -12,7 +12,8 @@ use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::grid_with_spacing;
 use crate::image::{Grid, Mask};
 use crate::layout::{
-    ESTIMATE_STATE, NATIVE_RESECTED, POST_NATIVE_BRAIN, PRE_NATIVE_BRAIN, REST_MESH, SAG, SAMPLE_STATE, SHIFT_JSON,
+    ESTIMATE_JSON, ESTIMATE_STATE, NATIVE_RESECTED, POST_NATIVE_BRAIN, PRE_NATIVE_BRAIN, REST_MESH, SAG, SAMPLE_STATE,
+    SHIFT_JSON,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
@@ -21,6 +22,7 @@ use crate::segment::native::mask_on;
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::settings::Settings;
+use nalgebra::Matrix4;
 use rayon::prelude::*;
 use std::cell::OnceCell;
 
@@ -49,6 +51,8 @@ struct Model {
     depth_mm: Vec<f64>,
     /// What the images showed of some nodes, the registration's own error taken out; empty where no estimate did that.
     seen: Vec<MovedNode>,
+    /// What the rigid registration follows of the state, as far as that is known.
+    taken_up: RigidTransform<Mni, Mni>,
     fused: OnceCell<Fused>,
 }
 
@@ -172,7 +176,22 @@ impl<'a> CaseShift<'a> {
             _ => Vec::new(),
         };
         let nodes = Nodes { displacement_mm, sd_mm, reach95_mm };
-        Ok(Model { name: name.to_owned(), mesh: state.mesh, nodes, depth_mm, seen, fused: OnceCell::new() })
+        let taken_up = if name == ESTIMATE { self.taken_up_of_estimate()? } else { RigidTransform::identity() };
+        Ok(Model { name: name.to_owned(), mesh: state.mesh, nodes, depth_mm, seen, taken_up, fused: OnceCell::new() })
+    }
+
+    /// What the rigid registration follows of the estimate's state; nothing where it was never shown that.
+    fn taken_up_of_estimate(&self) -> Result<RigidTransform<Mni, Mni>, WorkflowError> {
+        let damaged = || CaseError::Damaged {
+            folder: self.case.folder().to_path_buf(),
+            file: ESTIMATE_JSON.to_owned(),
+            subject: self.case.subject(),
+        };
+        let outcome: EstimateOutcome =
+            serde_json::from_str(&self.case.read_text(ESTIMATE_JSON)?).map_err(|_| damaged())?;
+        let Some(rows) = outcome.rigid_taken_up else { return Ok(RigidTransform::identity()) };
+        let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
+        Ok(RigidTransform::from_matrix(&matrix).map_err(|_| damaged())?)
     }
 
     /// How far the samples of the sweep lie apart at every node, and the reach with it, mm.
@@ -300,7 +319,8 @@ impl<'a> CaseShift<'a> {
             if at_rest {
                 return Fused::at_rest(sd_mm, self.believed.errors.rigid_mm);
             }
-            fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &self.seen_nodes(model), &self.believed.errors)
+            let seen = self.seen_nodes(model);
+            fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &seen, &self.believed.errors, &model.taken_up)
         })
     }
 }
