@@ -2,8 +2,8 @@
 //!
 //! What is left at the places that were seen is a remainder of the rigid registration (the fields are given beside that
 //! registration, so it belongs to them), a discrepancy of the model, alike over a distance, and noise of the registration,
-//! alike over another: the most probable ones are found as an estimate finds them ([`LinearModel`]), and model, remainder
-//! and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with
+//! alike over another. How large the two are is found as an estimate finds it ([`LinearModel`]), the remainder by least
+//! squares, and model, remainder and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with
 //! explicit basis functions).
 //!
 //! What was seen has been put right by showing the model's own state to the registration, whose rigid half follows a part of any
@@ -95,6 +95,23 @@ impl Fused {
     }
 }
 
+/// Amounts of the rigid movements, and how far they may be off. By least squares: a process that is smooth enough takes a shift of
+/// everything for its own, and by its covariance the outermost places would speak for all; the registration's errors even out over
+/// a brain (docs/evidence/patients.md). The process only tells how far such amounts are off (White, Econometrica 48, 1980).
+fn remainder(
+    columns_mm: &DMatrix<f64>,
+    left_mm: &DVector<f64>,
+    precision: &DMatrix<f64>,
+    (factor, errors): (&Factor, &CorrelatedErrors),
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let weight = 1.0 / errors.noise.sd_mm.powi(2);
+    let inverse = (columns_mm.transpose() * columns_mm * weight + precision).try_inverse()?;
+    let amounts = &inverse * (columns_mm.transpose() * left_mm) * weight;
+    let spread = factor.lower_transposed_times(columns_mm) * weight;
+    let covariance = &inverse * (spread.transpose() * spread + precision) * &inverse;
+    Some((amounts, covariance))
+}
+
 /// How far rigid registration carries what has gone to `y`, mm.
 fn followed_mm(taken_up: &RigidTransform<Mni, Mni>, y: [f64; 3]) -> [f64; 3] {
     let y = Position::new(y[0], y[1], y[2]);
@@ -157,8 +174,7 @@ impl Rest {
         };
         let factor = unexplained.factor(&places_mm)?;
         let weights_of_rigid = factor.solve(&rigid.columns_mm);
-        let covariance = (rigid.columns_mm.transpose() * &weights_of_rigid + precision).try_inverse()?;
-        let amounts = &covariance * (weights_of_rigid.transpose() * &left_mm);
+        let (amounts, covariance) = remainder(&rigid.columns_mm, &left_mm, &precision, (&factor, errors))?;
         let moved = &rigid.columns_mm * &amounts;
         let remains = &left_mm - &moved;
         let weights = factor.solve(&DMatrix::from_column_slice(remains.len(), 1, remains.as_slice()));
@@ -278,6 +294,35 @@ mod tests {
         );
         let [after, before] = [rms(&found.displacement_mm, &truth), rms(&model, &truth)];
         assert!(after < 0.2 * before && found.left.unwrap().rigid_mm > 0.5 * before, "{after} of {before}");
+    }
+
+    /// Errors that are alike over a third of the body and even out over the whole.
+    #[test]
+    fn smooth_errors_do_not_hide_a_rigid_remainder() {
+        let mesh = block(8);
+        let nodes = mesh.nodes_mm();
+        let model = vec![[0.0, 0.0, -1.0]; nodes.len()];
+        let shift = [0.02, 0.1, -0.03];
+        let (mut seen_error, mut after) = (0.0f64, 0.0f64);
+        for phase in 0..6 {
+            let wave = |x: &[f64; 3], a: usize| {
+                let at = |b: usize| (x[b] / 8.0 + f64::from(phase) + a as f64).sin();
+                0.1 * (at(0) + at(1) + at(2)) / 1.5f64.sqrt()
+            };
+            let truth: Vec<[f64; 3]> = model.iter().map(|u| [0, 1, 2].map(|a| u[a] + shift[a])).collect();
+            let with = |(x, u): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|a| u[a] + wave(x, a));
+            let seen: Vec<[f64; 3]> = nodes.iter().zip(&truth).map(with).collect();
+            let found = fused(
+                nodes,
+                &model,
+                &vec![0.0; nodes.len()],
+                &every_fourth(&seen),
+                &ERRORS,
+                &RigidTransform::identity(),
+            );
+            (seen_error, after) = (seen_error + rms(&seen, &truth), after + rms(&found.displacement_mm, &truth));
+        }
+        assert!(after < 0.5 * 6.0 * rms(&[shift], &[[0.0; 3]]) && after < seen_error, "{after} {seen_error}");
     }
 
     /// What rigid registration is known to follow of the model is missing beside the scans, whatever was seen of it.
