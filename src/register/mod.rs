@@ -4,6 +4,7 @@ mod affine;
 mod bfgs;
 mod bspline;
 pub mod deformable;
+mod gain;
 mod head;
 mod mutual_information;
 mod normalised;
@@ -18,6 +19,7 @@ mod two_scans;
 mod whole_head;
 
 pub use affine::subject_from_mean_head;
+pub use gain::without_gain;
 pub use rigid::{FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid};
 pub use two_scans::register_two_scans;
-pub use whole_head::{MeanHead, register_to_mean_head, without_gain};
+pub use whole_head::{MeanHead, register_to_mean_head};

@@ -10,6 +10,7 @@
 use super::bfgs::Stopping;
 use super::bspline::prefilter;
 use super::deformable::force::local_correlation;
+use super::gain::{not_air, without_gain};
 use super::head;
 use super::mutual_information::{Bins, Interpolated, Pose};
 use super::normalised::{LARGEST, normalised};
@@ -20,7 +21,6 @@ use super::search::{Freedom, Level, Measure, Reach, TETHER, coarse, optimise, ra
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
 
 /// Resolutions: for the starts, for the judgement, for the result.
 const LEVELS_MM: [f64; 3] = [8.0, 4.0, 2.0];
@@ -173,74 +173,6 @@ pub(super) fn search_level<'a>(head: &Prepared, subject: &'a Subject, n: usize, 
         bins: Bins { sampled: BINS, interpolated: BINS + 4 },
         spacing_mm: LEVELS_MM[n],
     }
-}
-
-/// The image over its own slow gain: every neighbourhood of the head (30 mm, standard deviation) becomes equally bright on
-/// average. Intensities come out in units of their neighbourhood's mean.
-#[must_use]
-pub fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
-    use crate::image::gaussian::gaussian;
-    /// Wider than the brain's own regions, narrower than a coil's reach.
-    const SIGMA_MM: f64 = 30.0;
-    /// What stands for the head's brightness where there is no head nearby.
-    const FLOOR: f32 = 0.02;
-    let lowest = head::range_of(image.data.iter().copied(), 0.0, 1.0)[0].min(0.0);
-    let image = image.map(|x| x - lowest);
-    let mut flat = reduced_to(&image, LEVELS_MM[1]);
-    let coarse = flat.clone();
-    let mut gain = coarse.map(|_| 1.0);
-    // The second time the foreground is that of the flattened image: a coil's shadow has become head.
-    for _ in 0..2 {
-        let inside = not_air(&flat).map(|inside| f32::from(u8::from(inside)));
-        let share = gaussian(&inside, SIGMA_MM);
-        let bright = Volume::from_fn(coarse.grid, |n| inside.data[n] * coarse.data[n]);
-        let count = inside.data.iter().sum::<f32>().max(1.0);
-        let mean = bright.data.iter().sum::<f32>() / count;
-        let sum = gaussian(&bright, SIGMA_MM);
-        gain = Volume::from_fn(coarse.grid, |n| (sum.data[n] + FLOOR * mean) / (share.data[n] + FLOOR));
-        let least = 0.02 * mean.max(f32::MIN_POSITIVE);
-        flat = Volume::from_fn(coarse.grid, |n| coarse.data[n] / gain.data[n].max(least));
-    }
-    let least = 0.02 * gain.data.iter().copied().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
-    let gain = gain.map(|g| g.max(least));
-    divided_by(&image, &gain)
-}
-
-/// The image over a gain that is known on a coarser grid of the same axes, read linearly; beyond it the gain's outermost values count.
-pub(super) fn divided_by(image: &Volume<f32, Native>, gain: &Volume<f32, Native>) -> Volume<f32, Native> {
-    let to_gain = gain.grid.voxel_from_mm() * image.grid.mm_from_voxel;
-    // Axis by axis: the voxels of the gain on both sides, and the share of the upper one.
-    let [along_x, along_y, along_z] = [0, 1, 2].map(|a| {
-        let last = gain.grid.dims[a] - 1;
-        let place = |i: usize| {
-            let x = (to_gain[(a, a)] * i as f64 + to_gain[(a, 3)]).clamp(0.0, last as f64);
-            let low = x as usize;
-            (low, (low + 1).min(last), (x - low as f64) as f32)
-        };
-        (0..image.grid.dims[a]).map(place).collect::<Vec<(usize, usize, f32)>>()
-    });
-    let (nx, ny) = (image.grid.dims[0], image.grid.dims[1]);
-    let row_of = |j: usize, k: usize| &gain.data[gain.grid.index(0, j, k)..][..gain.grid.dims[0]];
-    let mix = |low: f32, high: f32, share: f32| low * (1.0 - share) + high * share;
-    let mut out = image.clone();
-    out.data.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        let ((j0, j1, v), (k0, k1, w)) = (along_y[row % ny], along_z[row / ny]);
-        let rows = [row_of(j0, k0), row_of(j1, k0), row_of(j0, k1), row_of(j1, k1)];
-        let across = |i: usize| mix(mix(rows[0][i], rows[1][i], v), mix(rows[2][i], rows[3][i], v), w);
-        let line: Vec<f32> = (0..rows[0].len()).map(across).collect();
-        for (value, (i0, i1, u)) in values.iter_mut().zip(&along_x) {
-            *value /= mix(line[*i0], line[*i1], *u);
-        }
-    });
-    out
-}
-
-/// All that is brighter than air. In logarithms the air stays apart from a brain that is a tenth as bright as the scalp.
-pub(super) fn not_air(image: &Volume<f32, Native>) -> Mask<Native> {
-    let unit = 0.01 * head::range_of(image.data.iter().copied(), 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
-    let logarithm = image.map(|x| (1.0 + x.max(0.0) / unit).ln());
-    let [_, threshold] = head::otsu(&logarithm.data);
-    logarithm.map(|x| x > threshold)
 }
 
 /// From dark to the brightest tissue: fat is brighter than all else, by how much says nothing.

@@ -130,12 +130,14 @@ impl Settings {
     /// [`SettingsError`] with table, value and rule.
     pub fn resolve<'a>(layers: impl IntoIterator<Item = &'a toml::Table>) -> Result<Self, SettingsError> {
         // From the defaults of the whole, not of its parts: those of `[anat.sag]` are not those of `[deformable]`.
-        // Through their text: reading and writing what stands in no text would be compiled once more for every table.
-        let mut whole: toml::Table = Self::default().to_toml().parse().map_err(|e| unreadable(&e))?;
+        // Through texts: readers and writers of values without one would be compiled for every table besides.
+        let defaults = Self::default().to_toml();
+        let mut whole: toml::Table = defaults.parse().map_err(|e| unreadable(&e, &defaults))?;
         for layer in layers {
             lay_over(&mut whole, layer, "");
         }
-        let settings: Self = toml::from_str(&whole.to_string()).map_err(|e| unreadable(&e))?;
+        let whole = whole.to_string();
+        let settings: Self = toml::from_str(&whole).map_err(|e| unreadable(&e, &whole))?;
         settings.check()?;
         Ok(settings)
     }
@@ -199,8 +201,15 @@ impl Settings {
     }
 }
 
-fn unreadable(said: &toml::de::Error) -> SettingsError {
-    SettingsError { file: None, line: None, table: None, reason: in_words(said.message()) }
+/// What is wrong with a text that nobody has written: table and setting stand for its line.
+fn unreadable(said: &toml::de::Error, text: &str) -> SettingsError {
+    let at = said.span().map_or(0, |span| span.start);
+    let (before, rest) = text.split_at_checked(at).unwrap_or(("", text));
+    let table = before.lines().rev().find_map(|line| line.strip_prefix('[')?.strip_suffix(']'));
+    let line = [before.rsplit('\n').next(), rest.lines().next()].into_iter().flatten().collect::<String>();
+    let setting = line.split_once(" = ").map_or_else(String::new, |(name, _)| format!("{name}: "));
+    let reason = setting + &in_words(said.message());
+    SettingsError { file: None, line: None, table: table.map(str::to_owned), reason }
 }
 
 fn spanned(value: Spanned<DeValue<'_>>) -> ValueDeserializer<'_> {
@@ -251,6 +260,16 @@ mod tests {
 
     fn said(text: &str) -> String {
         Settings::layer(text, "my.toml").expect_err(text).to_string()
+    }
+
+    #[test]
+    fn a_value_of_another_kind_in_no_file_is_refused_with_table_and_setting() {
+        let refused =
+            |layer: &str| Settings::resolve([&layer.parse::<toml::Table>().unwrap()]).unwrap_err().to_string();
+        let kind = refused("[anat.sag]\nmargin_mm = \"wide\"\n");
+        assert!(kind.contains("[anat.sag]") && kind.contains("margin_mm: "), "{kind}");
+        let unknown = refused("[register]\nsample = 3\n");
+        assert!(unknown.contains("[register]") && unknown.contains("sample"), "{unknown}");
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! explicit basis functions).
 //!
 //! What was seen has been put right by showing the model's own state to the registration, whose rigid half follows a part of any
-//! shift. That part is known, and goes back into the field after all: beside the registration of the scans it is missing.
+//! shift. What it followed of that state goes back into the field: beside the registration of the scans it is missing.
 
 use crate::experiment::estimate::{
     CorrelatedErrors, Factor, LinearModel, MovedNode, Process, RigidModes, Unexplained, spread_out,

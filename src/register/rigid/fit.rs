@@ -71,8 +71,8 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// One resolution; `seed` tells the draws of several apart.
-    fn level(&self, n: usize, seed: u64, most: usize, bins: usize) -> Level<'_> {
+    /// One resolution, each with a draw of its own.
+    fn level(&self, n: usize, most: usize, bins: usize) -> Level<'_> {
         let (s, o) = (&self.sampled[n], &self.other[n]);
         let spacing = o.image.grid.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
         let request = Draw {
@@ -81,7 +81,7 @@ impl<'a> Pair<'a> {
             bins,
             range: head::range_inside(&s.image, &self.sampled_head),
             centre_mm: head::centre_mm(&self.sampled_head),
-            seed: self.settings.seed + seed,
+            seed: self.settings.seed + n as u64,
         };
         Level {
             measure: Measure::Information,
@@ -110,11 +110,11 @@ pub(super) fn fit_near(
     settings: &RigidSettings,
 ) -> Result<Pose, RegisterError> {
     let finest_mm = settings.levels_mm.last().copied().unwrap_or(1.0);
-    // The head is found on a coarse copy.
+    // Only the last is looked at; the head is found on the second.
     let levels_mm = [settings.start_level_mm, HEAD_MM.max(finest_mm), finest_mm];
     let pair = Pair::new(sampled, other, &levels_mm, settings);
     let finest = levels_mm.len() - 1;
-    let level = pair.level(finest, finest as u64, settings.samples.max(20_000), settings.histogram_bins);
+    let level = pair.level(finest, settings.samples.max(20_000), settings.histogram_bins);
     if level.samples.len() < 64 {
         return Err(RegisterError::NoOverlap);
     }
@@ -131,7 +131,7 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
     let pair = Pair::new(sampled, other, &levels_mm, settings);
     let centre = head::centre_mm(&pair.sampled_head);
     let target = head::centre_mm(&pair.other_head);
-    let level = |n: usize, most: usize, bins: usize| pair.level(n, n as u64, most, bins);
+    let level = |n: usize, most: usize, bins: usize| pair.level(n, most, bins);
 
     let bins = settings.histogram_bins;
     let start_level = level(0, 3000, bins.min(24));

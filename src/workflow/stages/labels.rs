@@ -7,7 +7,7 @@ use crate::workflow::stage_name::StageName;
 use crate::workflow::work::{Made, Work};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const NAME: StageName = StageName::Labels;
 
 /// Notes which template the phantom stands on.
