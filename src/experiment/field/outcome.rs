@@ -50,11 +50,11 @@ pub struct StateShift {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Discrepancy {
-    /// Standard deviation of one component, mm; 0 where noise and remainder explain what is left.
+    /// Standard deviation of one component, mm: no less than what a body made from scans misses always.
     pub size_mm: f64,
     /// Length over which it changes, mm.
     pub length_mm: f64,
-    /// Size of what looks like the registration's noise, as a factor on the noise that was stated.
+    /// Size of what is left without the rigid remainder, as a factor on the registration's noise: the model's beyond 1.
     pub noise_factor: f64,
     /// Size of what looks like a remainder of the rigid registration, mm.
     #[serde(default)]
@@ -91,7 +91,7 @@ impl Discrepancy {
         Self {
             size_mm: rounded(discrepancy.sd_mm),
             length_mm: rounded(discrepancy.length_mm),
-            noise_factor: rounded(noise.sd_mm / left.stated_noise_mm),
+            noise_factor: rounded(left.size_mm / noise.sd_mm),
             rigid_mm: rounded(left.rigid_mm),
             nodes: left.places,
         }

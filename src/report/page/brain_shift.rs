@@ -20,7 +20,7 @@ pub fn section(shift: &BrainShift, figure: Option<Markup>, landmarks: Option<&Ev
         (table("Displacement of the tissue that is left", &head, &rows))
         @if let Some(d) = &shift.discrepancy {
             p {
-                @if d.size_mm > 0.0 {
+                @if d.noise_factor > 1.0 {
                     "What the model leaves varies by " (number(d.size_mm, 2)) " mm over " (number(d.length_mm, 2)) " mm"
                 } @else {
                     "What the model leaves is no more than the registration's errors"

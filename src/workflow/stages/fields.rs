@@ -18,7 +18,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const NAME: StageName = StageName::Fields;
 
 /// What the fields are made from.

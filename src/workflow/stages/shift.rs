@@ -51,8 +51,8 @@ struct Model {
     depth_mm: Vec<f64>,
     /// What the images showed of some nodes, the registration's own error taken out; empty where no estimate did that.
     seen: Vec<MovedNode>,
-    /// What the rigid registration follows of the state, as far as that is known.
-    taken_up: RigidTransform<Mni, Mni>,
+    /// What the rigid registration follows of the state; `None` where it was never shown that, and its own error is in what was seen.
+    taken_up: Option<RigidTransform<Mni, Mni>>,
     fused: OnceCell<Fused>,
 }
 
@@ -176,12 +176,12 @@ impl<'a> CaseShift<'a> {
             _ => Vec::new(),
         };
         let nodes = Nodes { displacement_mm, sd_mm, reach95_mm };
-        let taken_up = if name == ESTIMATE { self.taken_up_of_estimate()? } else { RigidTransform::identity() };
+        let taken_up = if name == ESTIMATE { self.taken_up_of_estimate()? } else { None };
         Ok(Model { name: name.to_owned(), mesh: state.mesh, nodes, depth_mm, seen, taken_up, fused: OnceCell::new() })
     }
 
-    /// What the rigid registration follows of the estimate's state; nothing where it was never shown that.
-    fn taken_up_of_estimate(&self) -> Result<RigidTransform<Mni, Mni>, WorkflowError> {
+    /// What the rigid registration follows of the estimate's state; `None` where it was never shown that.
+    fn taken_up_of_estimate(&self) -> Result<Option<RigidTransform<Mni, Mni>>, WorkflowError> {
         let damaged = || CaseError::Damaged {
             folder: self.case.folder().to_path_buf(),
             file: ESTIMATE_JSON.to_owned(),
@@ -189,9 +189,9 @@ impl<'a> CaseShift<'a> {
         };
         let outcome: EstimateOutcome =
             serde_json::from_str(&self.case.read_text(ESTIMATE_JSON)?).map_err(|_| damaged())?;
-        let Some(rows) = outcome.rigid_taken_up else { return Ok(RigidTransform::identity()) };
+        let Some(rows) = outcome.rigid_taken_up else { return Ok(None) };
         let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
-        Ok(RigidTransform::from_matrix(&matrix).map_err(|_| damaged())?)
+        Ok(Some(RigidTransform::from_matrix(&matrix).map_err(|_| damaged())?))
     }
 
     /// How far the samples of the sweep lie apart at every node, and the reach with it, mm.
@@ -320,7 +320,13 @@ impl<'a> CaseShift<'a> {
                 return Fused::at_rest(sd_mm, self.believed.errors.rigid_mm);
             }
             let seen = self.seen_nodes(model);
-            fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &seen, &self.believed.errors, &model.taken_up)
+            let believed = self.believed.errors;
+            let (noise, taken_up) = match model.taken_up {
+                Some(taken_up) => (self.settings.corrected_noise(), taken_up),
+                None => (believed.noise, RigidTransform::identity()),
+            };
+            let errors = CorrelatedErrors { noise, ..believed };
+            fused(model.mesh.nodes_mm(), displacement_mm, sd_mm, &seen, &errors, &taken_up)
         })
     }
 }
