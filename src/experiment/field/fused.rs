@@ -3,23 +3,18 @@
 //! What is left at the places that were seen is a remainder of the rigid registration (the fields are given beside that
 //! registration, so it belongs to them), a discrepancy of the model, alike over a distance, and noise of the registration,
 //! alike over another. How much noise there is was measured, and a body made from scans is never exact: what is left beyond the
-//! noise is the model's. The remainder is found by least squares where the model is not plainly wrong; model, remainder and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with explicit basis
+//! noise is the model's. The remainder is found by least squares, as far as those are believed; model, remainder and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with explicit basis
 //! functions).
 //!
 //! What was seen has been put right by showing the model's own state to the registration, whose rigid half follows a part of any
 //! shift. What it followed of that state goes back into the field: beside the registration of the scans it is missing.
 
-use crate::experiment::estimate::{
-    CorrelatedErrors, Factor, LinearModel, MovedNode, Process, RigidModes, Unexplained, spread_out,
-};
+use crate::experiment::estimate::{CorrelatedErrors, Factor, MovedNode, Process, RigidModes, Unexplained, spread_out};
 use crate::experiment::rmse::root_mean_square;
 use crate::geometry::{Mni, Position, RigidTransform};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// How many times the noise is left of a model that is plainly wrong. What it misses is found by its evidence, size and length, and
-/// so is the remainder, of which little can be told then.
-const PLAINLY: f64 = 3.0;
 /// What a body made from scans misses of a brain's movement even where it leaves no more than noise: measured on patients whose
 /// displacement is known (docs/evidence/patients.md).
 const USUAL: Process = Process { sd_mm: 0.025, length_mm: 25.0 };
@@ -100,36 +95,30 @@ impl Fused {
     }
 }
 
-/// What is left of a model that is nearly right, by its size: noise as it is stated, and all beyond it the model's.
-fn little(left_mm: f64, noise: Process) -> Unexplained {
+/// What is left, by its size: noise as it is stated, and all beyond it the model's.
+fn what_is_left(left_mm: f64, noise: Process) -> Unexplained {
     let beyond_mm2 = (left_mm.powi(2) - noise.sd_mm.powi(2)).max(0.0);
     Unexplained { noise, discrepancy: Process { sd_mm: USUAL.sd_mm.hypot(beyond_mm2.sqrt()), ..USUAL } }
 }
 
-/// Amounts of the rigid movements by least squares: a process that is smooth enough takes a shift of everything for its own, and by
-/// its covariance the outermost places would speak for all; the registration's errors even out over a brain
-/// (docs/evidence/patients.md).
+/// Amounts of the rigid movements and their covariance, from least squares and from what is expected of them (`precision`).
+///
+/// A process that is smooth enough takes a shift of everything for its own, and by its covariance the outermost places would speak
+/// for all; the registration's errors even out over a brain (docs/evidence/patients.md). So least squares find the amounts, and the
+/// process of what they leave (`process` of its size) says how far they are believed (White, Econometrica 48, 1980).
 fn remainder(
     columns_mm: &DMatrix<f64>,
     left_mm: &DVector<f64>,
     precision: &DMatrix<f64>,
-    noise: Process,
-) -> Option<DVector<f64>> {
-    let weight = 1.0 / noise.sd_mm.powi(2);
-    let normal = columns_mm.transpose() * columns_mm * weight + precision;
-    Some(normal.cholesky()?.solve(&(columns_mm.transpose() * left_mm * weight)))
-}
-
-/// How far those amounts may be off, when what is left is such a process (White, Econometrica 48, 1980).
-fn covariance(
-    columns_mm: &DMatrix<f64>,
-    precision: &DMatrix<f64>,
-    (factor, noise): (&Factor, Process),
-) -> Option<DMatrix<f64>> {
-    let weight = 1.0 / noise.sd_mm.powi(2);
-    let inverse = (columns_mm.transpose() * columns_mm * weight + precision).try_inverse()?;
-    let spread = factor.lower_transposed_times(columns_mm) * weight;
-    Some(&inverse * (spread.transpose() * spread + precision) * &inverse)
+    process: impl Fn(f64) -> Option<Factor>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let inverse = (columns_mm.transpose() * columns_mm).try_inverse()?;
+    let by_squares = &inverse * (columns_mm.transpose() * left_mm);
+    let size_mm = root_mean_square((left_mm - columns_mm * &by_squares).as_slice())?;
+    let spread = process(size_mm)?.lower_transposed_times(columns_mm) * &inverse;
+    let told = (spread.transpose() * spread).try_inverse()?;
+    let covariance = (&told + precision).try_inverse()?;
+    Some((&covariance * (told * by_squares), covariance))
 }
 
 /// How far rigid registration carries what has gone to `y`, mm.
@@ -172,32 +161,15 @@ impl Rest {
         });
         let rigid = RigidModes::new(&places_mm, errors.rigid_mm);
         let precision = rigid.precision();
-        let by_squares = remainder(&rigid.columns_mm, &left_mm, &precision, errors.noise)?;
-        let size_mm = root_mean_square((&left_mm - &rigid.columns_mm * &by_squares).as_slice())?;
-        let wrong = size_mm > PLAINLY * errors.noise.sd_mm;
-        let unexplained = if wrong {
-            let minus = -&left_mm;
-            let linear = LinearModel {
-                places_mm: &places_mm,
-                residuals_mm: &minus,
-                jacobian_mm: &rigid.columns_mm,
-                away: DVector::zeros(precision.nrows()),
-                precision: precision.clone(),
-            };
-            linear.with_discrepancy(errors.noise)?.unexplained
-        } else {
-            little(size_mm, errors.noise)
-        };
-        let factor = unexplained.factor(&places_mm)?;
-        let weights_of_rigid = factor.solve(&rigid.columns_mm);
-        let (amounts, covariance) = if wrong {
-            let covariance = (rigid.columns_mm.transpose() * &weights_of_rigid + &precision).try_inverse()?;
-            (&covariance * (weights_of_rigid.transpose() * &left_mm), covariance)
-        } else {
-            (by_squares, covariance(&rigid.columns_mm, &precision, (&factor, errors.noise))?)
-        };
+        let (amounts, covariance) = remainder(&rigid.columns_mm, &left_mm, &precision, |size_mm| {
+            what_is_left(size_mm, errors.noise).factor(&places_mm)
+        })?;
         let moved = &rigid.columns_mm * &amounts;
         let remains = &left_mm - &moved;
+        let size_mm = root_mean_square(remains.as_slice())?;
+        let unexplained = what_is_left(size_mm, errors.noise);
+        let factor = unexplained.factor(&places_mm)?;
+        let weights_of_rigid = factor.solve(&rigid.columns_mm);
         let weights = factor.solve(&DMatrix::from_column_slice(remains.len(), 1, remains.as_slice()));
         let followed = places_mm.iter().zip(&chosen).flat_map(|(x, &n)| {
             let u = model_mm[seen[n].0 as usize];
@@ -323,6 +295,7 @@ mod tests {
             let found: Vec<[f64; 3]> = (columns * amounts).as_slice().chunks(3).map(|u| [u[0], u[1], u[2]]).collect();
             rms(&found, &vec![shift; places.len()])
         };
+        let process_of = |size_mm| what_is_left(size_mm, ERRORS.noise).factor(&places);
         let (mut by_squares, mut by_covariance) = (0.0, 0.0);
         for phase in 0..6 {
             let wave = |x: &[f64; 3], a: usize| {
@@ -330,7 +303,7 @@ mod tests {
                 0.1 * (at(0) + at(1) + at(2)) / 1.5f64.sqrt()
             };
             let left = DVector::from_fn(3 * places.len(), |row, _| shift[row % 3] + wave(&places[row / 3], row % 3));
-            by_squares += off(&remainder(columns, &left, &precision, ERRORS.noise).unwrap()) / 6.0;
+            by_squares += off(&remainder(columns, &left, &precision, process_of).unwrap().0) / 6.0;
             let weights = factor.solve(columns);
             let inverse = (columns.transpose() * &weights + &precision).try_inverse().unwrap();
             by_covariance += off(&(inverse * (weights.transpose() * &left))) / 6.0;
