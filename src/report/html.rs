@@ -77,10 +77,16 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if zero { text.replace('-', "") } else { text.replace('-', "\u{2212}") }
 }
 
+/// What JSON, which has no infinity, says in its place is above this, and no figure that is one.
+const INFINITE: f64 = 1e15;
+
 /// A number for a reader: `digits` significant digits, thousands apart with a thin space, no exponent.
 pub fn number(value: f64, digits: usize) -> String {
-    if !value.is_finite() {
+    if value.is_nan() {
         return "–".to_owned();
+    }
+    if value.abs() > INFINITE {
+        return if value > 0.0 { "∞" } else { "\u{2212}∞" }.to_owned();
     }
     let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     let decimals = (digits as i32 - 1 - magnitude).clamp(0, 9) as usize;
@@ -130,6 +136,7 @@ mod tests {
         assert_eq!(number(61234.0, 3), "61\u{2009}234");
         assert_eq!(number(-2.5, 2), "\u{2212}2.5");
         assert_eq!(number(f64::NAN, 3), "–");
+        assert_eq!((number(f64::MAX, 3), number(f64::NEG_INFINITY, 3)), ("∞".into(), "\u{2212}∞".into()));
         assert_eq!(number(0.0, 3), "0.00");
         assert_eq!((count(0), count(644), count(152052)), ("0".into(), "644".into(), "152\u{2009}000".into()));
         assert_eq!((fixed(-0.04, 1), fixed(-1.25, 1)), ("0.0".into(), "\u{2212}1.2".into()));

@@ -116,10 +116,14 @@ pub fn models_table(comparison: &Comparison) -> String {
     text
 }
 
+/// From here on a condition number says that something is not told at all; JSON has no infinity.
+const NO_CONDITION: f64 = 1e15;
+
 /// Parameters with their intervals, and what limits them.
 fn estimate_figures(estimate: &EstimateOutcome) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         estimate;
+    let condition = posterior.identifiability.condition;
     let mut text = String::new();
     let shown = estimate.verdict.finding.has_stiffness();
     if shown {
@@ -130,8 +134,8 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
         text += &format!("{name:<32} {:>8.1}   {low:.1} to {high:.1}\n", posterior.mode[n]);
     }
     text += &format!(
-        "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {:.1}\n",
-        posterior.identifiability.condition
+        "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {}\n",
+        if condition < NO_CONDITION { format!("{condition:.1}") } else { "infinite".to_owned() }
     );
     if let Some(taken_out) = taken_out_rms_mm {
         text += &format!("registration's own error, {taken_out:.3} mm, measured on the estimate and taken out\n");

@@ -38,6 +38,9 @@ pub fn in_a_sentence(shift: &BrainShift) -> String {
     let Some(state) = shift.states.first() else { return "No displacement field was made.".to_owned() };
     let [x, y, z] = state.largest_at_mm.map(|v| fixed(v, 0));
     let share = shift.explained.as_ref().map_or_else(String::new, |e| format!(" {}", explained(e)));
+    if state.largest_mm == 0.0 {
+        return format!("{}, the brain has not moved.{share}", as_begun(&state.state));
+    }
     format!(
         "{}, the brain moves by up to {} mm ({} mm in the median), most at ({x}, {y}, {z}) mm in the frame of the pre-operative \
          scan.{share}",
@@ -131,5 +134,8 @@ mod tests {
             "{}",
             said(Some(0.8))
         );
+        let still = StateShift { largest_mm: 0.0, median_mm: 0.0, ..state.clone() };
+        let said = in_a_sentence(&BrainShift { states: vec![still], ..BrainShift::default() });
+        assert_eq!(said, "As estimated, the brain has not moved.");
     }
 }
