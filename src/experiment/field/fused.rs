@@ -3,8 +3,8 @@
 //! What is left at the places that were seen is a remainder of the rigid registration (the fields are given beside that
 //! registration, so it belongs to them), a discrepancy of the model, alike over a distance, and noise of the registration,
 //! alike over another. How much noise there is was measured, and a body made from scans is never exact: what is left beyond the
-//! noise is the model's. The remainder is found by least squares, as far as those are believed; model, remainder and discrepancy are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with explicit basis
-//! functions).
+//! noise is the model's. The remainder is found by least squares, as far as those are believed; model, remainder and discrepancy
+//! are added up (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2.7: a process with explicit basis functions).
 //!
 //! What was seen has been put right by showing the model's own state to the registration, whose rigid half follows a part of any
 //! shift. What it followed of that state goes back into the field: beside the registration of the scans it is missing.
