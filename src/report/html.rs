@@ -77,10 +77,11 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if zero { text.replace('-', "") } else { text.replace('-', "\u{2212}") }
 }
 
-/// What JSON, which has no infinity, says in its place is above this, and no figure that is one.
-const INFINITE: f64 = 1e15;
+/// Figures beyond this stand for infinity, which JSON has not; none that is told is as large.
+pub const INFINITE: f64 = 1e15;
 
-/// A number for a reader: `digits` significant digits, thousands apart with a thin space, no exponent.
+/// A number for a reader: `digits` significant digits, thousands apart with a thin space, no exponent; infinity beyond
+/// [`INFINITE`].
 pub fn number(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "–".to_owned();

@@ -1,5 +1,6 @@
 //! What was found in a few lines of text.
 
+use super::html::INFINITE;
 use super::page::expected_in_a_sentence;
 use crate::experiment::compare::Comparison;
 use crate::experiment::estimate::EstimateOutcome;
@@ -116,14 +117,10 @@ pub fn models_table(comparison: &Comparison) -> String {
     text
 }
 
-/// From here on a condition number says that something is not told at all; JSON has no infinity.
-const NO_CONDITION: f64 = 1e15;
-
 /// Parameters with their intervals, and what limits them.
 fn estimate_figures(estimate: &EstimateOutcome) -> String {
     let EstimateOutcome { posterior, noise_mm, residual_rms_mm, taken_out_rms_mm, tangent_solves, limits, .. } =
         estimate;
-    let condition = posterior.identifiability.condition;
     let mut text = String::new();
     let shown = estimate.verdict.finding.has_stiffness();
     if shown {
@@ -135,7 +132,7 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
     }
     text += &format!(
         "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {}\n",
-        if condition < NO_CONDITION { format!("{condition:.1}") } else { "infinite".to_owned() }
+        condition_in_words(posterior.identifiability.condition)
     );
     if let Some(taken_out) = taken_out_rms_mm {
         text += &format!("registration's own error, {taken_out:.3} mm, measured on the estimate and taken out\n");
@@ -144,6 +141,11 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
         text += &format!("limit: {limit}\n");
     }
     text
+}
+
+/// A condition number for the terminal.
+fn condition_in_words(condition: f64) -> String {
+    if condition > INFINITE { "infinite".to_owned() } else { format!("{condition:.1}") }
 }
 
 /// A phantom's samples with their errors; which is best, and which is nearest to what went in.
@@ -188,4 +190,14 @@ fn stability_in_words(fit: &Fit) -> String {
         where_(fit.stability.convex),
         where_(fit.stability.true_stress_rises)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_that_is_infinite_is_told_in_a_word() {
+        assert_eq!((condition_in_words(5.14), condition_in_words(f64::MAX)), ("5.1".into(), "infinite".into()));
+    }
 }

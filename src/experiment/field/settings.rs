@@ -36,11 +36,11 @@ pub struct FieldSettings {
     pub seen_border_noise_mm: f64,
     /// The depth over which that falls to a third, mm.
     pub seen_border_mm: f64,
-    /// Standard deviation of one component of the noise of what an estimate saw, the registration's own error taken out, mm: what a
-    /// model leaves beyond it is the model's (docs/evidence/patients.md).
-    pub corrected_noise_mm: f64,
+    /// Standard deviation of one component of the seen displacement where an estimate has had the registration's own error taken out of
+    /// it, mm: what a model leaves beyond that is the model's (docs/evidence/patients.md).
+    pub seen_corrected_noise_mm: f64,
     /// Length over which that noise is alike, mm: that of Matern's covariance of order 3/2.
-    pub corrected_correlation_mm: f64,
+    pub seen_corrected_correlation_mm: f64,
 }
 
 impl Default for FieldSettings {
@@ -53,8 +53,8 @@ impl Default for FieldSettings {
             seen_noise_mm: 0.3,
             seen_border_noise_mm: 1.0,
             seen_border_mm: 5.0,
-            corrected_noise_mm: 0.055,
-            corrected_correlation_mm: 10.0,
+            seen_corrected_noise_mm: 0.055,
+            seen_corrected_correlation_mm: 10.0,
         }
     }
 }
@@ -74,19 +74,24 @@ impl FieldSettings {
             ("seen_noise_mm", &self.seen_noise_mm, positive(self.seen_noise_mm), "above 0"),
             ("seen_border_noise_mm", &self.seen_border_noise_mm, self.seen_border_noise_mm >= 0.0, "0 or more"),
             ("seen_border_mm", &self.seen_border_mm, positive(self.seen_border_mm), "above 0"),
-            ("corrected_noise_mm", &self.corrected_noise_mm, positive(self.corrected_noise_mm), "above 0"),
             (
-                "corrected_correlation_mm",
-                &self.corrected_correlation_mm,
-                positive(self.corrected_correlation_mm),
+                "seen_corrected_noise_mm",
+                &self.seen_corrected_noise_mm,
+                positive(self.seen_corrected_noise_mm),
+                "above 0",
+            ),
+            (
+                "seen_corrected_correlation_mm",
+                &self.seen_corrected_correlation_mm,
+                positive(self.seen_corrected_correlation_mm),
                 "above 0",
             ),
         ])
     }
 
-    /// The noise of what an estimate saw.
-    pub fn corrected_noise(&self) -> Process {
-        Process { sd_mm: self.corrected_noise_mm, length_mm: self.corrected_correlation_mm }
+    /// The noise of the seen displacement where the registration's own error is taken out.
+    pub fn seen_corrected_noise(&self) -> Process {
+        Process { sd_mm: self.seen_corrected_noise_mm, length_mm: self.seen_corrected_correlation_mm }
     }
 
     /// Standard deviation of one component of the seen displacement at a depth below skull or margin, mm.

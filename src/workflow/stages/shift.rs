@@ -322,7 +322,7 @@ impl<'a> CaseShift<'a> {
             let seen = self.seen_nodes(model);
             let believed = self.believed.errors;
             let (noise, taken_up) = match model.taken_up {
-                Some(taken_up) => (self.settings.corrected_noise(), taken_up),
+                Some(taken_up) => (self.settings.seen_corrected_noise(), taken_up),
                 None => (believed.noise, RigidTransform::identity()),
             };
             let errors = CorrelatedErrors { noise, ..believed };
