@@ -28,7 +28,7 @@ pub fn shift_figure(
     let grid = slice_through(mesh, largest(displacement_mm)?);
     let model = in_tetrahedra(mesh.tets(), mesh.nodes_mm(), displacement_mm, &grid);
     let shown = |n: usize| -> Option<[[f64; 3]; 2]> {
-        let model = model[n]?.map(f64::from);
+        let model = model.at(n)?.map(f64::from);
         Some([at(seen, place(&grid, n)).unwrap_or_default(), model])
     };
     let panels: [(&str, &str, Panel<'_>); 3] = [
@@ -59,7 +59,7 @@ pub fn prediction_figure(
     let values: Vec<[f64; 5]> =
         (0..mean_mm.len()).map(|n| [mean_mm[n][0], mean_mm[n][1], mean_mm[n][2], reach95_mm[n], sd_mm[n]]).collect();
     let known = in_tetrahedra(mesh.tets(), mesh.nodes_mm(), &values, &grid);
-    let shown = |n: usize| known[n].map(|v| v.map(f64::from));
+    let shown = |n: usize| known.at(n).map(|v| v.map(f64::from));
     let mean = |n: usize| shown(n).map(|v| [v[0], v[1], v[2]]);
     // What lies between nodes that do not move may be a hair below nothing.
     let sizes = (0..grid.len()).filter_map(shown).flat_map(|v| [length([v[0], v[1], v[2]]), v[3].max(0.0)]);

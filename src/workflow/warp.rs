@@ -154,7 +154,7 @@ fn image_through(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> Volum
     let grid = map.grid.unwrap_or(volume.grid);
     let from = |v: [usize; 3]| {
         let y: Position<Native> = grid.centre(v);
-        map.source(y).filter(|x| !map.removed(*x, y))
+        map.source(y).filter(|x| !map.removed(*x, y)).map(|x| volume.grid.voxel_at(x))
     };
     let between = if labels { Between::Labels } else { Between::Intensities };
     let carried = seen_through(volume, &grid, from, None, between);

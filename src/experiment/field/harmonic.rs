@@ -35,7 +35,7 @@ pub fn continued<const N: usize>(
     place: &[Place],
     mut values: Vec<[f32; N]>,
 ) -> Vec<[f32; N]> {
-    let free = place.iter().filter(|p| **p == Place::Free).count();
+    let free = place.par_iter().filter(|p| **p == Place::Free).count();
     if free == 0 || free == place.len() {
         return values;
     }
@@ -90,15 +90,24 @@ impl Lattice {
     }
 
     fn colours(&self, place: &[Place]) -> [Colour; 2] {
+        let of_plane = |(k, place): (usize, &[Place])| {
+            let mut colours = [Colour::default(), Colour::default()];
+            for (n, _) in place.iter().enumerate().filter(|(_, p)| **p == Place::Free) {
+                let v = [n % self.dims[0], n / self.dims[0], k];
+                let bits = |a: usize| u8::from(v[a] > 0) | u8::from(v[a] + 1 < self.dims[a]) << 1;
+                let colour = &mut colours[(v[0] + v[1] + v[2]) % 2];
+                colour.voxels.push((k * self.stride[2] + n) as u32);
+                colour.neighbours.push(bits(0) | bits(1) << 2 | bits(2) << 4);
+            }
+            colours
+        };
+        let planes: Vec<[Colour; 2]> = place.par_chunks(self.stride[2]).enumerate().map(of_plane).collect();
         let mut colours = [Colour::default(), Colour::default()];
-        for (n, _) in place.iter().enumerate().filter(|(_, p)| **p == Place::Free) {
-            let v = [n % self.dims[0], n / self.dims[0] % self.dims[1], n / self.stride[2]];
-            let bits = |a: usize| u8::from(v[a] > 0) | u8::from(v[a] + 1 < self.dims[a]) << 1;
-            let colour = &mut colours[(v[0] + v[1] + v[2]) % 2];
-            colour.voxels.push(n as u32);
-            colour.neighbours.push(bits(0) | bits(1) << 2 | bits(2) << 4);
-        }
-        for colour in &mut colours {
+        for (n, colour) in colours.iter_mut().enumerate() {
+            for plane in &planes {
+                colour.voxels.extend_from_slice(&plane[n].voxels);
+                colour.neighbours.extend_from_slice(&plane[n].neighbours);
+            }
             let before = |first: usize| colour.voxels.partition_point(|&n| (n as usize) < first);
             colour.begins = (0..=place.len().div_ceil(FEW)).map(|chunk| before(chunk * FEW)).collect();
         }
@@ -162,17 +171,19 @@ fn halved<const N: usize>(
     values: &[[f32; N]],
 ) -> (Vec<Place>, Vec<[f32; N]>) {
     let mut sums = vec![([0f32; N], 0u32); coarse.iter().product()];
-    for (n, value) in values.iter().enumerate().filter(|(n, _)| place[*n] == Place::Known) {
-        let v = [n % dims[0], n / dims[0] % dims[1], n / (dims[0] * dims[1])];
-        let (sum, count) = &mut sums[v[0] / 2 + coarse[0] * (v[1] / 2 + coarse[1] * (v[2] / 2))];
-        for (s, x) in sum.iter_mut().zip(value) {
-            *s += x;
+    let plane = dims[0] * dims[1];
+    sums.par_chunks_mut(coarse[0] * coarse[1]).enumerate().for_each(|(k, sums)| {
+        for n in 2 * k * plane..place.len().min((2 * k + 2) * plane) {
+            if place[n] == Place::Known {
+                let (sum, count) = &mut sums[n % dims[0] / 2 + coarse[0] * (n / dims[0] % dims[1] / 2)];
+                sum.iter_mut().zip(&values[n]).for_each(|(s, x)| *s += x);
+                *count += 1;
+            }
         }
-        *count += 1;
-    }
+    });
     let mean = |(sum, count): &([f32; N], u32)| sum.map(|s| s / (*count).max(1) as f32);
     let known = |(_, count): &([f32; N], u32)| if *count > 0 { Place::Known } else { Place::Free };
-    (sums.iter().map(known).collect(), sums.iter().map(mean).collect())
+    (sums.par_iter().map(known).collect(), sums.par_iter().map(mean).collect())
 }
 
 /// Free voxels from the coarse grid, linearly between its centres.

@@ -23,7 +23,7 @@ pub use harmonic::{Place, continued};
 pub use inverse::inverse;
 pub use jacobian::{Mended, jacobian_min, mended};
 pub use outcome::{BrainShift, Discrepancy, StateShift};
-pub use raster::in_tetrahedra;
+pub use raster::{InTetrahedra, in_tetrahedra};
 pub use settings::{FieldSettings, Source};
 pub use shift::{Moved, ShiftField, Surroundings, shift_field};
 pub use vectors::{at, carried};

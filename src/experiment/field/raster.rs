@@ -5,14 +5,30 @@ use crate::image::Grid;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// `N` numbers of every node at the voxels whose centre lies in a tetrahedron, by the linear shape functions; `None`
-/// elsewhere. Where tetrahedra touch, the first in the list speaks.
+/// Numbers at the voxels of a grid, i fastest.
+#[derive(Clone, Debug)]
+pub struct InTetrahedra<const N: usize> {
+    /// Whether a voxel's centre lies in a tetrahedron.
+    pub inside: Vec<bool>,
+    /// The numbers there; 0 elsewhere.
+    pub values: Vec<[f32; N]>,
+}
+
+impl<const N: usize> InTetrahedra<N> {
+    /// The numbers of a voxel in a tetrahedron.
+    pub fn at(&self, voxel: usize) -> Option<[f32; N]> {
+        self.inside[voxel].then(|| self.values[voxel])
+    }
+}
+
+/// `N` numbers of every node at the voxels whose centre lies in a tetrahedron, by the linear shape functions. Where
+/// tetrahedra touch, the first in the list speaks.
 pub fn in_tetrahedra<const N: usize, F: Frame>(
     tets: &[[u32; 4]],
     nodes_mm: &[[f64; 3]],
     values: &[[f64; N]],
     grid: &Grid<F>,
-) -> Vec<Option<[f32; N]>> {
+) -> InTetrahedra<N> {
     let voxels: Vec<Point3<f64>> =
         nodes_mm.par_iter().map(|x| grid.voxel_from_mm().transform_point(&Point3::from(*x))).collect();
     let [nx, ny, nz] = grid.dims;
@@ -28,8 +44,10 @@ pub fn in_tetrahedra<const N: usize, F: Frame>(
             of_plane[k].push(t as u32);
         }
     }
-    let mut found = vec![None; grid.len()];
-    found.par_chunks_mut((nx * ny).max(1)).zip(&of_plane).enumerate().for_each(|(k, (plane, list))| {
+    let (mut inside, mut found) = (vec![false; grid.len()], vec![[0f32; N]; grid.len()]);
+    let plane = (nx * ny).max(1);
+    let planes = inside.par_chunks_mut(plane).zip(found.par_chunks_mut(plane)).zip(&of_plane);
+    planes.enumerate().for_each(|(k, ((inside, found), list))| {
         for &t in list {
             let tet = &tets[t as usize];
             let x = tet.map(|n| voxels[n as usize].coords);
@@ -38,22 +56,23 @@ pub fn in_tetrahedra<const N: usize, F: Frame>(
             let Some(barycentric) = edges.try_inverse() else { continue };
             for j in reach(tet, 1, ny) {
                 for i in reach(tet, 0, nx) {
-                    let place: &mut Option<[f32; N]> = &mut plane[i + nx * j];
-                    if place.is_some() {
+                    let place = i + nx * j;
+                    if inside[place] {
                         continue;
                     }
                     let b = barycentric * (Vector3::new(i as f64, j as f64, k as f64) - x[0]);
                     let weight = [1.0 - b.sum(), b.x, b.y, b.z];
                     if weight.iter().all(|&w| w >= -1e-9) {
-                        *place = Some(std::array::from_fn(|c| {
+                        inside[place] = true;
+                        found[place] = std::array::from_fn(|c| {
                             tet.iter().zip(weight).map(|(&n, w)| w * values[n as usize][c]).sum::<f64>() as f32
-                        }));
+                        });
                     }
                 }
             }
         }
     });
-    found
+    InTetrahedra { inside, values: found }
 }
 
 #[cfg(test)]
@@ -83,7 +102,8 @@ mod tests {
             }
         }
         let mut inside = 0;
-        for (n, value) in found.iter().enumerate() {
+        for n in 0..grid.len() {
+            let value = found.at(n);
             let p = grid.centre(grid.voxel(n)).mm;
             let deep = (0..3).all(|a| p[a] > low[a] + 1e-6 && p[a] < high[a] - 1e-6);
             let out = (0..3).any(|a| p[a] < low[a] - 1e-6 || p[a] > high[a] + 1e-6);

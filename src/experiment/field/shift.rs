@@ -3,9 +3,9 @@
 use super::harmonic::{Place, continued};
 use super::inverse::inverse;
 use super::jacobian::mended;
-use super::raster::in_tetrahedra;
+use super::raster::{InTetrahedra, in_tetrahedra};
 use super::settings::FieldSettings;
-use super::vectors::at;
+use super::vectors::Cell;
 use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::{Grid, Mask, Volume};
@@ -86,8 +86,10 @@ pub fn shift_field(
     let mut known = in_tetrahedra(state.tets, &nodes, &values, &grid);
     if let Some(seen) = seen {
         let mni_from_pre = pre_from_mni.inverse();
-        known.par_iter_mut().enumerate().for_each(|(n, value)| {
-            let Some(value) = value else { return };
+        known.values.par_iter_mut().zip(&known.inside).enumerate().for_each(|(n, (value, inside))| {
+            if !inside {
+                return;
+            }
             let u = turned(seen(mni_from_pre.apply(grid.centre(grid.voxel(n))).mm.into()));
             (0..3).for_each(|a| value[a] = u[a] as f32);
             value[4] = (length(&u) + 1.96 / 3f64.sqrt() * f64::from(value[3])) as f32;
@@ -100,20 +102,21 @@ pub fn shift_field(
 
 /// The field of what is known at voxels of tissue: displacement, standard deviation and reach.
 fn from_tissue(
-    known: Vec<Option<[f32; 5]>>,
+    known: InTetrahedra<5>,
     brain: &Mask<Pre>,
     resected: &Mask<Pre>,
     (whole, first): (Grid<Pre>, [usize; 3]),
     settings: &FieldSettings,
 ) -> ShiftField {
     let grid = brain.grid;
-    let tissue: Vec<bool> = known.par_iter().zip(&resected.data).map(|(v, gone)| v.is_some() && !gone).collect();
-    let head = Mask::from_fn(grid, |n| brain.data[n] || known[n].is_some());
+    let InTetrahedra { inside, mut values } = known;
+    let tissue: Vec<bool> = inside.par_iter().zip(&resected.data).map(|(inside, gone)| *inside && !gone).collect();
+    let head = Mask::from_fn(grid, |n| brain.data[n] || inside[n]);
     let reached = dilate(&head, settings.fall_mm);
     let place_of = |n: usize| if tissue[n] || !reached.data[n] { Place::Known } else { Place::Free };
     let place: Vec<Place> = (0..grid.len()).into_par_iter().map(place_of).collect();
-    let value_of = |(known, tissue): (Option<[f32; 5]>, &bool)| known.filter(|_| *tissue).unwrap_or_default();
-    let values = known.into_par_iter().zip(&tissue).map(value_of).collect();
+    let taken = |n: usize| inside[n] && !tissue[n];
+    values.par_iter_mut().enumerate().filter(|(n, _)| taken(*n)).for_each(|(_, value)| *value = [0.0; 5]);
     let values = continued(grid.dims, grid.spacing_mm(), &place, values);
     let vectors = values.par_iter().map(|&[x, y, z, ..]| [x, y, z]).collect();
     let mut mended = mended(Volume::from_data(grid, vectors), settings.jacobian_least);
@@ -122,7 +125,9 @@ fn from_tissue(
     let inside = |n: usize, v: f32| if resected.data[n] { 0.0 } else { rounded(v.max(0.0)) };
     let component = |c: usize| values.par_iter().enumerate().map(|(n, v)| inside(n, v[c])).collect();
     let mut inverse = inverse(&mended.field);
-    inverse.data.par_iter_mut().for_each(|v| *v = [rounded(v[0]), rounded(v[1]), rounded(v[2])]);
+    // Zeros stay untouched: memory that nothing is written to need not be handed out.
+    let moved = inverse.data.par_iter_mut().filter(|v| **v != [0.0; 3]);
+    moved.for_each(|v| *v = [rounded(v[0]), rounded(v[1]), rounded(v[2])]);
     ShiftField {
         whole,
         first,
@@ -134,6 +139,12 @@ fn from_tissue(
         changed,
         forward: mended.field,
     }
+}
+
+/// What an affine makes of a voxel: nothing else is done for every voxel of a head.
+fn of_voxels(affine: &Matrix4<f64>) -> impl Fn([usize; 3]) -> Vector3<f64> + Sync + Send + use<> {
+    let [x, y, z, origin] = [0, 1, 2, 3].map(|c| affine.fixed_view::<3, 1>(0, c).into_owned());
+    move |[i, j, k]| x * i as f64 + y * j as f64 + z * k as f64 + origin
 }
 
 #[inline]
@@ -189,12 +200,15 @@ impl ShiftField {
         &self,
         post_from_pre: &RigidTransform<Pre, Post>,
     ) -> impl Fn([usize; 3]) -> [f32; 3] + Sync + Send + use<'_> {
-        let (turn, shift) = (post_from_pre.rotation.to_rotation_matrix(), post_from_pre.translation_mm);
+        let turn = post_from_pre.to_affine().linear;
+        let mm_from_voxel = self.whole.mm_from_voxel;
+        let rigid = of_voxels(&(post_from_pre.to_matrix() * mm_from_voxel - mm_from_voxel));
         move |v| {
-            let x = self.whole.centre(v).mm.coords;
-            let [u, v, w] = self.forward_at(v);
-            let d = turn * (x + Vector3::new(f64::from(u), f64::from(v), f64::from(w))) + shift - x;
-            vector(&d)
+            let d = rigid(v);
+            match self.forward_at(v) {
+                [0.0, 0.0, 0.0] => vector(&d),
+                shift => vector(&(d + turn * Vector3::from(shift.map(f64::from)))),
+            }
         }
     }
 
@@ -204,13 +218,12 @@ impl ShiftField {
         grid: &Grid<Post>,
         pre_from_post: &RigidTransform<Post, Pre>,
     ) -> impl Fn([usize; 3]) -> [f32; 3] + Sync + Send + use<'_> {
-        let (grid, turn, shift) = (*grid, pre_from_post.rotation.to_rotation_matrix(), pre_from_post.translation_mm);
+        let moved = pre_from_post.to_matrix() * grid.mm_from_voxel;
+        let rigid = of_voxels(&(moved - grid.mm_from_voxel));
+        let there = of_voxels(&(self.inverse.grid.voxel_from_mm() * moved));
         move |v| {
-            let y = grid.centre(v);
-            let moved = Position::from_point(Point3::from(turn * y.mm.coords + shift));
-            let back = at(&self.inverse, moved).unwrap_or_default();
-            let d = moved.mm.coords + Vector3::from(back) - y.mm.coords;
-            vector(&d)
+            let back = Cell::at(self.inverse.grid.dims, &Point3::from(there(v)));
+            vector(&(rigid(v) + back.map_or(Vector3::zeros(), |cell| cell.value(&self.inverse.data))))
         }
     }
 
@@ -233,6 +246,11 @@ impl ShiftField {
         self.of_whole(voxel).map_or([0.0; 3], |m| self.inverse.data[m])
     }
 
+    /// A value of the part at a voxel of the whole grid, 0 elsewhere.
+    pub fn on_part(&self, part: &[f32], voxel: [usize; 3]) -> f32 {
+        self.of_whole(voxel).map_or(0.0, |m| part[m])
+    }
+
     /// A volume of the part on the whole grid, `outside` elsewhere.
     pub fn on_whole<T: Copy + Default + Send + Sync>(&self, part: &[T], outside: T) -> Volume<T, Pre> {
         Volume::from_voxels(self.whole, |v| self.of_whole(v).map_or(outside, |m| part[m]))
@@ -241,8 +259,8 @@ impl ShiftField {
     /// Largest and median length of the shift over the tissue, mm, and where the largest is (mm, pre-operative scan).
     pub fn sizes(&self) -> Option<(f64, f64, [f64; 3])> {
         let size = |n: usize| self.forward.data[n].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt();
-        let mut sizes: Vec<(f64, usize)> =
-            (0..self.believed.len()).filter(|&n| self.believed[n]).map(|n| (size(n), n)).collect();
+        let believed = (0..self.believed.len()).into_par_iter().filter(|&n| self.believed[n]);
+        let mut sizes: Vec<(f64, usize)> = believed.map(|n| (size(n), n)).collect();
         // Of equals the first voxel is the largest.
         let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1));
         let (largest, at) = sizes.iter().copied().max_by(order)?;

@@ -3,7 +3,7 @@
 use super::shift::{Believed, CaseShift, FUSED, OBSERVED};
 use crate::artefact::{Manifest, Produced};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
-use crate::geometry::{Frame, Position, Post, Pre, RigidTransform};
+use crate::geometry::{Frame, Post, Pre, RigidTransform};
 use crate::image::nifti::{
     self, ReadOptions, encode_displacement, encode_intensities, encode_mask, encode_numbers, encode_u8,
 };
@@ -16,9 +16,10 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
+use nalgebra::{Point3, Vector3};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Fields;
 
 /// What the fields are made from.
@@ -96,8 +97,8 @@ fn files(
         let value = field.to_pre(post_grid, &post_from_pre.inverse());
         (PRE_FROM_POST_FIELD.of(state), encode_displacement(post_grid, value))
     };
-    let sd = || (SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
-    let reach = || (SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
+    let sd = || (SHIFT_SD.of(state), encode_numbers(whole, |v| field.on_part(&field.sd_mm, v)));
+    let reach = || (SHIFT_REACH.of(state), encode_numbers(whole, |v| field.on_part(&field.reach95_mm, v)));
     // Two at a time: what one waits for the other can use, and no more has to be held at once.
     let pairs = [rayon::join(forward, back), rayon::join(to_post, to_pre), rayon::join(sd, reach)];
     let mask = (SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
@@ -130,9 +131,13 @@ pub(super) fn carried(work: &Work<'_>, field: &ShiftField, produced: &mut Produc
     Ok(())
 }
 
-/// Where the tissue at a voxel came from.
-fn moved_back(field: &ShiftField, (grid, same): (&Grid<Pre>, bool), voxel: [usize; 3]) -> Position<Pre> {
-    let y = grid.centre(voxel);
-    let d = if same { field.inverse_at(voxel).map(f64::from) } else { at(&field.inverse, y).unwrap_or_default() };
-    Position::new(y.mm.x + d[0], y.mm.y + d[1], y.mm.z + d[2])
+/// Where the tissue at a voxel came from, in voxels.
+fn moved_back(field: &ShiftField, (grid, same): (&Grid<Pre>, bool), voxel: [usize; 3]) -> Point3<f64> {
+    let d = if same {
+        field.inverse_at(voxel).map(f64::from)
+    } else {
+        at(&field.inverse, grid.centre(voxel)).unwrap_or_default()
+    };
+    let voxel = Point3::from(voxel.map(|x| x as f64));
+    if d == [0.0; 3] { voxel } else { voxel + grid.voxel_from_mm().fixed_view::<3, 3>(0, 0) * Vector3::from(d) }
 }

@@ -115,7 +115,7 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         write(TEMPLATE_DISPLACEMENT, encode_vectors(&template.atlas_from_subject.displacement_mm()));
         let (fit, deformation) = template.atlas_from_subject.parts();
         write(TEMPLATE_FIT, encode_vectors(&deformation));
-        write(PRE_EVEN_T1, encode_numbers(&before.t1_mni));
+        write(PRE_EVEN_T1, encode_numbers(&before.t1_mni.grid, |[i, j, k]| before.t1_mni.at(i, j, k)));
         write(PRE_NATIVE_BRAIN, encode_mask(&before.brain));
         write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
         write(NATIVE_RESECTED, encode_mask(&scan.resection));

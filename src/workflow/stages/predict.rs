@@ -203,16 +203,18 @@ impl<'a> Patient<'a> {
         let known = in_tetrahedra(mesh.tets(), &nodes, &both, &field.forward.grid);
         let part = |c: usize| -> Vec<f32> {
             // A thousandth of a mm, or of a probability, is more than is known, and packs well.
-            let rounded = |v: Option<[f32; 2]>| v.map_or(0.0, |v| (v[c] * 1024.0).round() / 1024.0);
-            known.iter().zip(&field.believed).map(|(v, believed)| if *believed { rounded(*v) } else { 0.0 }).collect()
+            let rounded = |v: &[f32; 2]| (v[c] * 1024.0).round() / 1024.0;
+            let values = known.values.iter().zip(&field.believed);
+            values.map(|(v, believed)| if *believed { rounded(v) } else { 0.0 }).collect()
         };
         let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
         write(SHIFT.of(state), encode_displacement(&field.whole, |v| field.forward_at(v)));
         write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |v| field.inverse_at(v)));
-        write(SHIFT_SD.of(state), encode_numbers(&field.on_whole(&field.sd_mm, 0.0)));
-        write(SHIFT_REACH_50.of(state), encode_numbers(&field.on_whole(&part(0), 0.0)));
-        write(SHIFT_REACH.of(state), encode_numbers(&field.on_whole(&field.reach95_mm, 0.0)));
-        write(SHIFT_PROBABILITY.of(state), encode_numbers(&field.on_whole(&part(1), 0.0)));
+        let numbers = |part: &[f32]| encode_numbers(&field.whole, |v| field.on_part(part, v));
+        write(SHIFT_SD.of(state), numbers(&field.sd_mm));
+        write(SHIFT_REACH_50.of(state), numbers(&part(0)));
+        write(SHIFT_REACH.of(state), numbers(&field.reach95_mm));
+        write(SHIFT_PROBABILITY.of(state), numbers(&part(1)));
         write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
         let modes = found.modes(mesh, self.settings.predict.threshold_mm);
         let mut points = vec![
