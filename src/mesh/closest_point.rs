@@ -40,16 +40,6 @@ pub struct Hit {
 }
 
 const LEAF: usize = 8;
-/// Below so many triangles one thread is as fast as two.
-const FEW: usize = 4096;
-/// A box around nothing.
-const NOTHING: Node = Node {
-    low: Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-    high: Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-    first: 0,
-    count: 0,
-    right: 0,
-};
 
 impl ClosestPoint {
     /// Prepares a surface; `None` when it has no triangles.
@@ -58,16 +48,13 @@ impl ClosestPoint {
             return None;
         }
         let corner = |t: &[u32; 3]| t.map(|n| Point3::from(surface.nodes_mm[n as usize]));
-        let corners: Vec<[Point3<f64>; 3]> = surface.triangles.iter().map(corner).collect();
-        let middle = |(n, t): (usize, &[Point3<f64>; 3])| Leaf {
-            middle: t[0].coords + t[1].coords + t[2].coords,
-            number: n as u32,
-        };
-        let mut leaves: Vec<Leaf> = corners.iter().enumerate().map(middle).collect();
-        let mut boxes = vec![NOTHING; boxes(leaves.len())];
-        split(&mut leaves, &mut boxes, (0, 0), &corners);
-        let number: Vec<u32> = leaves.iter().map(|leaf| leaf.number).collect();
-        Some(Self { corners: number.iter().map(|&n| corners[n as usize]).collect(), number, boxes })
+        let mut order: Vec<([Point3<f64>; 3], u32)> =
+            surface.triangles.iter().enumerate().map(|(n, t)| (corner(t), n as u32)).collect();
+        let mut boxes = Vec::with_capacity(order.len() / 2);
+        let end = order.len();
+        split(&mut order, 0, end, &mut boxes);
+        let (corners, number) = order.into_iter().unzip();
+        Some(Self { corners, number, boxes })
     }
 
     /// The closest point of the surface.
@@ -101,47 +88,28 @@ impl ClosestPoint {
     }
 }
 
-/// A triangle while the tree is made.
-#[derive(Clone, Copy)]
-struct Leaf {
-    /// Three times its centre.
-    middle: Vector3<f64>,
-    number: u32,
-}
-
-/// How many boxes a tree over so many triangles has.
-fn boxes(triangles: usize) -> usize {
-    let half = triangles / 2;
-    if triangles <= LEAF { 1 } else { 1 + boxes(half) + boxes(triangles - half) }
-}
-
-/// The tree over some triangles: the first of them and of its boxes are so many of all.
-fn split(leaves: &mut [Leaf], tree: &mut [Node], (first, me): (u32, u32), corners: &[[Point3<f64>; 3]]) {
-    let (node, children) = tree.split_first_mut().expect("a box for every tree");
-    *node = Node { first, count: leaves.len() as u32, ..NOTHING };
-    if leaves.len() <= LEAF {
-        for corner in leaves.iter().flat_map(|leaf| &corners[leaf.number as usize]) {
-            (node.low, node.high) = (node.low.inf(corner), node.high.sup(corner));
-        }
+fn split(order: &mut [([Point3<f64>; 3], u32)], first: usize, end: usize, boxes: &mut Vec<Node>) {
+    let part = &mut order[first..end];
+    let (mut low, mut high) = (part[0].0[0], part[0].0[0]);
+    for corner in part.iter().flat_map(|(corners, _)| corners) {
+        low = low.inf(corner);
+        high = high.sup(corner);
+    }
+    let me = boxes.len();
+    boxes.push(Node { low, high, first: first as u32, count: (end - first) as u32, right: 0 });
+    if end - first <= LEAF {
         return;
     }
-    let bounds =
-        |(low, high): (Vector3<f64>, Vector3<f64>), leaf: &Leaf| (low.inf(&leaf.middle), high.sup(&leaf.middle));
-    let (low, high) = leaves.iter().fold((leaves[0].middle, leaves[0].middle), bounds);
     let axis = (high - low).imax();
-    let half = leaves.len() / 2;
-    leaves.select_nth_unstable_by(half, |a, b| a.middle[axis].total_cmp(&b.middle[axis]).then(a.number.cmp(&b.number)));
-    let (left, right) = leaves.split_at_mut(half);
-    let (of_left, of_right) = children.split_at_mut(boxes(half));
-    node.right = me + 1 + of_left.len() as u32;
-    let (at_left, at_right) = ((first, me + 1), (first + half as u32, node.right));
-    if right.len() < FEW {
-        split(left, of_left, at_left, corners);
-        split(right, of_right, at_right, corners);
-    } else {
-        rayon::join(|| split(left, of_left, at_left, corners), || split(right, of_right, at_right, corners));
-    }
-    (node.low, node.high) = (of_left[0].low.inf(&of_right[0].low), of_left[0].high.sup(&of_right[0].high));
+    let centre = |t: &([Point3<f64>; 3], u32)| (t.0[0][axis] + t.0[1][axis] + t.0[2][axis], t.1);
+    let middle = usize::midpoint(first, end);
+    part.select_nth_unstable_by(middle - first, |a, b| {
+        let (a, b) = (centre(a), centre(b));
+        a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+    });
+    split(order, first, middle, boxes);
+    boxes[me].right = boxes.len() as u32;
+    split(order, middle, end, boxes);
 }
 
 fn squared_distance_to_box(p: Point3<f64>, node: &Node) -> f64 {

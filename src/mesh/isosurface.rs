@@ -4,14 +4,12 @@ use super::TriMesh;
 use crate::geometry::Frame;
 use crate::image::Volume;
 use nalgebra::Point3;
+use std::collections::HashMap;
 
 /// The six tetrahedra of a cube around its main diagonal (Kuhn): neighbouring cubes agree on shared faces, so the
 /// surface has no cracks and no edge with more than two triangles. Corner number = i + 2 j + 4 k.
 pub(super) const KUHN: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
-
-/// No node yet.
-const NONE: u32 = u32::MAX;
 
 /// The surface `image = level` by marching tetrahedra (Doi and Koide, IEICE Trans. E74, 1991), outward where the
 /// image falls below the level, in mm. Outside the grid the image counts as below the level, so it is always closed.
@@ -29,12 +27,12 @@ pub fn isosurface<F: Frame>(image: &Volume<f32, F>, level: f32) -> TriMesh {
     // A mirrored grid (LAS, say) would turn every triangle inside out.
     let mirrored = image.grid.mm_from_voxel.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
     let value = |p: [isize; 3]| image.get(p[0], p[1], p[2]).filter(|v| v.is_finite()).map_or(-1.0, |v| v - level);
-    // The node on an edge by the edge's lower end, in two planes by turns, and the way from there to the other: one of seven.
-    let mut numbers = [0, 1].map(|_| vec![NONE; 7 * (nx + 2) * (ny + 2)]);
+    let id =
+        |p: [isize; 3]| (p[0] + 1) as u64 + (nx as u64 + 2) * ((p[1] + 1) as u64 + (ny as u64 + 2) * (p[2] + 1) as u64);
+    let mut numbers: HashMap<(u64, u64), u32> = HashMap::new();
     let mut surface = TriMesh::default();
     let above = above_with_a_border(image, level);
     for k in -1..nz as isize {
-        numbers[k as usize & 1].fill(NONE);
         for j in -1..ny as isize {
             let row = |up: usize| {
                 let (j, k) = ((j + 1) as usize + (up & 1), (k + 1) as usize + (up >> 1));
@@ -55,18 +53,15 @@ pub fn isosurface<F: Frame>(image: &Volume<f32, F>, level: f32) -> TriMesh {
                     let (within, without): (Vec<usize>, Vec<usize>) = tet.iter().partition(|&&c| values[c] >= 0.0);
                     let mut node = |a: usize, b: usize| {
                         let (a, b) = if a < b { (a, b) } else { (b, a) };
-                        let [x, y, z] = corners[a].map(|x| (x + 1) as usize);
-                        let number = &mut numbers[z & 1][7 * (x + (nx + 2) * y) + (a ^ b) - 1];
-                        if *number == NONE {
+                        *numbers.entry((id(corners[a]), id(corners[b]))).or_insert_with(|| {
                             let t = f64::from(values[a] / (values[a] - values[b])).clamp(1e-3, 1.0 - 1e-3);
                             let voxel = |axis: usize| {
                                 corners[a][axis] as f64 + t * (corners[b][axis] - corners[a][axis]) as f64
                             };
                             let p = image.grid.position(Point3::new(voxel(0), voxel(1), voxel(2)));
                             surface.nodes_mm.push([p.mm.x, p.mm.y, p.mm.z]);
-                            *number = surface.nodes_mm.len() as u32 - 1;
-                        }
-                        *number
+                            surface.nodes_mm.len() as u32 - 1
+                        })
                     };
                     let ring: Vec<u32> = match (within.as_slice(), without.as_slice()) {
                         (&[a], &[b, c, d]) | (&[b, c, d], &[a]) => vec![node(a, b), node(a, c), node(a, d)],

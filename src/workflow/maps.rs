@@ -231,6 +231,6 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     } else {
         native(Volume::from_voxels(field.whole, |v| field.inverse_at(v)))
     };
-    let sd = native(field.on_whole(&field.sd_mm, 0.0));
-    Ok((vectors, Some(sd), native(field.on_whole(&field.believed, false))))
+    let sd = native(field.on_whole(&field.sd_mm));
+    Ok((vectors, Some(sd), native(field.on_whole(&field.believed))))
 }

@@ -236,24 +236,24 @@ impl ShiftField {
         (i < dims[0] && j < dims[1] && k < dims[2]).then(|| self.forward.grid.index(i, j, k))
     }
 
+    /// What the part's values (one per voxel of it) are at a voxel of the whole grid; nothing beyond the part.
+    pub fn value_at<T: Copy + Default>(&self, part: &[T], voxel: [usize; 3]) -> T {
+        self.of_whole(voxel).map_or(T::default(), |m| part[m])
+    }
+
     /// How far the point at a voxel of the whole grid moves, mm.
     pub fn forward_at(&self, voxel: [usize; 3]) -> [f32; 3] {
-        self.of_whole(voxel).map_or([0.0; 3], |m| self.forward.data[m])
+        self.value_at(&self.forward.data, voxel)
     }
 
     /// The same of the inverse.
     pub fn inverse_at(&self, voxel: [usize; 3]) -> [f32; 3] {
-        self.of_whole(voxel).map_or([0.0; 3], |m| self.inverse.data[m])
+        self.value_at(&self.inverse.data, voxel)
     }
 
-    /// A value of the part at a voxel of the whole grid, 0 elsewhere.
-    pub fn on_part(&self, part: &[f32], voxel: [usize; 3]) -> f32 {
-        self.of_whole(voxel).map_or(0.0, |m| part[m])
-    }
-
-    /// A volume of the part on the whole grid, `outside` elsewhere.
-    pub fn on_whole<T: Copy + Default + Send + Sync>(&self, part: &[T], outside: T) -> Volume<T, Pre> {
-        Volume::from_voxels(self.whole, |v| self.of_whole(v).map_or(outside, |m| part[m]))
+    /// The part's values on the whole grid.
+    pub fn on_whole<T: Copy + Default + Send + Sync>(&self, part: &[T]) -> Volume<T, Pre> {
+        Volume::from_voxels(self.whole, |v| self.value_at(part, v))
     }
 
     /// Largest and median length of the shift over the tissue, mm, and where the largest is (mm, pre-operative scan).
@@ -320,7 +320,7 @@ mod tests {
                 assert_eq!(field.forward_at(field.whole.voxel(n)), [0.0; 3]);
             }
         }
-        let resected = field.on_whole(&field.believed, false);
+        let resected = field.on_whole(&field.believed);
         assert!(resected.data.iter().zip(&around.resected.data).all(|(b, r)| !(*b && *r)), "nothing is known there");
         assert!(field.believed.iter().filter(|b| **b).count() > 1000);
         // Where the field bends between two voxels of 2 mm, at the rim of the tissue, the map back bends elsewhere.

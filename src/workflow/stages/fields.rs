@@ -97,11 +97,11 @@ fn files(
         let value = field.to_pre(post_grid, &post_from_pre.inverse());
         (PRE_FROM_POST_FIELD.of(state), encode_displacement(post_grid, value))
     };
-    let sd = || (SHIFT_SD.of(state), encode_numbers(whole, |v| field.on_part(&field.sd_mm, v)));
-    let reach = || (SHIFT_REACH.of(state), encode_numbers(whole, |v| field.on_part(&field.reach95_mm, v)));
+    let sd = || (SHIFT_SD.of(state), encode_numbers(whole, |v| field.value_at(&field.sd_mm, v)));
+    let reach = || (SHIFT_REACH.of(state), encode_numbers(whole, |v| field.value_at(&field.reach95_mm, v)));
     // Two at a time: what one waits for the other can use, and no more has to be held at once.
     let pairs = [rayon::join(forward, back), rayon::join(to_post, to_pre), rayon::join(sd, reach)];
-    let mask = (SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+    let mask = (SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed)));
     pairs.into_iter().flat_map(|(a, b)| [a, b]).chain([mask]).collect()
 }
 

@@ -210,12 +210,12 @@ impl<'a> Patient<'a> {
         let mut write = |name: String, bytes: Vec<u8>| produced.files.push((name, bytes));
         write(SHIFT.of(state), encode_displacement(&field.whole, |v| field.forward_at(v)));
         write(SHIFT_BACK.of(state), encode_displacement(&field.whole, |v| field.inverse_at(v)));
-        let numbers = |part: &[f32]| encode_numbers(&field.whole, |v| field.on_part(part, v));
+        let numbers = |part: &[f32]| encode_numbers(&field.whole, |v| field.value_at(part, v));
         write(SHIFT_SD.of(state), numbers(&field.sd_mm));
         write(SHIFT_REACH_50.of(state), numbers(&part(0)));
         write(SHIFT_REACH.of(state), numbers(&field.reach95_mm));
         write(SHIFT_PROBABILITY.of(state), numbers(&part(1)));
-        write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed, false)));
+        write(SHIFT_MASK.of(state), encode_mask(&field.on_whole(&field.believed)));
         let modes = found.modes(mesh, self.settings.predict.threshold_mm);
         let mut points = vec![
             Field::vector("displacement", &spread.mean_mm),
