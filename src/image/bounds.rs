@@ -4,6 +4,7 @@ use super::grid::Grid;
 use super::volume::{Mask, Volume};
 use crate::geometry::Frame;
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 /// A box of voxels: `first` is inside, `end` is one past the last, along i, j, k.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,18 +37,21 @@ impl<F: Frame> Mask<F> {
     /// The smallest box that holds every voxel of the mask; `None` when the mask is empty.
     pub fn bounding_box(&self) -> Option<VoxelBox> {
         let [nx, ny, nz] = self.grid.dims;
-        let mut found = VoxelBox { first: [usize::MAX; 3], end: [0; 3] };
-        for k in 0..nz {
-            for j in 0..ny {
+        let nothing = || VoxelBox { first: [usize::MAX; 3], end: [0; 3] };
+        let both = |a: VoxelBox, b: VoxelBox| VoxelBox {
+            first: [0, 1, 2].map(|d| a.first[d].min(b.first[d])),
+            end: [0, 1, 2].map(|d| a.end[d].max(b.end[d])),
+        };
+        let in_plane = |k: usize| {
+            let rows = (0..ny).filter_map(|j| {
                 let row = &self.data[self.grid.index(0, j, k)..][..nx];
-                let Some(first) = row.iter().position(|&inside| inside) else { continue };
+                let first = row.iter().position(|&inside| inside)?;
                 let last = row.iter().rposition(|&inside| inside).unwrap_or(first);
-                for (a, (lo, hi)) in [(first, last), (j, j), (k, k)].into_iter().enumerate() {
-                    found.first[a] = found.first[a].min(lo);
-                    found.end[a] = found.end[a].max(hi + 1);
-                }
-            }
-        }
+                Some(VoxelBox { first: [first, j, k], end: [last + 1, j + 1, k + 1] })
+            });
+            rows.fold(nothing(), both)
+        };
+        let found = (0..nz).into_par_iter().map(in_plane).reduce(nothing, both);
         (found.end[0] > 0).then_some(found)
     }
 }

@@ -1,6 +1,7 @@
 //! Volumes on oriented grids: NIfTI, resampling, filtering, morphology, distance.
 
 mod blank_slices;
+pub mod blocks;
 mod bounds;
 pub mod components;
 pub mod distance;

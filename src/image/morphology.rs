@@ -11,11 +11,22 @@ use crate::geometry::Frame;
 /// Every voxel whose centre lies at most `radius_mm` from a centre inside. A radius of 0 changes nothing.
 #[must_use]
 pub fn dilate<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
-    let Some(around) = mask.bounding_box() else { return mask.clone() };
-    // Outside this box the mask and the result are both empty.
-    let part = mask.cropped(&around.grown(&mask.grid, radius_mm));
-    let limit = squared_limit(radius_mm);
-    pasted(mask, &around.grown(&mask.grid, radius_mm), &squared_distance_mm2(&part, true, limit).map(|d2| d2 <= limit))
+    let [dilated] = dilations(mask, [radius_mm]);
+    dilated
+}
+
+/// [`dilate`] by several radii, for little more than by the largest.
+#[must_use]
+pub fn dilations<const N: usize, F: Frame>(mask: &Mask<F>, radii_mm: [f64; N]) -> [Mask<F>; N] {
+    let Some(around) = mask.bounding_box() else { return radii_mm.map(|_| mask.clone()) };
+    let largest_mm = radii_mm.into_iter().fold(0.0, f64::max);
+    // Outside this box the mask and the results are empty.
+    let around = around.grown(&mask.grid, largest_mm);
+    let squared = squared_distance_mm2(&mask.cropped(&around), true, squared_limit(largest_mm));
+    radii_mm.map(|radius_mm| {
+        let limit = squared_limit(radius_mm);
+        pasted(mask, &around, &squared.map(|d2| d2 <= limit))
+    })
 }
 
 /// Every inside voxel whose centre lies more than `radius_mm` from all centres outside. A radius of 0 changes nothing.
@@ -84,6 +95,14 @@ mod tests {
         fn erosion_is_dilation_of_the_outside(mask in masks(), radius in 0.0f64..2.6) {
             let outside = mask.map(|inside| !inside);
             prop_assert_eq!(erode(&mask, radius), dilate(&outside, radius).map(|inside| !inside));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn several_dilations_at_once_are_those_one_by_one(mask in masks(), radii in [0.0f64..4.0, 0.0f64..4.0]) {
+            prop_assert_eq!(dilations(&mask, radii), radii.map(|radius| dilate(&mask, radius)));
         }
     }
 

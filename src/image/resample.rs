@@ -75,6 +75,17 @@ pub fn resample_together<const N: usize, S: Frame, T: Frame>(
 ) -> [Volume<f32, T>; N] {
     let grid = sources[0].grid;
     assert!(sources.iter().all(|s| s.grid.coincides(&grid, 0.0)), "the volumes lie on one grid");
+    filled_together(&grid, target, source_from_target, outside, |cell| sources.map(|source| cell.of(&source.data)))
+}
+
+/// Several volumes of what `values` makes of the cell around each voxel's place in a grid.
+fn filled_together<const N: usize, S: Frame, T: Frame>(
+    grid: &Grid<S>,
+    target: &Grid<T>,
+    source_from_target: impl Fn(Position<T>) -> Position<S> + Sync,
+    outside: [f32; N],
+    values: impl Fn(&Cell) -> [f32; N] + Sync,
+) -> [Volume<f32, T>; N] {
     let last = grid.dims.map(|n| n as f64 - 1.0);
     let [nx, ny, nz] = target.dims;
     let mut out = outside.map(|value| Volume::filled(*target, value));
@@ -87,14 +98,23 @@ pub fn resample_together<const N: usize, S: Frame, T: Frame>(
             let p = source_from_target(Position::from_point(p.into()));
             let v = affine_point(grid.voxel_from_mm(), p.mm.into());
             if (0..3).all(|a| v[a] >= 0.0 && v[a] <= last[a]) {
-                let cell = Cell::at(&grid, v);
-                for (plane, source) in planes.iter_mut().zip(sources) {
-                    plane[n] = cell.of(&source.data);
-                }
+                let found = values(&Cell::at(grid, v));
+                planes.iter_mut().zip(found).for_each(|(plane, value)| plane[n] = value);
             }
         }
     });
     out
+}
+
+/// [`resample_together`] of values that lie side by side: each corner around a point is one read for all of them.
+#[must_use]
+pub fn resample_each<const N: usize, S: Frame, T: Frame>(
+    source: &Volume<[f32; N], S>,
+    target: &Grid<T>,
+    source_from_target: impl Fn(Position<T>) -> Position<S> + Sync,
+    outside: [f32; N],
+) -> [Volume<f32, T>; N] {
+    filled_together(&source.grid, target, source_from_target, outside, |cell| cell.of_each(&source.data))
 }
 
 /// Labels (or any values that cannot be mixed) of the nearest centres; `outside` where the source's voxels do not reach.
@@ -225,7 +245,8 @@ impl Cell {
     #[inline]
     fn at<S: Frame>(grid: &Grid<S>, v: [f64; 3]) -> Self {
         let dims = grid.dims;
-        let [i, j, k] = [0, 1, 2].map(|a| (v[a] as usize).min(dims[a].saturating_sub(2)));
+        // By way of 32 bits: one instruction, where 64 take a dozen.
+        let [i, j, k] = [0, 1, 2].map(|a| (v[a] as u32 as usize).min(dims[a].saturating_sub(2)));
         let stride = [1, dims[0], dims[0] * dims[1]];
         Self {
             corner: grid.index(i, j, k),
@@ -239,6 +260,19 @@ impl Cell {
         let (o, [step, up, over], w) = (self.corner, self.step, self.weight);
         // a + w (b - a) would not return b exactly at w = 1.
         let mix = |a: f32, b: f32, w: f32| a * (1.0 - w) + b * w;
+        let line = |o: usize| mix(d[o], d[o + step], w[0]);
+        let plane = |o: usize| mix(line(o), line(o + up), w[1]);
+        mix(plane(o), plane(o + over), w[2])
+    }
+}
+
+impl Cell {
+    /// [`Self::of`] for values side by side.
+    #[inline]
+    fn of_each<const N: usize>(&self, d: &[[f32; N]]) -> [f32; N] {
+        let (o, [step, up, over], w) = (self.corner, self.step, self.weight);
+        let mix =
+            |a: [f32; N], b: [f32; N], w: f32| -> [f32; N] { std::array::from_fn(|n| a[n] * (1.0 - w) + b[n] * w) };
         let line = |o: usize| mix(d[o], d[o + step], w[0]);
         let plane = |o: usize| mix(line(o), line(o + up), w[1]);
         mix(plane(o), plane(o + over), w[2])
@@ -260,29 +294,32 @@ fn cubic_weights(t: f64) -> [f32; 4] {
 
 fn cubic<S: Frame>(coefficients: &Volume<f32, S>, v: [f64; 3]) -> f32 {
     let dims = coefficients.grid.dims;
-    let mut index = [[0usize; 4]; 3];
-    let mut weight = [[0f32; 4]; 3];
-    for a in 0..3 {
+    let base = v.map(|x| x as u32 as isize - 1);
+    let weight: [[f32; 4]; 3] = std::array::from_fn(|a| cubic_weights(v[a] - (base[a] + 1) as f64));
+    // Mirrored at the outermost centres, as the coefficients were found.
+    let place = |a: usize, t: usize| {
         let n = dims[a] as isize;
-        let base = v[a].floor();
-        weight[a] = cubic_weights(v[a] - base);
-        for (t, slot) in index[a].iter_mut().enumerate() {
-            // Mirrored at the outermost centres, as the coefficients were found.
-            let p = base as isize - 1 + t as isize;
-            let p = if p < 0 { -p } else { p };
-            let p = if p >= n { 2 * n - 2 - p } else { p };
-            *slot = p.clamp(0, n - 1) as usize;
+        let p = (base[a] + t as isize).abs();
+        let p = if p >= n { 2 * n - 2 - p } else { p };
+        p.clamp(0, n - 1) as usize
+    };
+    let within = (0..3).all(|a| base[a] >= 0 && base[a] + 4 <= dims[a] as isize);
+    // Four neighbours along x at a time, closed along x at the end.
+    let mut sums = [0f32; 4];
+    for (c, wz) in weight[2].iter().enumerate() {
+        for (b, wy) in weight[1].iter().enumerate() {
+            let row = coefficients.grid.index(0, place(1, b), place(2, c));
+            let four: [f32; 4] = if within {
+                let first = row + base[0] as usize;
+                coefficients.data[first..first + 4].try_into().expect("four of them")
+            } else {
+                std::array::from_fn(|t| coefficients.data[row + place(0, t)])
+            };
+            let w = wy * wz;
+            sums.iter_mut().zip(four).for_each(|(sum, x)| *sum += w * x);
         }
     }
-    let mut sum = 0.0;
-    for (k, wk) in index[2].iter().zip(weight[2]) {
-        for (j, wj) in index[1].iter().zip(weight[1]) {
-            let row = &coefficients.data[coefficients.grid.index(0, *j, *k)..][..dims[0]];
-            let line: f32 = index[0].iter().zip(weight[0]).map(|(&i, w)| w * row[i]).sum();
-            sum += wk * wj * line;
-        }
-    }
-    sum
+    sums.iter().zip(weight[0]).map(|(sum, w)| w * sum).sum()
 }
 
 /// Coefficients of the cubic B-spline that passes through the values, mirrored at the border.

@@ -3,6 +3,7 @@
 use super::head;
 use super::pyramid::reduced_to;
 use crate::geometry::{Native, RigidTransform};
+use crate::image::blocks::on_finer_grid;
 use crate::image::gaussian::gaussian;
 use crate::image::{Mask, Volume};
 use rayon::prelude::*;
@@ -21,7 +22,7 @@ pub fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
     const SIGMA_MM: f64 = 30.0;
     /// What stands for the head's brightness where there is no head nearby.
     const FLOOR: f32 = 0.02;
-    let lowest = head::range_of(image.data.iter().copied(), 0.0, 1.0)[0].min(0.0);
+    let lowest = head::range_of(&image.data, 0.0, 1.0)[0].min(0.0);
     let image = image.map(|x| x - lowest);
     let mut flat = reduced_to(&image, SPACING_MM);
     let coarse = flat.clone();
@@ -43,38 +44,16 @@ pub fn without_gain(image: &Volume<f32, Native>) -> Volume<f32, Native> {
     divided_by(&image, &gain)
 }
 
-/// The image over a gain that is known on a coarser grid of the same axes, read linearly; beyond it the gain's outermost values count.
+/// The image over a gain that is known on a coarser grid of the same axes.
 fn divided_by(image: &Volume<f32, Native>, gain: &Volume<f32, Native>) -> Volume<f32, Native> {
-    let to_gain = gain.grid.voxel_from_mm() * image.grid.mm_from_voxel;
-    // Axis by axis: the voxels of the gain on both sides, and the share of the upper one.
-    let [along_x, along_y, along_z] = [0, 1, 2].map(|a| {
-        let last = gain.grid.dims[a] - 1;
-        let place = |i: usize| {
-            let x = (to_gain[(a, a)] * i as f64 + to_gain[(a, 3)]).clamp(0.0, last as f64);
-            let low = x as usize;
-            (low, (low + 1).min(last), (x - low as f64) as f32)
-        };
-        (0..image.grid.dims[a]).map(place).collect::<Vec<(usize, usize, f32)>>()
-    });
-    let (nx, ny) = (image.grid.dims[0], image.grid.dims[1]);
-    let row_of = |j: usize, k: usize| &gain.data[gain.grid.index(0, j, k)..][..gain.grid.dims[0]];
-    let mix = |low: f32, high: f32, share: f32| low * (1.0 - share) + high * share;
-    let mut out = image.clone();
-    out.data.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
-        let ((j0, j1, v), (k0, k1, w)) = (along_y[row % ny], along_z[row / ny]);
-        let rows = [row_of(j0, k0), row_of(j1, k0), row_of(j0, k1), row_of(j1, k1)];
-        let across = |i: usize| mix(mix(rows[0][i], rows[1][i], v), mix(rows[2][i], rows[3][i], v), w);
-        let line: Vec<f32> = (0..rows[0].len()).map(across).collect();
-        for (value, (i0, i1, u)) in values.iter_mut().zip(&along_x) {
-            *value /= mix(line[*i0], line[*i1], *u);
-        }
-    });
+    let mut out = on_finer_grid(gain, &image.grid);
+    out.data.par_iter_mut().zip(&image.data).for_each(|(gain, value)| *gain = value / *gain);
     out
 }
 
 /// All that is brighter than air. In logarithms the air stays apart from a brain that is a tenth as bright as the scalp.
 pub(super) fn not_air(image: &Volume<f32, Native>) -> Mask<Native> {
-    let unit = 0.01 * head::range_of(image.data.iter().copied(), 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
+    let unit = 0.01 * head::range_of(&image.data, 0.0, 0.999)[1].max(f32::MIN_POSITIVE);
     let logarithm = image.map(|x| (1.0 + x.max(0.0) / unit).ln());
     let [_, threshold] = head::otsu(&logarithm.data);
     logarithm.map(|x| x > threshold)

@@ -3,6 +3,7 @@
 use crate::geometry::Native;
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 /// Foreground lies within this distance of something brighter than half of Otsu's threshold.
 const MARGIN_MM: f64 = 8.0;
@@ -26,7 +27,7 @@ fn half_otsu(values: &[f32]) -> f32 {
 
 /// The smallest value and the threshold that best separates two classes (Otsu 1979).
 pub(super) fn otsu(values: &[f32]) -> [f32; 2] {
-    let [low, high] = range_of(values.iter().copied(), 0.0, 0.999);
+    let [low, high] = range_of(values, 0.0, 0.999);
     let mut histogram = [0f64; BINS];
     for &x in values {
         let b = (x - low) / (high - low) * BINS as f32;
@@ -50,19 +51,16 @@ pub(super) fn otsu(values: &[f32]) -> [f32; 2] {
 }
 
 /// Two quantiles of the values, always apart; at most about 200 000 values are looked at.
-pub(super) fn range_of(values: impl Iterator<Item = f32>, low: f64, high: f64) -> [f32; 2] {
-    let mut sorted: Vec<f32> = values.collect();
-    if sorted.len() > 200_000 {
-        let stride = sorted.len().div_ceil(200_000);
-        sorted = sorted.into_iter().step_by(stride).collect();
-    }
-    if sorted.is_empty() {
+pub(super) fn range_of(values: &[f32], low: f64, high: f64) -> [f32; 2] {
+    let stride = values.len().div_ceil(200_000).max(1);
+    let mut values: Vec<f32> = values.iter().copied().step_by(stride).collect();
+    if values.is_empty() {
         return [0.0, 1.0];
     }
-    sorted.sort_unstable_by(f32::total_cmp);
-    let quantile = |q: f64| sorted[((sorted.len() - 1) as f64 * q).round() as usize];
-    let [a, b] = [quantile(low), quantile(high)];
-    if b > a { [a, b] } else { [a, sorted[sorted.len() - 1].max(a + 1e-3 * a.abs().max(1.0))] }
+    let last = values.len() - 1;
+    let mut quantile = |q: f64| *values.select_nth_unstable_by((last as f64 * q).round() as usize, f32::total_cmp).1;
+    let [a, b] = [low, high].map(&mut quantile);
+    if b > a { [a, b] } else { [a, quantile(1.0).max(a + 1e-3 * a.abs().max(1.0))] }
 }
 
 /// The range of nearly all values inside a region (given on any grid).
@@ -74,13 +72,14 @@ pub(super) fn range_inside(image: &Volume<f32, Native>, region: &Mask<Native>) -
 pub(super) fn range_within(image: &Volume<f32, Native>, region: &Mask<Native>, low: f64, high: f64) -> [f32; 2] {
     let to_region = region.grid.voxel_from_mm() * image.grid.mm_from_voxel;
     let stride = (image.grid.len() / 400_000).max(1);
-    let values = (0..image.grid.len()).step_by(stride).filter_map(|index| {
+    let inside = |index: usize| {
         let [i, j, k] = image.grid.voxel(index);
         let p = to_region.transform_point(&Point3::new(i as f64, j as f64, k as f64));
         let inside = region.get(p.x.round() as isize, p.y.round() as isize, p.z.round() as isize);
         inside.unwrap_or(false).then_some(image.data[index])
-    });
-    range_of(values, low, high)
+    };
+    let looked_at = (0..image.grid.len().div_ceil(stride)).into_par_iter();
+    range_of(&looked_at.filter_map(|n| inside(n * stride)).collect::<Vec<f32>>(), low, high)
 }
 
 /// Centre of the region's upper part, in mm.

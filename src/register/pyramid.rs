@@ -5,21 +5,22 @@ use crate::geometry::Native;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix4, Point3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// The image with every axis reduced by the whole factor that brings its spacing nearest to `spacing_mm`; axes that
 /// are already as coarse stay as they are.
 pub(super) fn reduced_to(image: &Volume<f32, Native>, spacing_mm: f64) -> Volume<f32, Native> {
     let spacing = image.grid.spacing_mm();
-    let mut out = image.clone();
+    let mut out = Cow::Borrowed(image);
     for axis in 0..3 {
         let factor = (spacing_mm / spacing[axis]).round().max(1.0) as usize;
         // Keep a few slices, however thin the slab.
         let factor = factor.min((image.grid.dims[axis] / 4).max(1));
         if factor > 1 {
-            out = reduced_along(&out, axis, factor);
+            out = Cow::Owned(reduced_along(&out, axis, factor));
         }
     }
-    out
+    out.into_owned()
 }
 
 /// One axis reduced by `factor`: a Gaussian of sigma `factor / 2` voxels, read at the centres of groups of `factor`
@@ -46,12 +47,17 @@ fn reduced_along(image: &Volume<f32, Native>, axis: usize, factor: usize) -> Vol
     dims[axis] = n_out;
     let mut data = vec![0f32; dims.iter().product()];
     data.par_chunks_mut(dims[0] * dims[1]).enumerate().for_each(|(k, slice)| {
+        let mut padded = Vec::new();
         for (j, row) in slice.chunks_mut(dims[0]).enumerate() {
+            if axis == 0 {
+                let line = &image.data[nx * (j + ny * k)..][..nx];
+                padded.clear();
+                padded.extend((0..(n_out - 1) * factor + weights.len()).map(|t| line[source(0, t)]));
+            }
             for (tap, &w) in weights.iter().enumerate() {
                 if axis == 0 {
-                    let line = &image.data[nx * (j + ny * k)..][..nx];
-                    for (i, out) in row.iter_mut().enumerate() {
-                        *out += w * line[source(i, tap)];
+                    for (out, x) in row.iter_mut().zip(padded[tap..].iter().step_by(factor)) {
+                        *out += w * x;
                     }
                 } else {
                     let (jj, kk) = if axis == 1 { (source(j, tap), k) } else { (j, source(k, tap)) };

@@ -21,6 +21,7 @@ use super::search::{Freedom, Level, Measure, Reach, TETHER, coarse, optimise, ra
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
 /// Resolutions: for the starts, for the judgement, for the result.
 const LEVELS_MM: [f64; 3] = [8.0, 4.0, 2.0];
@@ -337,13 +338,13 @@ pub(super) fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
         let known = subject.known[1].as_ref().is_none_or(|k| k.nearest(p).unwrap_or(false));
         if known { image.trilinear(p) } else { None }
     };
-    let seen: Vec<Option<f32>> = (0..grid.len()).map(read).collect();
+    let seen: Vec<Option<f32>> = (0..grid.len()).into_par_iter().map(read).collect();
     let weight: Vec<f32> = seen.iter().map(|x| f32::from(u8::from(x.is_some()))).collect();
     let moved: Vec<f32> = seen.iter().map(|x| x.unwrap_or(0.0)).collect();
     // Contrast below 2 % of what the brain and its rim show is noise.
     let noise = |values: &[f32]| {
-        let inside = values.iter().zip(&weight).filter(|(_, w)| **w > 0.0).map(|(x, _)| *x);
-        let [low, high] = head::range_of(inside, 0.02, 0.98);
+        let inside: Vec<f32> = values.iter().zip(&weight).filter(|(_, w)| **w > 0.0).map(|(x, _)| *x).collect();
+        let [low, high] = head::range_of(&inside, 0.02, 0.98);
         0.02 * (high - low)
     };
     let noises = [noise(&template.data), noise(&moved)];

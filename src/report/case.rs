@@ -44,12 +44,11 @@ fn shift_of(case: &Case<'_>, shift: Option<&BrainShift>) -> Result<Option<ShiftF
 fn scans_of(case: &Case<'_>, images: Option<&CaseImages>) -> Result<CasePage, ReportError> {
     let Some(images) = images else { return Ok(CasePage::default()) };
     let seen = case.bytes(layout::SAG)?.map(|bytes| nifti::decode_displacement(&bytes, layout::SAG)).transpose()?;
-    Ok(CasePage {
-        glance: glance_figure(images, seen.map(Volume::relabelled).as_ref()),
-        registration: images.registration(),
-        mosaics: images.mosaics(),
-        ..CasePage::default()
-    })
+    let (glance, (registration, mosaics)) = rayon::join(
+        || glance_figure(images, seen.map(Volume::relabelled).as_ref()),
+        || rayon::join(|| images.registration(), || images.mosaics()),
+    );
+    Ok(CasePage { glance, registration, mosaics, ..CasePage::default() })
 }
 
 /// The sections of the samples or the estimate; what of them is not there is named.

@@ -142,9 +142,12 @@ impl Case<'_> {
 
     /// The images in the MNI frame; `None` without the pre-operative image and its brain.
     pub(super) fn images(&self) -> Result<Option<CaseImages>, ReportError> {
-        let (pre, post) = rayon::join(
-            || self.masked_image(layout::PRE_T1, layout::PRE_BRAIN),
-            || self.masked_image(layout::POST_T1, layout::POST_BRAIN),
+        let ((pre, labels), (post, (resected, cavity))) = rayon::join(
+            || (self.masked_image(layout::PRE_T1, layout::PRE_BRAIN), self.labels(layout::PRE_LABELS)),
+            || {
+                let masks = || (self.mask(layout::RESECTED), self.mask(layout::CAVITY));
+                (self.masked_image(layout::POST_T1, layout::POST_BRAIN), masks())
+            },
         );
         let Some((pre, pre_brain)) = pre? else { return Ok(None) };
         let pre_from_post = self.transform::<Post, Pre>(layout::PRE_FROM_POST_TEXT)?;
@@ -157,9 +160,9 @@ impl Case<'_> {
             pre,
             pre_brain,
             post: post?,
-            labels: self.labels(layout::PRE_LABELS)?,
-            resected: self.mask(layout::RESECTED)?,
-            cavity: self.mask(layout::CAVITY)?,
+            labels: labels?,
+            resected: resected?,
+            cavity: cavity?,
             registered_from_scanned,
         }))
     }

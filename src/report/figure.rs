@@ -4,6 +4,7 @@ use super::slice::{self, PLANES, Plane, Tile};
 use crate::geometry::{Mni, Position, RigidTransform};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::segment::label;
+use rayon::prelude::*;
 
 /// What an outline surrounds; decides its colour and its dashes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -211,14 +212,14 @@ impl CaseImages {
         masks: &Outlined<'_>,
     ) -> Option<Mosaic> {
         let window = slice::window(image, shown)?;
-        let mut tiles = Vec::new();
-        for plane in PLANES {
-            for at in self.positions(plane, bounds, 6) {
-                let tile = slice::tile(plane, at, bounds, 4.0, STEP_MM);
-                let layers = vec![slice::png::<Mni, Mni>(&tile, image, shown, window, |p| p)];
-                tiles.push(TileFigure { tile, layers, outlines: outlines(&tile, masks) });
-            }
-        }
+        let at = |plane| self.positions(plane, bounds, 6).into_iter().map(move |at| (plane, at));
+        let places: Vec<(Plane, f64)> = PLANES.into_iter().flat_map(at).collect();
+        let shown_at = |(plane, at)| {
+            let tile = slice::tile(plane, at, bounds, 4.0, STEP_MM);
+            let layers = vec![slice::png::<Mni, Mni>(&tile, image, shown, window, |p| p)];
+            TileFigure { tile, layers, outlines: outlines(&tile, masks) }
+        };
+        let tiles: Vec<TileFigure> = places.into_par_iter().map(shown_at).collect();
         let structures = structures(&tiles);
         Some(Mosaic { title: title.to_owned(), caption: caption.to_owned(), structures, tiles })
     }

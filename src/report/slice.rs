@@ -137,9 +137,8 @@ pub fn positions_mm(plane: Plane, bounds_mm: [[f64; 3]; 2], count: usize, share:
 pub fn window<F: Frame>(volume: &Volume<f32, F>, mask: &Mask<F>) -> Option<[f32; 2]> {
     let mut values: Vec<f32> =
         volume.data.iter().zip(&mask.data).filter(|(v, m)| **m && v.is_finite()).map(|(v, _)| *v).collect();
-    values.sort_unstable_by(f32::total_cmp);
     let last = values.len().checked_sub(1)?;
-    let at = |q: f64| values[(q * last as f64).round() as usize];
+    let mut at = |q: f64| *values.select_nth_unstable_by((q * last as f64).round() as usize, f32::total_cmp).1;
     let [low, high] = [at(0.005), at(0.995)];
     // Black is kept for what lies outside the mask and for fluid near zero.
     (high > low).then_some([low.min(0.25 * high), high + 0.15 * (high - low)])

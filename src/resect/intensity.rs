@@ -1,10 +1,9 @@
 //! The post-operative intensities on the pre-operative scale.
 
 use crate::geometry::Mni;
+use crate::image::blocks::{block_means, on_finer_grid};
 use crate::image::gaussian::gaussian;
-use crate::image::resample::resample_together;
-use crate::image::{Grid, Mask, Volume};
-use nalgebra::{Matrix4, Vector3};
+use crate::image::{Mask, Volume};
 
 /// Divides `post` by the smooth ratio post/pre seen over `tissue`, so that what has not changed has the pre-operative
 /// intensity and thresholds learnt on `pre` hold: scanner gain, bias of either coil and contrast in one step.
@@ -30,38 +29,18 @@ pub fn on_the_scale_of(
     // Half and double are wide for a bias of 30 % either way; the second limit is what tissue contrast allows.
     for limit in [std::f32::consts::LN_2, 0.25] {
         let near = |n: usize| tissue.data[n] && (log_ratio[n] - expected.data[n]).abs() < limit;
-        let weight = Volume::from_fn(pre.grid, |n| f32::from(near(n)));
-        let weighted = Volume::from_fn(pre.grid, |n| if near(n) { log_ratio[n] - median } else { 0.0 });
-        let [weight, weighted] = [weight, weighted].map(|v| gaussian(&block_means(&v, factor), sigma_mm));
+        let weight = block_means(&pre.grid, factor, |n| f32::from(near(n)));
+        let weighted = block_means(&pre.grid, factor, |n| if near(n) { log_ratio[n] - median } else { 0.0 });
+        let [weight, weighted] = [weight, weighted].map(|v| gaussian(&v, sigma_mm));
         // The small weight draws places without tissue to the median.
         let smooth = Volume::from_fn(weight.grid, |n| median + weighted.data[n] / (weight.data[n] + 1e-3));
-        [expected] = resample_together([&smooth], &pre.grid, |p| p, [median]);
+        expected = on_finer_grid(&smooth, &pre.grid);
     }
     Volume::from_fn(post.grid, |n| post.data[n] / expected.data[n].exp())
 }
 
 /// A Gaussian is smoothed on blocks this much smaller than its standard deviation.
 const BLOCKS_PER_SIGMA: f64 = 6.0;
-
-/// Means over blocks of `factor` voxels along each axis; what of a block lies beyond the grid counts as 0.
-fn block_means(volume: &Volume<f32, Mni>, factor: usize) -> Volume<f32, Mni> {
-    let [nx, ny, nz] = volume.grid.dims;
-    let dims = volume.grid.dims.map(|n| n.div_ceil(factor));
-    let centre = (factor as f64 - 1.0) / 2.0;
-    let fine_from_coarse = Matrix4::new_scaling(factor as f64).append_translation(&Vector3::repeat(centre));
-    let Some(grid) = Grid::new(dims, volume.grid.mm_from_voxel * fine_from_coarse) else { return volume.clone() };
-    Volume::from_fn(grid, |n| {
-        let [i, j, k] = grid.voxel(n).map(|c| c * factor);
-        let mut sum = 0f32;
-        for k in k..(k + factor).min(nz) {
-            for j in j..(j + factor).min(ny) {
-                let row = volume.grid.index(0, j, k);
-                sum += volume.data[row + i..row + (i + factor).min(nx)].iter().sum::<f32>();
-            }
-        }
-        sum / factor.pow(3) as f32
-    })
-}
 
 #[cfg(test)]
 mod tests {

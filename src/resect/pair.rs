@@ -7,14 +7,13 @@ use super::{
     CavityFinding, CavityPair, CavitySettings, Likeness, ResectError, apart_from, find_cavity, likeness,
     on_the_scale_of, subtract,
 };
-use crate::geometry::{Mni, Post, Pre, RigidTransform};
-use crate::image::resample::{Interpolation, resample};
+use crate::geometry::{Mni, Post, Pre};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
 use crate::segment::native::labels_on;
 use crate::segment::{
-    HeadError, Scale, SegmentOverrides, SegmentSettings, Segmentation, atlas, carried_priors, fit_template_to_labels,
-    label, segment_by_labels, segment_head, segment_with_priors,
+    HeadError, PosedScan, Scale, SegmentOverrides, SegmentSettings, Segmentation, carried_priors,
+    fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -161,18 +160,13 @@ pub enum PairError {
 /// # Errors
 /// [`PairError`], which names the scan.
 pub fn take_pair_apart(
-    pre: &Volume<f32, Pre>,
-    post: &Volume<f32, Post>,
-    pre_from_post: &RigidTransform<Post, Pre>,
-    mni_from_pre: &RigidTransform<Pre, Mni>,
+    pre: &PosedScan<'_, Pre>,
+    post: &PosedScan<'_, Post>,
     given: &GivenMasks,
     settings: &PairSettings,
     step: impl Fn(&'static str),
 ) -> Result<OperatedBrain, PairError> {
-    let mni_from_post = pre_from_post.then(mni_from_pre);
-    let grid = atlas::template().grid();
-
-    let likeness = likeness(pre, post, mni_from_pre, &mni_from_post);
+    let likeness = likeness(pre.t1, post.t1, &pre.mni_from_t1, &post.mni_from_t1);
     let by_hand = given.cavity.is_some() || given.resected.is_some();
     if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
         return Err(PairError::NotOnePerson { folds: found.folds });
@@ -185,28 +179,26 @@ pub fn take_pair_apart(
     };
     let HeadApart { pre: before, template_from_patient, scale } = match &given.head {
         Some(head) => head.clone(),
-        None => apart(take_head_apart(pre, mni_from_pre, given, settings)?),
+        None => apart(take_head_apart(pre, given, settings)?),
     };
 
     step("cavity");
-    let post_on_mni = resample(post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+    let (post_raw, post_known) = (post.on_template(), post.known());
     let by_hand = subtract(given.cavity.clone(), given.resected.clone(), &before.brain_mni, &before.labels_mni)?;
     let tissue = tissue_of(&before.labels_mni);
-    let known_tissue = both(&tissue, &post_on_mni.inside);
+    let known_tissue = both(&tissue, post_known);
     // Ratios of gain are those of the scans as they are; turning back is turning again.
     let as_scanned = before.t1_mni.map(|x| scale.of(x));
-    let post_raw = post_on_mni.volume.map(|x| x.max(0.0));
-    let alike = |pre: &Volume<f32, Mni>| on_the_scale_of(pre, &post_raw, &known_tissue, settings.cavity.bias_sigma_mm);
+    let alike = |pre: &Volume<f32, Mni>| on_the_scale_of(pre, post_raw, &known_tissue, settings.cavity.bias_sigma_mm);
     let post_t1 = if given.labels.is_some() {
         // Where labels were given no gain was looked for.
         alike(&as_scanned)
     } else {
         // What was taken out of one scan goes out of the other, around the brain as within it: a skull that is bright on one of
         // them alone would draw the brain to it, or away.
-        let pre_on_mni = resample(pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        let raw = pre_on_mni.volume.map(|x| x.max(0.0));
-        let post = alike(&raw);
-        Volume::from_fn(grid, |n| {
+        let raw = pre.on_template();
+        let post = alike(raw);
+        Volume::from_fn(raw.grid, |n| {
             if raw.data[n] > 0.0 { post.data[n] * (as_scanned.data[n] / raw.data[n]) } else { post.data[n] }
         })
     };
@@ -220,7 +212,7 @@ pub fn take_pair_apart(
             pre_labels: &before.labels_mni,
             pre_brain: &before.brain_mni,
             post: &post_t1,
-            post_known: &post_on_mni.inside,
+            post_known,
             csf_grey_border: before.csf_grey_border,
             grey_mean: before.tissue_means[1],
             grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
@@ -233,7 +225,7 @@ pub fn take_pair_apart(
         pre: &before.t1_mni,
         pre_brain: &before.brain_mni,
         post: &post_t1,
-        post_known: &post_on_mni.inside,
+        post_known,
         cavity: &finding.cavity,
     };
     let sag = fit_sag(&scans, &settings.sag)
@@ -248,7 +240,7 @@ pub fn take_pair_apart(
             tissue: &tissue.map(|share| share >= 0.5),
             brain: &brain.map(|share| share >= 0.5),
             post: &post_t1.cropped(&near),
-            post_known: &post_on_mni.inside.cropped(&near),
+            post_known: &post_known.cropped(&near),
             csf_grey_border: before.csf_grey_border,
             grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
         };
@@ -268,9 +260,9 @@ pub fn take_pair_apart(
     let after = if given.labels.is_some() && !as_in_t1 {
         // Without T1's contrast nothing is known of the tissue after the operation but where it went.
         let moved = labels_through(&before.labels_mni, &sag);
-        segment_by_labels(post, &mni_from_post, &labels_on(&moved, &post.grid, &mni_from_post)).0
+        segment_by_labels(post, &labels_on(&moved, &post.t1.grid, &post.mni_from_t1)).0
     } else {
-        segment_with_priors(post, &mni_from_post, &post_priors, &SegmentOverrides::default(), &settings.segment)
+        segment_with_priors(post, &post_priors, &SegmentOverrides::default(), &settings.segment)
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
@@ -296,19 +288,18 @@ pub fn take_pair_apart(
 /// # Errors
 /// [`PairError::Head`].
 pub fn take_head_apart(
-    pre: &Volume<f32, Pre>,
-    mni_from_pre: &RigidTransform<Pre, Mni>,
+    pre: &PosedScan<'_, Pre>,
     given: &GivenMasks,
     settings: &PairSettings,
 ) -> Result<(Segmentation<Pre>, AtlasFit<Mni>, Scale), PairError> {
     let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
     let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
     if let Some(labels) = &given.labels {
-        let (before, scale) = segment_by_labels(pre, mni_from_pre, labels);
+        let (before, scale) = segment_by_labels(pre, labels);
         let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
         return Ok((before, fit, scale));
     }
-    let head = segment_head(pre, mni_from_pre, &masks, &settings.deformable, &settings.segment);
+    let head = segment_head(pre, &masks, &settings.deformable, &settings.segment);
     let (before, fit) = head.map_err(in_pre)?;
     Ok((before, fit, Scale { turned_at: None }))
 }

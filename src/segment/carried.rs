@@ -1,10 +1,10 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::overhang::{beyond, onto_the_brain, short};
-use super::segmentation::{FoundBrain, Seen, labelled};
+use super::posed_scan::PosedScan;
+use super::segmentation::{FoundBrain, find_brain, labelled};
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, atlas};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
-use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume, blank_slices, with_filled};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head, without_gain};
@@ -87,7 +87,7 @@ pub fn fit_template<F: Frame>(
     mni_from_t1: &RigidTransform<F, Mni>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<Mni>, DeformableError> {
-    Ok(Carried::onto(t1, mni_from_t1, settings)?.fit)
+    Ok(Carried::onto(&PosedScan::new(t1, mni_from_t1), settings)?.fit)
 }
 
 /// A way to a larger template.
@@ -127,27 +127,23 @@ impl Carried {
     /// The fit from the stretch that was found, with the coil's gain taken out: it bends what is compared at coarse levels,
     /// and where it leaves the crown dim the surface would be drawn in. Where the fit is doubtful, also with the head as it
     /// is and from the mean head's size.
-    fn onto<F: Frame>(
-        t1: &Volume<f32, F>,
-        mni_from_t1: &RigidTransform<F, Mni>,
-        settings: &DeformableSettings,
-    ) -> Result<Self, DeformableError> {
-        let affine = mni_from_t1.inverse().to_affine();
-        let grid = atlas::template().grid();
-        let on_grid = resample(t1, &grid, &affine, Interpolation::Linear, f32::NAN);
-        let (subject, known) = (on_grid.volume, on_grid.inside);
-        let finite = subject.map(|x| if x.is_finite() { x } else { 0.0 });
-        let start = if settings.affine { stretch(&finite, &known) } else { AffineTransform::identity() };
-        let flat = without_gain(&finite.relabelled());
-        let flat = Volume::from_fn(grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
-        let first = Self::from(flat, start, settings)?;
+    fn onto<F: Frame>(scan: &PosedScan<'_, F>, settings: &DeformableSettings) -> Result<Self, DeformableError> {
+        let (subject, known) = (scan.on_template(), scan.known());
+        let start = if settings.affine { stretch(subject, known) } else { AffineTransform::identity() };
+        let flat = without_gain(&subject.clone().relabelled());
+        let first = Self::from(where_known(&flat.relabelled(), known), start, settings)?;
         if !settings.affine || first.correlation() >= DOUBTFUL {
             return Ok(first);
         }
-        let best = first.or(Self::from(subject, start, settings)?);
+        let best = first.or(Self::from(where_known(subject, known), start, settings)?);
         let plain = Self::from(best.subject.clone(), atlas::head_from_template(), settings)?;
         Ok(best.or(plain))
     }
+}
+
+/// Not a number where nothing is known.
+fn where_known(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> Volume<f32, Mni> {
+    Volume::from_fn(subject.grid, |n| if known.data[n] { subject.data[n] } else { f32::NAN })
 }
 
 /// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
@@ -164,23 +160,22 @@ pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<
 
 /// A head on the template's grid, and what its brain is looked for with.
 struct BrainSearch<'a, F: Frame> {
-    seen: Seen,
-    mni_from_t1: &'a RigidTransform<F, Mni>,
+    scan: &'a PosedScan<'a, F>,
     /// The brain's mask where the user brought one.
     given: Option<&'a Mask<F>>,
     settings: &'a SegmentSettings,
 }
 
 /// The brain found with a carried template.
-struct FittedBrain {
+struct FittedBrain<'a> {
     carried: Carried,
-    found: FoundBrain,
+    found: FoundBrain<'a>,
     /// The template's maps; let go while another template is tried, since two of them at a time would be the peak of memory.
     priors: Option<AtlasPriors>,
     beyond: f64,
 }
 
-impl FittedBrain {
+impl FittedBrain<'_> {
     fn priors(&mut self) -> AtlasPriors {
         self.priors.take().unwrap_or_else(|| priors_of(&self.carried.fit))
     }
@@ -190,11 +185,11 @@ fn priors_of(fit: &AtlasFit<Mni>) -> AtlasPriors {
     carried_priors(|p| fit.atlas_from_subject.apply(p))
 }
 
-impl<F: Frame> BrainSearch<'_, F> {
-    fn with(&self, carried: Carried) -> Result<FittedBrain, SegmentError> {
+impl<'a, F: Frame> BrainSearch<'a, F> {
+    fn with(&self, carried: Carried) -> Result<FittedBrain<'a>, SegmentError> {
         let priors = priors_of(&carried.fit);
-        let found = self.seen.brain(self.mni_from_t1, &priors, self.given, self.settings)?;
-        let beyond = beyond(&found.brain, &self.seen.known, &priors).share;
+        let found = find_brain(self.scan, &priors, self.given, self.settings)?;
+        let beyond = beyond(&found.brain, self.scan.known(), &priors).share;
         Ok(FittedBrain { carried, found, priors: Some(priors), beyond })
     }
 
@@ -202,21 +197,20 @@ impl<F: Frame> BrainSearch<'_, F> {
     /// flattened without knowing where the brain lies, and what is left hides the contrast of its dim parts.
     fn with_the_coil_known(
         &self,
-        mut first: FittedBrain,
+        mut first: FittedBrain<'a>,
         deformable: &DeformableSettings,
-    ) -> Result<FittedBrain, HeadError> {
+    ) -> Result<FittedBrain<'a>, HeadError> {
         if !first.found.warnings.iter().any(|warning| matches!(warning, SegmentWarning::StrongGain { .. })) {
             return Ok(first);
         }
-        let (flat, known) = (&first.found.raw, &self.seen.known);
-        let subject = Volume::from_fn(flat.grid, |n| if known.data[n] { flat.data[n] } else { f32::NAN });
+        let subject = where_known(&first.found.raw, self.scan.known());
         first.priors = None;
         let again = Carried::from(subject, first.carried.start, deformable)?;
         if again.correlation() > first.carried.correlation() { Ok(self.with(again)?) } else { Ok(first) }
     }
 
     /// The template made larger for as long as brain is found beyond it and that helps.
-    fn grown(&self, mut best: FittedBrain, deformable: &DeformableSettings) -> Result<FittedBrain, HeadError> {
+    fn grown(&self, mut best: FittedBrain<'a>, deformable: &DeformableSettings) -> Result<FittedBrain<'a>, HeadError> {
         let mut settings = deformable.clone();
         for way in LARGER {
             if best.beyond < CROWDED {
@@ -257,22 +251,22 @@ impl<F: Frame> BrainSearch<'_, F> {
 /// # Errors
 /// [`HeadError`].
 pub fn segment_head<F: Frame>(
-    t1: &Volume<f32, F>,
-    mni_from_t1: &RigidTransform<F, Mni>,
+    scan: &PosedScan<'_, F>,
     overrides: &SegmentOverrides<'_, F>,
     deformable: &DeformableSettings,
     settings: &SegmentSettings,
 ) -> Result<(Segmentation<F>, AtlasFit<Mni>), HeadError> {
-    let gaps = blank_slices(t1, WIDEST_GAP_MM);
-    let filled = (!gaps.is_empty()).then(|| with_filled(t1, &gaps));
-    let t1 = filled.as_ref().unwrap_or(t1);
-    let carried = Carried::onto(t1, mni_from_t1, deformable)?;
+    settings.check()?;
+    let gaps = blank_slices(scan.t1, WIDEST_GAP_MM);
+    let filled = (!gaps.is_empty()).then(|| with_filled(scan.t1, &gaps));
+    let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &scan.mni_from_t1));
+    let scan = filled.as_ref().unwrap_or(scan);
+    let carried = Carried::onto(scan, deformable)?;
     let correlation = carried.correlation();
     if correlation < LEAST {
         return Err(HeadError::PoorFit { correlation, least: LEAST });
     }
-    let seen = Seen::of(t1, mni_from_t1, &atlas::template().grid(), settings)?;
-    let search = BrainSearch { seen, mni_from_t1, given: overrides.brain, settings };
+    let search = BrainSearch { scan, given: overrides.brain, settings };
     let mut best = search.with(carried)?;
     best = search.with_the_coil_known(best, deformable)?;
     if deformable.affine && overrides.brain.is_none() {
@@ -280,8 +274,8 @@ pub fn segment_head<F: Frame>(
     }
     let priors = best.priors();
     let FittedBrain { carried, found, .. } = best;
-    let mut segmentation = labelled(t1, mni_from_t1, found, &priors, overrides, settings)?;
-    segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &t1.grid)));
+    let mut segmentation = labelled(scan, found, &priors, overrides, settings)?;
+    segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));
     }
@@ -309,7 +303,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pre;
     use crate::image::Grid;
-    use crate::image::resample::resample_through;
+    use crate::image::resample::{Interpolation, resample_through};
     use nalgebra::{Matrix3, Point3, Vector3};
 
     /// The mean head a tenth smaller, turned by half a radian and moved, under a coil that sees one side twice as bright.

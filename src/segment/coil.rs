@@ -6,9 +6,10 @@
 
 use super::priors::AtlasPriors;
 use crate::geometry::Mni;
+use crate::image::blocks::{block_means, on_finer_grid};
 use crate::image::gaussian::gaussian;
 use crate::image::{Grid, Mask, Volume};
-use nalgebra::{Matrix4, Point3, Vector3, Vector4};
+use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// Brightness of CSF, grey and white matter on a T1-weighted scan, over white matter's. Differences between scanners are the
 /// same everywhere and average out.
@@ -66,7 +67,8 @@ pub(super) fn without_strong_gain(
     let mut flat = t1.clone();
     for _ in 0..ROUNDS {
         let log_gain = sloping(&flat, &grid, usual, inside, expected);
-        flat = Volume::from_fn(grid, |n| flat.data[n] * (-clamped(&log_gain, &grid, n)).exp());
+        let log_gain = on_finer_grid(&log_gain, &grid);
+        flat = Volume::from_fn(grid, |n| flat.data[n] * (-log_gain.data[n]).exp());
     }
     let flat = flat.map(|x| x * (mean as f32).exp());
     // One standard deviation to either side of a Gaussian leaves 16 % beyond each.
@@ -127,29 +129,8 @@ fn sloping(
 }
 
 /// Means of a function of the voxel over blocks.
-pub(super) fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync) -> Volume<f32, Mni> {
-    let dims = grid.dims.map(|n| n.div_ceil(BLOCK));
-    let half = 0.5 * (BLOCK as f64 - 1.0);
-    let to_fine = Matrix4::new_translation(&Vector3::repeat(half)) * Matrix4::new_scaling(BLOCK as f64);
-    let coarse = Grid::new(dims, grid.mm_from_voxel * to_fine).expect("a scaled grid is a grid");
-    Volume::from_fn(coarse, |n| {
-        let first = coarse.voxel(n).map(|v| v * BLOCK);
-        let end = [0, 1, 2].map(|a| (first[a] + BLOCK).min(grid.dims[a]));
-        let mut sum = 0.0;
-        for k in first[2]..end[2] {
-            for j in first[1]..end[1] {
-                sum += (first[0]..end[0]).map(|i| value(grid.index(i, j, k))).sum::<f32>();
-            }
-        }
-        sum / (BLOCK * BLOCK * BLOCK) as f32
-    })
-}
-
-/// The coarse volume at a voxel of the fine grid, linearly; its border is repeated outwards.
-pub(super) fn clamped(coarse: &Volume<f32, Mni>, grid: &Grid<Mni>, n: usize) -> f32 {
-    let voxel = coarse.grid.voxel_at(grid.centre(grid.voxel(n)));
-    let inside = Point3::from([0, 1, 2].map(|a| voxel[a].clamp(0.0, coarse.grid.dims[a] as f64 - 1.0)));
-    coarse.trilinear(coarse.grid.position(inside)).unwrap_or(0.0)
+pub(super) fn in_blocks(grid: &Grid<Mni>, value: impl Fn(usize) -> f32 + Sync + Send) -> Volume<f32, Mni> {
+    block_means(grid, BLOCK, value)
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! A scan of any contrast taken apart by a label map that somebody else made.
 
 use super::native::labels_on;
-use super::{Segmentation, TissueVolumes, atlas};
+use super::{PosedScan, Segmentation, TissueVolumes, atlas};
 use crate::anatomy::label;
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::components::fill_holes;
 use crate::image::morphology::close;
-use crate::image::resample::{Interpolation, resample, resample_nearest};
+use crate::image::resample::resample_nearest;
 use crate::image::{LabelMap, Mask, Volume};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
 use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head};
@@ -31,18 +31,13 @@ impl Scale {
 
 /// Labels, masks and intensities of a scan whose label map is given on any grid of the scan's frame; the intensities are
 /// turned where fluid is bright.
-pub fn segment_by_labels<F: Frame>(
-    scan: &Volume<f32, F>,
-    mni_from_scan: &RigidTransform<F, Mni>,
-    given: &LabelMap<F>,
-) -> (Segmentation<F>, Scale) {
-    let grid = atlas::template().grid();
-    let scan_from_mni = mni_from_scan.inverse();
-    let on_grid = resample(scan, &grid, &scan_from_mni.to_affine(), Interpolation::CubicBSpline, 0.0);
-    let labels = if given.grid.coincides(&scan.grid, 1e-3) {
+pub fn segment_by_labels<F: Frame>(scan: &PosedScan<'_, F>, given: &LabelMap<F>) -> (Segmentation<F>, Scale) {
+    let (raw, known) = (scan.on_template(), scan.known());
+    let (grid, scan_from_mni) = (raw.grid, scan.mni_from_t1.inverse());
+    let labels = if given.grid.coincides(&scan.t1.grid, 1e-3) {
         given.clone()
     } else {
-        labels_on(given, &scan.grid, &RigidTransform::identity())
+        labels_on(given, &scan.t1.grid, &RigidTransform::identity())
     };
     let drawn = labels_on(given, &grid, &scan_from_mni);
     let brain = whole_brain(&drawn);
@@ -53,10 +48,9 @@ pub fn segment_by_labels<F: Frame>(
         (false, _) => label::BACKGROUND,
     });
 
-    let raw = on_grid.volume.map(|x| x.max(0.0));
     let median = |of: &[u8]| {
         let mut values: Vec<f32> = (0..raw.data.len())
-            .filter(|&n| on_grid.inside.data[n] && of.contains(&labels_mni.data[n]))
+            .filter(|&n| known.data[n] && of.contains(&labels_mni.data[n]))
             .map(|n| raw.data[n])
             .collect();
         let middle = values.len() / 2;
@@ -75,7 +69,7 @@ pub fn segment_by_labels<F: Frame>(
         brain: labels.map(|l| l > 0),
         labels,
         t1_mni: raw.map(|x| scale.of(x)),
-        known_mni: on_grid.inside,
+        known_mni: known.clone(),
         tissue_means: [fluid, grey, white],
         // The nearer of the two tissues to fluid bounds what is fluid.
         csf_grey_border: 0.5 * (fluid + grey.min(white)),
@@ -183,7 +177,7 @@ mod tests {
         let same = RigidTransform::identity();
         let t2 = t1.map(|x| if x > 0.0 { 260.0 - x } else { 0.0 });
         for (scan, turned) in [(&t1, false), (&t2, true)] {
-            let (found, scale) = segment_by_labels(scan, &same, &labels);
+            let (found, scale) = segment_by_labels(&PosedScan::new(scan, &same), &labels);
             assert_eq!(scale.turned_at.is_some(), turned);
             let [fluid, grey, white] = found.tissue_means;
             assert!(

@@ -76,21 +76,22 @@ pub(super) fn fit_mixture(
 ) -> Option<Mixture> {
     let grid = t1.grid;
     let on_stride = |n: usize| settings.stride == 1 || grid.voxel(n).iter().all(|&x| x % settings.stride == 0);
-    let voxels: Vec<u32> = (0..grid.len()).filter(|&n| region.data[n] && on_stride(n)).map(|n| n as u32).collect();
+    let within = |n: &u32| region.data[*n as usize] && on_stride(*n as usize);
+    let voxels: Vec<u32> = (0..grid.len() as u32).into_par_iter().filter(within).collect();
     if voxels.len() < 1000 {
         return None;
     }
-    let places: Vec<[usize; 3]> = voxels.iter().map(|&n| grid.voxel(n as usize)).collect();
-    let raw: Vec<f32> = voxels.iter().map(|&n| t1.data[n as usize]).collect();
+    let places: Vec<[usize; 3]> = voxels.par_iter().map(|&n| grid.voxel(n as usize)).collect();
+    let raw: Vec<f32> = voxels.par_iter().map(|&n| t1.data[n as usize]).collect();
     let believed: Vec<[f32; CLASSES]> =
-        voxels.iter().map(|&n| prior_at(priors, n as usize, settings.disbelief)).collect();
+        voxels.par_iter().map(|&n| prior_at(priors, n as usize, settings.disbelief)).collect();
     let neighbours = if settings.neighbour_weight > 0.0 && settings.stride == 1 {
         neighbour_slots(grid.dims, &voxels)
     } else {
         Vec::new()
     };
 
-    let typical: Vec<bool> = voxels.iter().map(|&n| priors.deep_grey.data[n as usize] < 0.25).collect();
+    let typical: Vec<bool> = voxels.par_iter().map(|&n| priors.deep_grey.data[n as usize] < 0.25).collect();
     let (mut means, mut deviations) = begun.map_or_else(|| start(&raw, &believed), |b| (b.means, b.deviations));
     let mut bias = begun.map_or_else(|| LogBias::flat(grid.dims), |b| b.bias.clone());
     let mut corrected: Vec<f32> = if begun.is_some() {
@@ -98,8 +99,8 @@ pub(super) fn fit_mixture(
     } else {
         raw.clone()
     };
-    let fluid: Vec<usize> =
-        (0..voxels.len()).filter(|&n| priors.ventricle_mm.data[voxels[n] as usize] < -VENTRICLE_DEPTH_MM).collect();
+    let in_ventricle = |n: &usize| priors.ventricle_mm.data[voxels[*n] as usize] < -VENTRICLE_DEPTH_MM;
+    let fluid: Vec<usize> = (0..voxels.len()).into_par_iter().filter(in_ventricle).collect();
     let mut contents = believed.clone();
     let iterations = if begun.is_some() { settings.iterations.min(LAST_ITERATIONS) } else { settings.iterations };
     for iteration in 0..iterations {
@@ -276,15 +277,16 @@ impl Moments {
 fn log_ratios(
     places: &[[usize; 3]],
     raw: &[f32],
-    pure: impl Fn(usize) -> [f64; CLASSES],
+    pure: impl Fn(usize) -> [f64; CLASSES] + Sync,
     means: &[f64; CLASSES],
     deviations: &[f64; CLASSES],
 ) -> Vec<LogRatio> {
     // Some hundred thousand observations are plenty for 19 unknowns.
     let step = 1 + places.len() / 150_000;
-    (0..places.len())
-        .step_by(step)
+    (0..places.len().div_ceil(step))
+        .into_par_iter()
         .filter_map(|n| {
+            let n = n * step;
             let value = f64::from(raw[n]);
             if value <= 0.0 {
                 return None;

@@ -14,6 +14,7 @@ mod mixture;
 pub mod native;
 mod noise;
 mod overhang;
+mod posed_scan;
 mod priors;
 mod segmentation;
 mod sulci;
@@ -26,6 +27,7 @@ pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment
 pub use import::{ImportError, ImportedLabels, import_labels};
 pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
 pub use overhang::VaultPart;
+pub use posed_scan::PosedScan;
 pub use priors::AtlasPriors;
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,

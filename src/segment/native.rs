@@ -46,7 +46,7 @@ pub fn mask_on<S: Frame, T: Frame>(
 
 /// What `value_of` makes of the values and weights of the eight corners around each voxel of `target`, or their value where
 /// they have but one.
-fn carried<V: Copy + PartialEq + Send + Sync, S: Frame, T: Frame>(
+fn carried<V: Copy + Default + PartialEq + Send + Sync, S: Frame, T: Frame>(
     source: &Volume<V, S>,
     target: &Grid<T>,
     source_from_target: &RigidTransform<T, S>,
@@ -56,15 +56,15 @@ fn carried<V: Copy + PartialEq + Send + Sync, S: Frame, T: Frame>(
     let m: Matrix4<f64> = source.grid.voxel_from_mm() * source_from_target.to_matrix() * target.mm_from_voxel;
     let [nx, ny, _] = target.dims;
     let dims = source.grid.dims;
-    if dims.contains(&0) {
-        return;
-    }
+    // Further than a voxel from everything that is labelled there is nothing, as `out` holds it.
+    let Some(labelled) = source.map(|value| value != V::default()).bounding_box() else { return };
+    let (first, end) = (labelled.first.map(|v| v as f64 - 1.0), labelled.end.map(|v| v as f64));
     out.data.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, plane)| {
         for (n, value) in plane.iter_mut().enumerate() {
             let p = m.transform_point(&Point3::new((n % nx) as f64, (n / nx) as f64, k as f64));
             let c = [p.x, p.y, p.z];
             // Half a voxel beyond the outermost centres still belongs to the outermost voxels.
-            if (0..3).any(|a| !(c[a] >= -0.5 && c[a] <= dims[a] as f64 - 0.5)) {
+            if (0..3).any(|a| !(c[a] >= first[a].max(-0.5) && c[a] <= end[a].min(dims[a] as f64 - 0.5))) {
                 continue;
             }
             let (mut low, mut high, mut w) = ([0; 3], [0; 3], [0.0; 3]);

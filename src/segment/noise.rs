@@ -4,10 +4,11 @@
 //! shadow the scan's noise has been made brighter with the rest: so many voxels of the cortex then fall out of the window
 //! that nothing hangs together, and the crown would be lost in a scan that shows it plainly.
 
-use super::coil::{clamped, in_blocks};
+use super::coil::in_blocks;
 use super::mixture::Mixture;
 use super::priors::AtlasPriors;
 use crate::geometry::Mni;
+use crate::image::blocks::on_finer_grid;
 use crate::image::gaussian::gaussian;
 use crate::image::{Mask, Volume};
 
@@ -47,10 +48,8 @@ pub(super) fn calmed(
     if excess.data.iter().all(|&x| x == 0.0) {
         return None;
     }
-    Some(Volume::from_fn(grid, |n| {
-        let share = clamped(&excess, &grid, n);
-        t1.data[n] + share * (averaged.data[n] - t1.data[n])
-    }))
+    let share = on_finer_grid(&excess, &grid);
+    Some(Volume::from_fn(grid, |n| t1.data[n] + share.data[n] * (averaged.data[n] - t1.data[n])))
 }
 
 #[cfg(test)]

@@ -6,9 +6,10 @@ use crate::geometry::{Mni, Position};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::close;
-use crate::image::resample::resample_together;
+use crate::image::resample::resample_each;
 use crate::image::{Grid, Volume, VoxelBox};
 use nalgebra::Point3;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Widest distance outside the brain that the fields know, in mm.
@@ -30,49 +31,39 @@ pub struct AtlasPriors {
     pub deep_grey: Volume<f32, Mni>,
 }
 
-/// The fields on the template's own grid, before any warp.
-struct TemplateFields {
-    brain_mm: Volume<f32, Mni>,
-    tissue: [Volume<f32, Mni>; 3],
-    ventricle_mm: Volume<f32, Mni>,
-    cistern_mm: Volume<f32, Mni>,
-    deep_grey: Volume<f32, Mni>,
-}
+/// Maps of the template on its own grid, side by side: one reading of eight corners then brings them all.
+const MAPS: usize = 8;
+/// The first of them are the probabilities of CSF, grey and white matter,
+const TISSUES: usize = 3;
+/// the next is the distance to the brain's surface.
+const BRAIN_MM: usize = TISSUES;
+/// What they are outside the template; the last is there for the sake of whole vectors.
+const OUTSIDE: [f32; MAPS] = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM, 0.0, 0.0];
 
-fn template_fields() -> &'static TemplateFields {
-    static FIELDS: OnceLock<TemplateFields> = OnceLock::new();
-    FIELDS.get_or_init(|| {
+fn template_maps() -> &'static Volume<[f32; MAPS], Mni> {
+    static MAPS_OF_TEMPLATE: OnceLock<Volume<[f32; MAPS], Mni>> = OnceLock::new();
+    MAPS_OF_TEMPLATE.get_or_init(|| {
         let atlas = atlas::template();
-        let tissue_sum: Vec<f32> = (atlas.grey.data.iter().zip(&atlas.white.data))
-            .map(|(&g, &w)| (f32::from(g) + f32::from(w)) / 255.0)
-            .collect();
+        let tissue = |n: usize| (f32::from(atlas.grey.data[n]) + f32::from(atlas.white.data[n])) / 255.0;
         // The template's T1 reaches about a voxel past the pia: there grey and white together are below one half.
-        let solid = Volume::from_data(atlas.grid(), tissue_sum.iter().map(|&p| p >= 0.5).collect());
-        let mut brain = close(&solid, 6.0);
-        for (inside, &t1) in brain.data.iter_mut().zip(&atlas.t1.data) {
-            *inside &= t1 > 0;
-        }
-        let csf = (tissue_sum.iter().zip(&atlas.t1.data))
-            .map(|(&p, &t1)| if t1 > 0 { (1.0 - p).max(0.0) } else { 0.0 })
-            .collect();
-        let distance = |l: u8| signed_distance_mm(&atlas.labels.map(|v| v == l)).map(|d| d.min(FAR_MM));
-        TemplateFields {
-            brain_mm: signed_distance_mm(&brain).map(|d| d.min(FAR_MM)),
-            tissue: [
-                Volume::from_data(atlas.grid(), csf),
-                atlas.grey.map(|v| f32::from(v) / 255.0),
-                atlas.white.map(|v| f32::from(v) / 255.0),
-            ],
-            ventricle_mm: distance(label::VENTRICLE),
-            cistern_mm: distance(label::CSF),
-            deep_grey: gaussian(&atlas::deep_grey().map(|inside| f32::from(u8::from(inside))), 1.0),
-        }
+        let closed = close(&Volume::from_fn(atlas.grid(), |n| tissue(n) >= 0.5), 6.0);
+        let brain = Volume::from_fn(atlas.grid(), |n| closed.data[n] && atlas.t1.data[n] > 0);
+        let brain_mm = signed_distance_mm(&brain);
+        let [ventricle_mm, cistern_mm] =
+            [label::VENTRICLE, label::CSF].map(|l| signed_distance_mm(&atlas.labels.map(|v| v == l)));
+        let deep_grey = gaussian(&atlas::deep_grey().map(|inside| f32::from(u8::from(inside))), 1.0);
+        Volume::from_fn(atlas.grid(), |n| {
+            let csf = if atlas.t1.data[n] > 0 { (1.0 - tissue(n)).max(0.0) } else { 0.0 };
+            let [grey, white] = [&atlas.grey, &atlas.white].map(|map| f32::from(map.data[n]) / 255.0);
+            let [brain, ventricle, cistern] = [&brain_mm, &ventricle_mm, &cistern_mm].map(|mm| mm.data[n].min(FAR_MM));
+            [csf, grey, white, brain, ventricle, cistern, deep_grey.data[n], 0.0]
+        })
     })
 }
 
 /// The part of the grid where the template's brain comes to lie, with room for whatever is looked at around it.
 fn where_brain_may_be(
-    brain_mm: &Volume<f32, Mni>,
+    template: &Volume<[f32; MAPS], Mni>,
     grid: &Grid<Mni>,
     template_from_patient: &(impl Fn(Position<Mni>) -> Position<Mni> + Sync),
 ) -> VoxelBox {
@@ -85,7 +76,7 @@ fn where_brain_may_be(
             return false;
         }
         let p = template_from_patient(grid.position(Point3::from(voxel.map(|v| v as f64))));
-        brain_mm.nearest(p).is_some_and(|d| d < 0.0)
+        template.nearest(p).is_some_and(|maps| maps[BRAIN_MM] < 0.0)
     });
     let whole = VoxelBox { first: [0; 3], end: grid.dims };
     near.bounding_box().map_or(whole, |found| found.grown(grid, ROOM_MM))
@@ -100,31 +91,20 @@ impl AtlasPriors {
         template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
         misfit_mm: f64,
     ) -> Self {
-        let fields = template_fields();
-        let around = where_brain_may_be(&fields.brain_mm, grid, &template_from_patient);
-        let near = grid.cropped(&around);
-        let [csf, grey, white] = &fields.tissue;
-        let maps = [csf, grey, white, &fields.brain_mm, &fields.ventricle_mm, &fields.cistern_mm, &fields.deep_grey];
-        let outside = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM, 0.0];
-        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey] =
-            resample_together(maps, &near, template_from_patient, outside);
+        let template = template_maps();
+        let around = where_brain_may_be(template, grid, &template_from_patient);
+        let mut maps = resample_each(template, &grid.cropped(&around), template_from_patient, OUTSIDE);
         // Each part is let go as soon as it is in its place: all of them twice would be the peak of memory.
-        let whole = |part: Volume<f32, Mni>, value: f32| {
-            let mut all = Volume::filled(*grid, value);
-            all.paste(&part, &around);
-            all
-        };
-        Self {
-            brain_mm: whole(brain_mm, FAR_MM),
-            ventricle_mm: whole(ventricle_mm, FAR_MM),
-            cistern_mm: whole(cistern_mm, FAR_MM),
-            deep_grey: whole(deep_grey, 0.0),
-            tissue: [csf, grey, white].map(|map| {
-                let blurred = gaussian(&map, misfit_mm);
-                drop(map);
-                whole(blurred, 0.0)
-            }),
-        }
+        maps.par_iter_mut().enumerate().for_each(|(map, part)| {
+            if map < TISSUES {
+                *part = gaussian(part, misfit_mm);
+            }
+            let mut whole = Volume::filled(*grid, OUTSIDE[map]);
+            whole.paste(part, &around);
+            *part = whole;
+        });
+        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey, _] = maps;
+        Self { brain_mm, tissue: [csf, grey, white], ventricle_mm, cistern_mm, deep_grey }
     }
 
     /// The template as it stands, for a patient who has only been aligned rigidly: misfits of several millimetres are

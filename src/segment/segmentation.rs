@@ -1,6 +1,5 @@
 //! The whole way from a T1 image to its labels.
 
-use super::atlas;
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
 use super::coil::without_strong_gain;
@@ -9,11 +8,12 @@ use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
 use super::noise::calmed;
 use super::overhang::VaultPart;
+use super::posed_scan::PosedScan;
 use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
-use crate::geometry::{Frame, Mni, RigidTransform};
-use crate::image::resample::{Interpolation, resample};
+use crate::geometry::{Frame, Mni};
 use crate::image::{BlankSlices, Grid, LabelMap, Mask, Volume};
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// Everything that steers [`segment_t1`].
@@ -230,106 +230,77 @@ pub enum SegmentError {
 /// # Errors
 /// [`SegmentError`] when the image shows too little brain or no tissue contrast, or when the mask is no brain.
 pub fn segment_t1<F: Frame>(
-    t1: &Volume<f32, F>,
-    mni_from_t1: &RigidTransform<F, Mni>,
+    scan: &PosedScan<'_, F>,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    segment_with_priors(t1, mni_from_t1, &AtlasPriors::rigid(&atlas::template().grid()), overrides, settings)
+    segment_with_priors(scan, &AtlasPriors::rigid(&scan.on_template().grid), overrides, settings)
 }
 
-/// [`segment_t1`] with the template's maps already carried onto the patient. The work is done on the priors' grid.
+/// [`segment_t1`] with the template's maps already carried onto the patient, on the template's grid.
 ///
 /// # Errors
 /// As [`segment_t1`].
 pub fn segment_with_priors<F: Frame>(
-    t1: &Volume<f32, F>,
-    mni_from_t1: &RigidTransform<F, Mni>,
+    scan: &PosedScan<'_, F>,
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    let seen = Seen::of(t1, mni_from_t1, &priors.brain_mm.grid, settings)?;
-    let found = seen.brain(mni_from_t1, priors, overrides.brain, settings)?;
-    labelled(t1, mni_from_t1, found, priors, overrides, settings)
-}
-
-/// An image on the working grid, before anything is known of its brain.
-pub(super) struct Seen {
-    raw: Volume<f32, Mni>,
-    /// Where the image's field of view covers the grid.
-    pub known: Mask<Mni>,
+    settings.check()?;
+    let found = find_brain(scan, priors, overrides.brain, settings)?;
+    labelled(scan, found, priors, overrides, settings)
 }
 
 /// A brain found or given, and nothing looked at inside it.
-pub(super) struct FoundBrain {
+pub(super) struct FoundBrain<'a> {
     /// The image with a strong coil's gain taken out.
-    pub raw: Volume<f32, Mni>,
-    known: Mask<Mni>,
+    pub raw: Cow<'a, Volume<f32, Mni>>,
     pub brain: Mask<Mni>,
     pub warnings: Vec<SegmentWarning>,
 }
 
-impl Seen {
-    /// Reads the image on the grid.
-    ///
-    /// # Errors
-    /// Settings out of range.
-    pub fn of<F: Frame>(
-        t1: &Volume<f32, F>,
-        mni_from_t1: &RigidTransform<F, Mni>,
-        grid: &Grid<Mni>,
-        settings: &SegmentSettings,
-    ) -> Result<Self, SegmentError> {
-        settings.check()?;
-        // The spline keeps the sharpness that a linear kernel would take from every sulcus.
-        let on_grid = resample(t1, grid, &mni_from_t1.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        Ok(Self { raw: on_grid.volume.map(|x| x.max(0.0)), known: on_grid.inside })
+/// The brain where the template expects it, or the one given.
+///
+/// # Errors
+/// As [`segment_with_priors`].
+pub(super) fn find_brain<'a, F: Frame>(
+    scan: &'a PosedScan<'_, F>,
+    priors: &AtlasPriors,
+    given: Option<&Mask<F>>,
+    settings: &SegmentSettings,
+) -> Result<FoundBrain<'a>, SegmentError> {
+    let mut warnings = Vec::new();
+    let known = scan.known();
+    let raw = match without_strong_gain(scan.on_template(), known, priors) {
+        Some((flat, times)) => {
+            warnings.push(SegmentWarning::StrongGain { times });
+            Cow::Owned(flat)
+        }
+        None => Cow::Borrowed(scan.on_template()),
+    };
+    let expected = priors.brain_mm.map(|d| d < 0.0);
+    let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
+    let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
+    if percent < 50.0 {
+        return Err(SegmentError::LittleBrain { percent });
     }
-
-    /// The brain where the template expects it, or the one given.
-    ///
-    /// # Errors
-    /// As [`segment_with_priors`].
-    pub fn brain<F: Frame>(
-        &self,
-        mni_from_t1: &RigidTransform<F, Mni>,
-        priors: &AtlasPriors,
-        given: Option<&Mask<F>>,
-        settings: &SegmentSettings,
-    ) -> Result<FoundBrain, SegmentError> {
-        let mut warnings = Vec::new();
-        let known = &self.known;
-        let raw = match without_strong_gain(&self.raw, known, priors) {
-            Some((flat, times)) => {
-                warnings.push(SegmentWarning::StrongGain { times });
-                flat
-            }
-            None => self.raw.clone(),
-        };
-        let expected = priors.brain_mm.map(|d| d < 0.0);
-        let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
-        let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
-        if percent < 50.0 {
-            return Err(SegmentError::LittleBrain { percent });
-        }
-        if percent < 98.0 {
-            warnings.push(SegmentWarning::CroppedBrain { percent: 100.0 - percent });
-        }
-        let brain = match given {
-            Some(mask) => mask_on(mask, &raw.grid, &mni_from_t1.inverse()),
-            None => computed_brain(&raw, known, priors, settings)?,
-        };
-        let found_cc = brain.volume_cc();
-        if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
-            return Err(SegmentError::ImplausibleBrain {
-                found_cc,
-                smallest_cc: settings.smallest_brain_cc,
-                largest_cc: settings.largest_brain_cc,
-            });
-        }
-        Ok(FoundBrain { raw, known: known.clone(), brain, warnings })
+    if percent < 98.0 {
+        warnings.push(SegmentWarning::CroppedBrain { percent: 100.0 - percent });
     }
+    let brain = match given {
+        Some(mask) => mask_on(mask, &raw.grid, &scan.mni_from_t1.inverse()),
+        None => computed_brain(&raw, known, priors, settings)?,
+    };
+    let found_cc = brain.volume_cc();
+    if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
+        return Err(SegmentError::ImplausibleBrain {
+            found_cc,
+            smallest_cc: settings.smallest_brain_cc,
+            largest_cc: settings.largest_brain_cc,
+        });
+    }
+    Ok(FoundBrain { raw, brain, warnings })
 }
 
 /// What is inside the brain.
@@ -337,14 +308,14 @@ impl Seen {
 /// # Errors
 /// As [`segment_with_priors`].
 pub(super) fn labelled<F: Frame>(
-    t1: &Volume<f32, F>,
-    mni_from_t1: &RigidTransform<F, Mni>,
-    found: FoundBrain,
+    scan: &PosedScan<'_, F>,
+    found: FoundBrain<'_>,
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    let FoundBrain { raw, known, brain, mut warnings } = found;
+    let FoundBrain { raw, brain, mut warnings } = found;
+    let (PosedScan { t1, mni_from_t1, .. }, known) = (scan, scan.known());
     let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
     let inside = at_each(&raw, |n| brain.data[n] && known.data[n]);
     let fitted = |stride: usize, begun: Option<&Mixture>| {
@@ -410,7 +381,7 @@ pub(super) fn labelled<F: Frame>(
             .unwrap_or_else(|| labels.map(|l| l > 0)),
         labels,
         t1_mni,
-        known_mni: known,
+        known_mni: known.clone(),
         brain_mni: brain,
         labels_mni,
         tissue_means: model.means,
@@ -509,8 +480,9 @@ fn most_probable(model: &Mixture, priors: &AtlasPriors) -> LabelMap<Mni> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Position, Pre};
+    use crate::geometry::{Position, Pre, RigidTransform};
     use crate::image::VoxelBox;
+    use crate::segment::atlas;
 
     fn template() -> Volume<f32, Pre> {
         atlas::template().t1_f32().relabelled()
@@ -518,7 +490,7 @@ mod tests {
 
     fn refusal(t1: &Volume<f32, Pre>, brain: Option<&Mask<Pre>>) -> SegmentError {
         let masks = SegmentOverrides { brain, ventricle: None };
-        segment_t1(t1, &RigidTransform::identity(), &masks, &SegmentSettings::default()).unwrap_err()
+        segment_t1(&PosedScan::new(t1, &RigidTransform::identity()), &masks, &SegmentSettings::default()).unwrap_err()
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::image::components::{Connectivity, fill_holes, without_islands};
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode};
 use crate::image::{LabelMap, Mask, Volume};
+use rayon::prelude::*;
 
 /// How the ventricles are told from the other CSF.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
@@ -58,21 +59,20 @@ pub(super) fn ventricles(
     let (reach, clearance) = (settings.reach_mm as f32, settings.cistern_clearance_mm as f32);
     let deep = erode(csf, 1.0);
     let csf = &at_each(&priors.ventricle_mm, |n| csf.data[n] || plexus.data[n]);
-    let mut owner: Vec<u8> = (0..csf.data.len())
-        .map(|n| {
-            let from_ventricle = priors.ventricle_mm.data[n];
-            if !csf.data[n] {
-                0
-            } else if from_ventricle < -0.5 && (deep.data[n] || from_ventricle < -1.5) {
-                VENTRICLE
-            } else if from_ventricle > clearance && priors.cistern_mm.data[n] < 0.0 || from_ventricle > 2.0 * reach {
-                CISTERN
-            } else {
-                0
-            }
-        })
-        .collect();
-    let mut front: Vec<u32> = (0..owner.len() as u32).filter(|&n| owner[n as usize] > 0).collect();
+    let mut owner = Volume::from_fn(csf.grid, |n| {
+        let from_ventricle = priors.ventricle_mm.data[n];
+        if !csf.data[n] {
+            0
+        } else if from_ventricle < -0.5 && (deep.data[n] || from_ventricle < -1.5) {
+            VENTRICLE
+        } else if from_ventricle > clearance && priors.cistern_mm.data[n] < 0.0 || from_ventricle > 2.0 * reach {
+            CISTERN
+        } else {
+            0
+        }
+    })
+    .data;
+    let mut front: Vec<u32> = (0..owner.len() as u32).into_par_iter().filter(|&n| owner[n as usize] > 0).collect();
     let [nx, ny, _] = csf.grid.dims;
     let strides = [1, nx, nx * ny];
     while !front.is_empty() {
@@ -97,10 +97,7 @@ pub(super) fn ventricles(
     let ventricle = without_islands(&ventricle, Connectivity::Faces, 30);
     let closed = fill_holes(&close(&ventricle, settings.closing_mm));
     // A closing may not reach over to a cistern or leave the brain.
-    Volume::from_data(
-        csf.grid,
-        (0..owner.len()).map(|n| closed.data[n] && brain.data[n] && owner[n] != CISTERN).collect(),
-    )
+    Mask::from_fn(csf.grid, |n| closed.data[n] && brain.data[n] && owner[n] != CISTERN)
 }
 
 /// The ventricles with the voxels of their wall that are more than half full of CSF.

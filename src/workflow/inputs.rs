@@ -99,8 +99,11 @@ impl Scans {
         if pre_bytes == post_bytes {
             return Err(InputError::SameFile { pre: pre.clone(), post: post.clone() }.into());
         }
-        let before = nifti::decode(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), options)?;
-        let after = nifti::decode(&post_bytes, &format!("post-operative scan {}", shown(post)), options)?;
+        let (before, after) = rayon::join(
+            || nifti::decode(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), options),
+            || nifti::decode(&post_bytes, &format!("post-operative scan {}", shown(post)), options),
+        );
+        let (before, after) = (before?, after?);
         if before.volume == after.volume {
             return Err(InputError::SameVoxels { pre: pre.clone(), post: post.clone() }.into());
         }

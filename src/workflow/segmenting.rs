@@ -8,7 +8,7 @@ use super::user_file::read_input;
 use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
-use crate::segment::{SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
+use crate::segment::{PosedScan, SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -68,7 +68,8 @@ pub fn segment_file(
     progress.step();
     progress.doing("labels");
     let overrides = SegmentOverrides { brain: own.as_ref(), ..SegmentOverrides::default() };
-    let (found, _) = segment_head(&t1, &fit.fixed_from_moving, &overrides, &settings.deformable, &settings.segment)
+    let scan = PosedScan::new(&t1, &fit.fixed_from_moving);
+    let (found, _) = segment_head(&scan, &overrides, &settings.deformable, &settings.segment)
         .map_err(|source| WorkflowError::Head { scan: name, source })?;
     progress.end();
 

@@ -12,7 +12,7 @@ use crate::image::nifti::{self, encode_u8};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::resect::{GivenMasks, PairError, take_head_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{atlas, pose_of_head, pose_of_labels};
+use crate::segment::{PosedScan, atlas, pose_of_head, pose_of_labels};
 use std::path::PathBuf;
 
 /// Raised when the code changes the patient of the same settings.
@@ -101,7 +101,7 @@ fn posed_head(
     let pose = pose.map_err(refused)?.fixed_from_moving;
     let given = GivenMasks { labels: labels.cloned(), ..GivenMasks::default() };
     let (segmented, template, _) =
-        take_head_apart(scan, &pose, &given, &settings.anat).map_err(|error| match error {
+        take_head_apart(&PosedScan::new(scan, &pose), &given, &settings.anat).map_err(|error| match error {
             PairError::Head { source, .. } => SynthError::from(source).into(),
             error => WorkflowError::from(error),
         })?;

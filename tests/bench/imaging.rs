@@ -11,7 +11,7 @@ use hgm::material::random::CounterRng;
 use hgm::register::{RigidMasks, RigidSettings, register_rigid};
 use hgm::resect::{GivenMasks, PairSettings, take_pair_apart};
 use hgm::segment::native::mask_on;
-use hgm::segment::{SegmentOverrides, SegmentSettings, atlas, label, pose_of_head, segment_t1};
+use hgm::segment::{PosedScan, SegmentOverrides, SegmentSettings, atlas, label, pose_of_head, segment_t1};
 use nalgebra::{Matrix4, Point3, Vector3};
 use std::path::Path;
 
@@ -88,7 +88,11 @@ fn prep_bars(folder: &Path) -> Vec<Bar> {
 fn template_bars() -> Vec<Bar> {
     let template = atlas::template();
     let t1: Volume<f32, Pre> = template.t1_f32().relabelled();
-    let found = segment_t1(&t1, &RigidTransform::identity(), &SegmentOverrides::default(), &SegmentSettings::default());
+    let found = segment_t1(
+        &PosedScan::new(&t1, &RigidTransform::identity()),
+        &SegmentOverrides::default(),
+        &SegmentSettings::default(),
+    );
     let Ok(found) = found else { return vec![Bar::new("imaging template", "segments", "refused", false)] };
     let dice = |l: u8| found.labels_mni.map(|x| x == l).dice(&template.labels.map(|x| x == l));
     let (grey, white) = (dice(label::GREY_MATTER), dice(label::WHITE_MATTER));
@@ -138,14 +142,15 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
     let settings = PairSettings::default();
     let before = cpu_seconds();
     let none = GivenMasks::default();
-    let found = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &none, &settings, |_| {});
+    let mni_from_post = pre_from_post.then(&mni_from_pre);
+    let scans = (PosedScan::new(&pre, &mni_from_pre), PosedScan::new(&post, &mni_from_post));
+    let found = take_pair_apart(&scans.0, &scans.1, &none, &settings, |_| {});
     let masks_cpu = cpu_seconds() - before;
     let found = match found {
         Ok(found) => found,
         Err(error) => return bar("masks", "found".into(), error.to_string(), false),
     };
     println!("{letter}: masks in {masks_cpu:.1} CPU-s");
-    let mni_from_post = pre_from_post.then(&mni_from_pre);
     let tissue: LabelMap<Pre> = labels(&truth("tissue_pre"));
     let ventricle: Mask<Pre> = mask(&truth("ventricles_clean_pre"));
     let my_ventricle = found.pre.labels.map(|l| l == label::VENTRICLE);
@@ -170,7 +175,7 @@ fn case_bars(wanted: &Wanted, folder: &Path, bars: &mut Vec<Bar>) {
     let dice = mask_on(&found.finding.cavity, &post.grid, &mni_from_post).dice(&cavity);
     bar("cavity Dice", format!(">= {}", wanted.cavity), format!("{dice:.3}"), dice >= wanted.cavity);
     let given = GivenMasks { brain: Some(brain), ventricle: Some(ventricle), ..none };
-    let told = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &given, &settings, |_| {});
+    let told = take_pair_apart(&scans.0, &scans.1, &given, &settings, |_| {});
     let dice = told.map_or(0.0, |t| mask_on(&t.finding.cavity, &post.grid, &mni_from_post).dice(&cavity));
     let wanted_told = wanted.cavity_with_true_masks;
     bar(

@@ -199,7 +199,7 @@ mod tests {
     use crate::register::{RigidMasks, RigidSettings, register_rigid};
     use crate::resect::{GivenMasks, PairSettings, take_pair_apart};
     use crate::segment::native::mask_on;
-    use crate::segment::pose_of_head;
+    use crate::segment::{PosedScan, pose_of_head};
 
     /// Mean distance over the brain between a fit and the truth.
     fn rigid_error_mm(pre_from_post: &RigidTransform<Post, Pre>, patient: &SyntheticPatient) -> f64 {
@@ -220,8 +220,10 @@ mod tests {
         let pre_from_post = register_rigid(&post, &pre, RigidMasks::default(), &settings).unwrap().fixed_from_moving;
         let mni_from_pre = pose_of_head(&pre).unwrap().fixed_from_moving;
         let (none, settings) = (GivenMasks::default(), PairSettings::default());
-        let found = take_pair_apart(&pre, &post, &pre_from_post, &mni_from_pre, &none, &settings, |_| {}).unwrap();
-        let cavity = mask_on(&found.finding.cavity, &post.grid, &pre_from_post.then(&mni_from_pre));
+        let mni_from_post = pre_from_post.then(&mni_from_pre);
+        let scans = (PosedScan::new(&pre, &mni_from_pre), PosedScan::new(&post, &mni_from_post));
+        let found = take_pair_apart(&scans.0, &scans.1, &none, &settings, |_| {}).unwrap();
+        let cavity = mask_on(&found.finding.cavity, &post.grid, &mni_from_post);
         let dice = [
             found.pre.brain.dice(&patient.brain_pre),
             found.pre.labels.map(|l| l == label::VENTRICLE).dice(&patient.ventricles_pre),

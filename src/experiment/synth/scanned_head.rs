@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pre;
     use crate::image::{Grid, LabelMap};
-    use crate::segment::{atlas, segment_by_labels};
+    use crate::segment::{PosedScan, atlas, segment_by_labels};
 
     fn own_place() -> DisplacementField<Mni> {
         let grid = Grid::axis_aligned([2; 3], [200.0; 3], [-100.0; 3]);
@@ -73,7 +73,7 @@ mod tests {
         let t1: Volume<f32, Pre> = template.t1_f32().map(|x| 7.0 * x).relabelled();
         let labels: LabelMap<Pre> = template.labels.clone().relabelled();
         let same = RigidTransform::identity();
-        let (segmented, _) = segment_by_labels(&t1, &same, &labels);
+        let (segmented, _) = segment_by_labels(&PosedScan::new(&t1, &same), &labels);
         let head = Head::of_scan(&t1, &same, &segmented, own_place()).unwrap();
         let mean = |l: u8| {
             let inside = (0..head.labels.data.len()).filter(|&n| head.labels.data[n] == l);

@@ -1,6 +1,6 @@
 //! Displacement fields: a map of points, kept on a grid.
 
-use super::velocity::{Cell, VectorField};
+use super::velocity::{Cell, Flow};
 use crate::geometry::{Frame, Position};
 use crate::image::resample::resample_together;
 use crate::image::{Grid, Mask, Volume};
@@ -12,9 +12,8 @@ use serde::{Deserialize, Serialize};
 /// the grid's border the deformation of the border holds).
 #[derive(Clone, Debug)]
 pub struct DisplacementField<F: Frame> {
-    grid: Grid<F>,
-    /// Displacement of the deformation in voxels of the grid.
-    components: [Vec<f32>; 3],
+    /// Displacement of the deformation in voxels of its grid, and a 0.
+    deformation: Volume<[f32; 4], F>,
     /// To voxels of the grid, by way of the affine part before the deformation.
     to_voxel: Affine,
     /// From voxels of the grid to mm and through the affine part after the deformation.
@@ -63,24 +62,29 @@ impl Affine {
     }
 }
 
+fn with_a_zero([x, y, z]: [f32; 3]) -> [f32; 4] {
+    [x, y, z, 0.0]
+}
+
 impl<F: Frame> DisplacementField<F> {
     /// A deformation without an affine part.
-    fn plain(grid: &Grid<F>, components: [Vec<f32>; 3]) -> Self {
+    fn plain(deformation: Volume<[f32; 4], F>) -> Self {
+        let grid = &deformation.grid;
         let (to_voxel, to_mm) = (Affine::of(grid.voxel_from_mm()), Affine::of(&grid.mm_from_voxel));
-        Self { grid: *grid, components, to_voxel, to_mm }
+        Self { deformation, to_voxel, to_mm }
     }
 
     /// First the flow, then the affine map.
-    pub(super) fn after_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
-        let plain = Self::plain(&flow.grid.relabelled(), flow.components.clone());
+    pub(super) fn after_flow(flow: Flow, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
+        let plain = Self::plain(flow.relabelled());
         Self { to_mm: plain.to_mm.then(Affine { linear: *linear, shift: *shift_mm }), ..plain }
     }
 
     /// First the inverse of the affine map (the identity when it has none), then the flow.
-    pub(super) fn before_flow(flow: &VectorField, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
+    pub(super) fn before_flow(flow: Flow, linear: &Matrix3<f64>, shift_mm: &Vector3<f64>) -> Self {
         let inverse = linear.try_inverse().unwrap_or_else(Matrix3::identity);
         let before = Affine { linear: inverse, shift: -(inverse * shift_mm) };
-        let plain = Self::plain(&flow.grid.relabelled(), flow.components.clone());
+        let plain = Self::plain(flow.relabelled());
         Self { to_voxel: before.then(plain.to_voxel), ..plain }
     }
 
@@ -88,35 +92,31 @@ impl<F: Frame> DisplacementField<F> {
     pub fn from_displacement(displacement_mm: &Volume<[f32; 3], F>) -> Self {
         let grid = displacement_mm.grid;
         let voxels_from_mm = grid.voxel_from_mm().fixed_view::<3, 3>(0, 0).into_owned();
-        let mut components = [0, 1, 2].map(|_| Vec::with_capacity(grid.len()));
-        for d in &displacement_mm.data {
+        Self::plain(displacement_mm.map(|d| {
             let voxels = voxels_from_mm * Vector3::from(d.map(f64::from));
-            for (component, v) in components.iter_mut().zip(voxels.iter()) {
-                component.push(*v as f32);
-            }
-        }
-        Self::plain(&grid, components)
+            with_a_zero([voxels.x, voxels.y, voxels.z].map(|v| v as f32))
+        }))
     }
 
     /// How far every point of the field's grid moves, mm: what [`Self::from_displacement`] takes. Rounded to a 64th
     /// of a mm, far below what a registration is worth, so that it packs well.
     pub fn displacement_mm(&self) -> Volume<[f32; 3], F> {
-        let value = |n: usize| {
-            let p = self.grid.centre(self.grid.voxel(n));
+        let grid = *self.grid();
+        Volume::from_voxels(grid, |voxel| {
+            let p = grid.centre(voxel);
             let d = self.apply(p).mm - p.mm;
             [d.x, d.y, d.z].map(|x| ((x * 64.0).round() / 64.0) as f32)
-        };
-        Volume::from_data(self.grid, (0..self.grid.len()).into_par_iter().map(value).collect())
+        })
     }
 
     /// The field to the last digit: its frame, and the deformation in voxels.
     pub fn parts(&self) -> (FieldFrame, Volume<[f32; 3], F>) {
-        let Self { grid, components: [x, y, z], to_voxel, to_mm } = self;
+        let Self { deformation, to_voxel, to_mm } = self;
+        let grid = deformation.grid;
         let mm_from_voxel = Affine::of(&grid.mm_from_voxel).rows();
         let (to_voxel, to_mm) = (to_voxel.rows(), to_mm.rows());
         let frame = FieldFrame { dims: grid.dims, mm_from_voxel, to_voxel, to_mm };
-        let vectors = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]);
-        (frame, Volume::from_data(*grid, vectors.collect()))
+        (frame, deformation.map(|[x, y, z, _]| [x, y, z]))
     }
 
     /// The field that [`Self::parts`] has told; `None` where the two are not one field's.
@@ -125,23 +125,24 @@ impl<F: Frame> DisplacementField<F> {
         let mut mm_from_voxel = of_grid.linear.to_homogeneous();
         mm_from_voxel.fixed_view_mut::<3, 1>(0, 3).copy_from(&of_grid.shift);
         let grid = Grid::new(frame.dims, mm_from_voxel)?;
-        let components = [0, 1, 2].map(|a| deformation.iter().map(|d| d[a]).collect());
-        let field =
-            Self { grid, components, to_voxel: Affine::of_rows(&frame.to_voxel), to_mm: Affine::of_rows(&frame.to_mm) };
-        (deformation.len() == grid.len()).then_some(field)
+        (deformation.len() == grid.len()).then(|| Self {
+            deformation: Volume::from_fn(grid, |n| with_a_zero(deformation[n])),
+            to_voxel: Affine::of_rows(&frame.to_voxel),
+            to_mm: Affine::of_rows(&frame.to_mm),
+        })
     }
 
     /// The grid the deformation is kept on.
     pub fn grid(&self) -> &Grid<F> {
-        &self.grid
+        &self.deformation.grid
     }
 
     /// Where a point goes.
     pub fn apply(&self, p: Position<F>) -> Position<F> {
         let v = self.to_voxel.apply(p.mm.coords);
-        let cell = Cell::at(self.grid.dims, [v.x as f32, v.y as f32, v.z as f32]);
-        let d = Vector3::from([0, 1, 2].map(|a| f64::from(cell.of(&self.components[a]))));
-        Position::from_point(Point3::from(self.to_mm.apply(v + d)))
+        let cell = Cell::at(self.grid().dims, [v.x as f32, v.y as f32, v.z as f32]);
+        let [x, y, z, _] = cell.of_all(&self.deformation.data).map(f64::from);
+        Position::from_point(Point3::from(self.to_mm.apply(v + Vector3::new(x, y, z))))
     }
 
     /// Images seen through the map on a grid: the value at `p` is the image's at `apply(p)`, linearly interpolated; 0 where
@@ -157,19 +158,19 @@ impl<F: Frame> DisplacementField<F> {
     /// Smallest and largest determinant of the map's gradient at the voxels of the mask (on the field's grid), by central
     /// differences.
     pub(super) fn jacobian_range<G: Frame>(&self, mask: &Mask<G>) -> (f64, f64) {
-        let dims = self.grid.dims;
+        let (grid, values) = (self.grid(), &self.deformation.data);
+        let dims = grid.dims;
         let stride = [1, dims[0], dims[0] * dims[1]];
         let affine = self.to_voxel.linear.determinant() * self.to_mm.linear.determinant();
         let determinant = |n: usize| {
-            let x = self.grid.voxel(n);
+            let x = grid.voxel(n);
             let mut gradient = Matrix3::<f64>::identity();
             for b in 0..3 {
                 if x[b] == 0 || x[b] + 1 == dims[b] {
                     continue;
                 }
                 for a in 0..3 {
-                    let c = &self.components[a];
-                    gradient[(a, b)] += 0.5 * f64::from(c[n + stride[b]] - c[n - stride[b]]);
+                    gradient[(a, b)] += 0.5 * f64::from(values[n + stride[b]][a] - values[n - stride[b]][a]);
                 }
             }
             // Voxel and mm gradients are similar matrices: one determinant.

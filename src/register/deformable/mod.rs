@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-use velocity::{Cell, VectorField};
+use velocity::{Cell, Flow, VectorField};
 
 /// Beyond this distance from the atlas's brain nothing of the head is looked at.
 const WIDE_MM: f64 = 6.0;
@@ -136,11 +136,9 @@ pub fn fit_atlas<F: Frame>(
     let brain_box = brain.bounding_box().ok_or(DeformableError::EmptyAtlas)?;
     // Room for the rim and for the velocity to fade.
     let around = brain_box.grown(&atlas.grid, settings.margin_mm + 8.0);
-    let region: Mask<Native> = morphology::dilate(&brain, settings.margin_mm).cropped(&around).relabelled();
-    let judged: Mask<Native> = morphology::dilate(&brain, JUDGED_MM).cropped(&around).relabelled();
-    let wide: Mask<Native> = morphology::dilate(&brain, WIDE_MM).cropped(&around).relabelled();
     let atlas: Volume<f32, Native> = atlas.cropped(&around).relabelled();
     let brain: Mask<Native> = brain.cropped(&around).relabelled();
+    let [region, judged, wide] = morphology::dilations(&brain, [settings.margin_mm, JUDGED_MM, WIDE_MM]);
 
     let subject: Volume<f32, Native> = subject.clone().relabelled();
     let left_out = left_out.map(|m| on_grid_of(&m.clone().relabelled(), &subject));
@@ -177,26 +175,23 @@ pub fn fit_atlas<F: Frame>(
         let noise = noise_of(&fixed, &moving, &inside);
 
         let mut course: Vec<f64> = Vec::new();
+        let (mut warped, mut weight) = (Vec::new(), Vec::new());
         for iteration in 0..=iterations {
             let displacement = v.exponential(0.8);
-            let seen: Vec<(f32, f32)> = (0..grid.len())
-                .into_par_iter()
-                .map(|n| {
-                    if !inside.data[n] {
-                        return (0.0, 0.0);
-                    }
-                    let x = grid.voxel(n);
-                    let p: Point3<f64> =
-                        Point3::from([0, 1, 2].map(|a| x[a] as f64 + f64::from(displacement.components[a][n])));
-                    let k = to_known.transform_point(&p);
-                    if !known.get(k.x.round() as isize, k.y.round() as isize, k.z.round() as isize).unwrap_or(false) {
-                        return (0.0, 0.0);
-                    }
-                    let m = to_moving.transform_point(&p);
-                    (Cell::at(moving.grid.dims, [m.x as f32, m.y as f32, m.z as f32]).of(&moving.data), 1.0)
-                })
-                .collect();
-            let (warped, weight): (Vec<f32>, Vec<f32>) = seen.into_iter().unzip();
+            let seen = |n: usize| {
+                if !inside.data[n] {
+                    return (0.0, 0.0);
+                }
+                let (x, d) = (grid.voxel(n), displacement.data[n]);
+                let p: Point3<f64> = Point3::from([0, 1, 2].map(|a| x[a] as f64 + f64::from(d[a])));
+                let k = to_known.transform_point(&p);
+                if !known.get(k.x.round() as isize, k.y.round() as isize, k.z.round() as isize).unwrap_or(false) {
+                    return (0.0, 0.0);
+                }
+                let m = to_moving.transform_point(&p);
+                (Cell::at(moving.grid.dims, [m.x as f32, m.y as f32, m.z as f32]).of(&moving.data), 1.0)
+            };
+            (0..grid.len()).into_par_iter().map(seen).unzip_into_vecs(&mut warped, &mut weight);
             if level == 0 && iteration == 0 {
                 let both = weight.iter().filter(|&&w| w > 0.0).count();
                 let known = both as f64 / inside.count().max(1) as f64;
@@ -225,9 +220,9 @@ pub fn fit_atlas<F: Frame>(
     let v = velocity.unwrap_or_else(|| VectorField::zeros(&atlas.grid));
     let forward = v.exponential(0.1);
     let backward = v.scaled(-1.0).exponential(0.1);
-    let subject_from_atlas = DisplacementField::<F>::after_flow(&forward, &linear, &shift);
-    let atlas_from_subject = DisplacementField::<F>::before_flow(&backward, &linear, &shift);
     let brain = on_grid_of(&brain, &Volume::filled(forward.grid, 0f32));
+    let subject_from_atlas = DisplacementField::<F>::after_flow(forward, &linear, &shift);
+    let atlas_from_subject = DisplacementField::<F>::before_flow(backward, &linear, &shift);
     let range = subject_from_atlas.jacobian_range(&brain);
     (quality.smallest_jacobian, quality.largest_jacobian) = range;
     quality.round_trip_mm = (0..brain.data.len())
@@ -251,9 +246,9 @@ fn near_brain(
     linear: &Matrix3<f64>,
     shift_mm: &Vector3<f64>,
 ) -> Volume<f32, Native> {
-    let still = VectorField::zeros(&region.grid);
-    let inverse = velocity.map_or(still, |v| v.clone().scaled(-1.0).exponential(0.8));
-    let atlas_from_subject = DisplacementField::<Native>::before_flow(&inverse, linear, shift_mm);
+    let still = || Flow::filled(region.grid, [0.0; 4]);
+    let inverse = velocity.map_or_else(still, |v| v.clone().scaled(-1.0).exponential(0.8));
+    let atlas_from_subject = DisplacementField::<Native>::before_flow(inverse, linear, shift_mm);
     let mut out = subject.clone();
     let grid = subject.grid;
     out.data.par_iter_mut().enumerate().for_each(|(n, x)| {

@@ -25,21 +25,17 @@ struct Reduced {
 
 /// The image at each resolution, coarse to fine; coarser ones are made from finer ones.
 fn pyramid(image: &Volume<f32, Native>, levels_mm: &[f64]) -> Vec<Reduced> {
-    let mut finer = image.clone();
-    let mut out: Vec<Reduced> = levels_mm
-        .iter()
-        .rev()
-        .map(|&spacing_mm| {
-            finer = reduced_to(&finer, spacing_mm);
-            let mut coefficients = finer.clone();
-            let spacing = finer.grid.spacing_mm();
-            let thinnest = spacing.into_iter().fold(f64::INFINITY, f64::min);
-            for axis in (0..3).filter(|&a| spacing[a] > 1.5 * thinnest) {
-                prefilter(&mut coefficients, axis);
-            }
-            Reduced { image: finer.clone(), coefficients, spacing_mm }
-        })
-        .collect();
+    let mut out: Vec<Reduced> = Vec::new();
+    for &spacing_mm in levels_mm.iter().rev() {
+        let image = reduced_to(out.last().map_or(image, |finer| &finer.image), spacing_mm);
+        let mut coefficients = image.clone();
+        let spacing = image.grid.spacing_mm();
+        let thinnest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        for axis in (0..3).filter(|&a| spacing[a] > 1.5 * thinnest) {
+            prefilter(&mut coefficients, axis);
+        }
+        out.push(Reduced { image, coefficients, spacing_mm });
+    }
     out.reverse();
     out
 }
@@ -57,7 +53,8 @@ struct Pair<'a> {
 
 impl<'a> Pair<'a> {
     fn new(sampled: &Side, other: &Side, levels_mm: &[f64], settings: &'a RigidSettings) -> Self {
-        let (sampled_levels, other_levels) = (pyramid(&sampled.image, levels_mm), pyramid(&other.image, levels_mm));
+        let (sampled_levels, other_levels) =
+            rayon::join(|| pyramid(&sampled.image, levels_mm), || pyramid(&other.image, levels_mm));
         let head_of = |side: &Side, levels: &[Reduced]| {
             side.mask.clone().unwrap_or_else(|| head::foreground(&levels[levels.len().min(2) - 1].image))
         };

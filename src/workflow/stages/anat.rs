@@ -7,7 +7,6 @@ use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
 use crate::geometry::{Frame, Mni};
 use crate::image::nifti::{self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
-use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{
     CAVITY, NATIVE_CAVITY, NATIVE_RESECTED, POST_BRAIN, POST_NATIVE_BRAIN, POST_T1, POST_VENTRICLE, PRE_BRAIN,
@@ -17,7 +16,7 @@ use crate::layout::{
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{atlas, label};
+use crate::segment::{PosedScan, atlas, label};
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
@@ -27,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 15;
+const VERSION: u32 = 16;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -139,6 +138,7 @@ pub(crate) fn anat(
                 p.doing(what);
             });
         };
+        let (pre, post) = (PosedScan::new(&scans.pre, &mni_from_pre), PosedScan::new(&scans.post, &mni_from_post));
         let OperatedBrain {
             pre: before,
             post: after,
@@ -148,16 +148,13 @@ pub(crate) fn anat(
             post_ventricle,
             post_brain,
             ..
-        } = take_pair_apart(&scans.pre, &scans.post, &pre_from_post, &mni_from_pre, &given, &work.settings.anat, step)?;
+        } = take_pair_apart(&pre, &post, &given, &work.settings.anat, step)?;
 
         work.tell(|p| p.doing("writing"));
         let mut produced = Produced::default();
         let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
-        let pre_t1 = resample(&scans.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        let post_t1 =
-            resample(&scans.post, &grid, &mni_from_post.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        write(PRE_T1, encode_i16(&whole_numbers(&pre_t1.volume)));
-        write(POST_T1, encode_i16(&whole_numbers(&post_t1.volume)));
+        write(PRE_T1, encode_i16(&whole_numbers(pre.on_template())));
+        write(POST_T1, encode_i16(&whole_numbers(post.on_template())));
         write(PRE_EVEN_T1, encode_i16(&sixteen_bits(&before.t1_mni)));
         write(PRE_NATIVE_T1, encode_intensities(&scans.pre));
         write(PRE_BRAIN, encode_mask(&before.brain_mni));

@@ -59,7 +59,7 @@ impl Earlier {
             brain,
             labels,
             t1_mni,
-            known_mni: resample(pre, &grid, &to_pre, Interpolation::CubicBSpline, 0.0).inside,
+            known_mni: resample(pre, &grid, &to_pre, Interpolation::Nearest, 0.0).inside,
             brain_mni,
             labels_mni,
             tissue_means: *tissue_means,

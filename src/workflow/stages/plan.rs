@@ -11,7 +11,6 @@ use crate::geometry::{Frame, Mni};
 use crate::image::nifti::{
     self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_numbers, encode_u8, encode_vectors,
 };
-use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask};
 use crate::layout::{
     NATIVE_RESECTED, PRE_BRAIN, PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1,
@@ -19,8 +18,8 @@ use crate::layout::{
 };
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, take_head_apart};
-use crate::segment::atlas;
 use crate::segment::native::mask_on;
+use crate::segment::{PosedScan, atlas};
 use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
@@ -31,7 +30,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -93,9 +92,9 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
             ventricle: scan.ventricle.as_ref().map(|(mask, _)| mask.clone()),
             ..GivenMasks::default()
         };
-        let (before, template, scale) = once(&scan.shared.head, || {
-            Ok::<_, WorkflowError>(take_head_apart(&scan.pre, &mni_from_pre, &given, &work.settings.anat)?)
-        })?;
+        let pre = PosedScan::new(&scan.pre, &mni_from_pre);
+        let (before, template, scale) =
+            once(&scan.shared.head, || Ok::<_, WorkflowError>(take_head_apart(&pre, &given, &work.settings.anat)?))?;
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
@@ -106,8 +105,7 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
             produced.warn([Warning::PlanOutsideBrain { plan: scan.plan.clone(), percent: 100.0 * found.outside }]);
         }
         let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
-        let t1 = resample(&scan.pre, &grid, &mni_from_pre.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
-        write(PRE_T1, encode_i16(&whole_numbers(&t1.volume)));
+        write(PRE_T1, encode_i16(&whole_numbers(pre.on_template())));
         write(PRE_NATIVE_T1, encode_intensities(&scan.pre));
         write(PRE_BRAIN, encode_mask(&before.brain_mni));
         write(PRE_LABELS, encode_u8(&before.labels_mni));

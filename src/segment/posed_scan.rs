@@ -1,0 +1,45 @@
+//! A scan and where it lies in the template's frame.
+
+use super::atlas;
+use crate::geometry::{Frame, Mni, RigidTransform};
+use crate::image::resample::{Interpolation, Resampled, resample};
+use crate::image::{Mask, Volume};
+use std::sync::OnceLock;
+
+/// A scan and its pose. What it shows on the template's grid is asked for by every step after the registration, and is read from
+/// the scan once, when it is first asked for.
+#[derive(Debug)]
+pub struct PosedScan<'a, F: Frame> {
+    /// The scan on its own grid.
+    pub t1: &'a Volume<f32, F>,
+    /// From the scan to the template's frame.
+    pub mni_from_t1: RigidTransform<F, Mni>,
+    on_template: OnceLock<Resampled<Mni>>,
+}
+
+impl<'a, F: Frame> PosedScan<'a, F> {
+    /// A scan in its pose.
+    pub fn new(t1: &'a Volume<f32, F>, mni_from_t1: &RigidTransform<F, Mni>) -> Self {
+        Self { t1, mni_from_t1: *mni_from_t1, on_template: OnceLock::new() }
+    }
+
+    fn read(&self) -> &Resampled<Mni> {
+        self.on_template.get_or_init(|| {
+            // The spline keeps the sharpness that a linear kernel would take from every sulcus.
+            let affine = self.mni_from_t1.inverse().to_affine();
+            let mut read = resample(self.t1, &atlas::template().grid(), &affine, Interpolation::CubicBSpline, 0.0);
+            read.volume = read.volume.map(|x| x.max(0.0));
+            read
+        })
+    }
+
+    /// The intensities on the template's grid, not below 0; 0 outside the field of view.
+    pub fn on_template(&self) -> &Volume<f32, Mni> {
+        &self.read().volume
+    }
+
+    /// Where the field of view covers the template's grid.
+    pub fn known(&self) -> &Mask<Mni> {
+        &self.read().inside
+    }
+}
