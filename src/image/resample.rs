@@ -108,8 +108,8 @@ fn filled_together<const N: usize, S: Frame, T: Frame>(
 
 /// [`resample_together`] of values that lie side by side: each corner around a point is one read for all of them.
 #[must_use]
-pub fn resample_each<const N: usize, S: Frame, T: Frame>(
-    source: &Volume<[f32; N], S>,
+pub fn resample_each<const N: usize, V: Copy + Into<f32> + Sync, S: Frame, T: Frame>(
+    source: &Volume<[V; N], S>,
     target: &Grid<T>,
     source_from_target: impl Fn(Position<T>) -> Position<S> + Sync,
     outside: [f32; N],
@@ -269,11 +269,11 @@ impl Cell {
 impl Cell {
     /// [`Self::of`] for values side by side.
     #[inline]
-    fn of_each<const N: usize>(&self, d: &[[f32; N]]) -> [f32; N] {
+    fn of_each<const N: usize, V: Copy + Into<f32>>(&self, d: &[[V; N]]) -> [f32; N] {
         let (o, [step, up, over], w) = (self.corner, self.step, self.weight);
         let mix =
             |a: [f32; N], b: [f32; N], w: f32| -> [f32; N] { std::array::from_fn(|n| a[n] * (1.0 - w) + b[n] * w) };
-        let line = |o: usize| mix(d[o], d[o + step], w[0]);
+        let line = |o: usize| mix(d[o].map(Into::into), d[o + step].map(Into::into), w[0]);
         let plane = |o: usize| mix(line(o), line(o + up), w[1]);
         mix(plane(o), plane(o + over), w[2])
     }

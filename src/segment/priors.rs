@@ -31,17 +31,23 @@ pub struct AtlasPriors {
     pub deep_grey: Volume<f32, Mni>,
 }
 
-/// Maps of the template on its own grid, side by side: one reading of eight corners then brings them all.
+/// Maps of the template on its own grid, side by side: one reading of eight corners then brings them all. Whole numbers of
+/// [`UNITS`], which are finer than anything the maps know, take half the room.
 const MAPS: usize = 8;
 /// The first of them are the probabilities of CSF, grey and white matter,
 const TISSUES: usize = 3;
 /// the next is the distance to the brain's surface.
 const BRAIN_MM: usize = TISSUES;
-/// What they are outside the template; the last is there for the sake of whole vectors.
+/// Units of probability and of mm; the last map is there for the sake of whole vectors.
+const UNITS: [f32; MAPS] = {
+    let (share, mm) = (1.0 / 32_000.0, 1.0 / 512.0);
+    [share, share, share, mm, mm, mm, share, share]
+};
+/// What they are outside the template.
 const OUTSIDE: [f32; MAPS] = [0.0, 0.0, 0.0, FAR_MM, FAR_MM, FAR_MM, 0.0, 0.0];
 
-fn template_maps() -> &'static Volume<[f32; MAPS], Mni> {
-    static MAPS_OF_TEMPLATE: OnceLock<Volume<[f32; MAPS], Mni>> = OnceLock::new();
+fn template_maps() -> &'static Volume<[i16; MAPS], Mni> {
+    static MAPS_OF_TEMPLATE: OnceLock<Volume<[i16; MAPS], Mni>> = OnceLock::new();
     MAPS_OF_TEMPLATE.get_or_init(|| {
         let atlas = atlas::template();
         let tissue = |n: usize| (f32::from(atlas.grey.data[n]) + f32::from(atlas.white.data[n])) / 255.0;
@@ -55,15 +61,17 @@ fn template_maps() -> &'static Volume<[f32; MAPS], Mni> {
         Volume::from_fn(atlas.grid(), |n| {
             let csf = if atlas.t1.data[n] > 0 { (1.0 - tissue(n)).max(0.0) } else { 0.0 };
             let [grey, white] = [&atlas.grey, &atlas.white].map(|map| f32::from(map.data[n]) / 255.0);
-            let [brain, ventricle, cistern] = [&brain_mm, &ventricle_mm, &cistern_mm].map(|mm| mm.data[n].min(FAR_MM));
-            [csf, grey, white, brain, ventricle, cistern, deep_grey.data[n], 0.0]
+            let [brain, ventricle, cistern] =
+                [&brain_mm, &ventricle_mm, &cistern_mm].map(|mm| mm.data[n].clamp(-FAR_MM, FAR_MM));
+            let values = [csf, grey, white, brain, ventricle, cistern, deep_grey.data[n], 0.0];
+            std::array::from_fn(|map| (values[map] / UNITS[map]).round() as i16)
         })
     })
 }
 
 /// The part of the grid where the template's brain comes to lie, with room for whatever is looked at around it.
 fn where_brain_may_be(
-    template: &Volume<[f32; MAPS], Mni>,
+    template: &Volume<[i16; MAPS], Mni>,
     grid: &Grid<Mni>,
     template_from_patient: &(impl Fn(Position<Mni>) -> Position<Mni> + Sync),
 ) -> VoxelBox {
@@ -76,7 +84,7 @@ fn where_brain_may_be(
             return false;
         }
         let p = template_from_patient(grid.position(Point3::from(voxel.map(|v| v as f64))));
-        template.nearest(p).is_some_and(|maps| maps[BRAIN_MM] < 0.0)
+        template.nearest(p).is_some_and(|maps| maps[BRAIN_MM] < 0)
     });
     let whole = VoxelBox { first: [0; 3], end: grid.dims };
     near.bounding_box().map_or(whole, |found| found.grown(grid, ROOM_MM))
@@ -93,9 +101,11 @@ impl AtlasPriors {
     ) -> Self {
         let template = template_maps();
         let around = where_brain_may_be(template, grid, &template_from_patient);
-        let mut maps = resample_each(template, &grid.cropped(&around), template_from_patient, OUTSIDE);
+        let outside = std::array::from_fn(|map| OUTSIDE[map] / UNITS[map]);
+        let mut maps = resample_each(template, &grid.cropped(&around), template_from_patient, outside);
         // Each part is let go as soon as it is in its place: all of them twice would be the peak of memory.
         maps.par_iter_mut().enumerate().for_each(|(map, part)| {
+            *part = part.map(|x| x * UNITS[map]);
             if map < TISSUES {
                 *part = gaussian(part, misfit_mm);
             }
