@@ -6,6 +6,15 @@ use crate::geometry::Frame;
 use nalgebra::{Matrix4, Vector3};
 use rayon::prelude::*;
 
+/// A voxel for each block of `factor` voxels along each axis.
+#[must_use]
+pub fn coarser<F: Frame>(grid: &Grid<F>, factor: usize) -> Grid<F> {
+    let middle = (factor as f64 - 1.0) / 2.0;
+    let fine_from_coarse = Matrix4::new_translation(&Vector3::repeat(middle)) * Matrix4::new_scaling(factor as f64);
+    let dims = grid.dims.map(|n| n.div_ceil(factor));
+    Grid::new(dims, grid.mm_from_voxel * fine_from_coarse).expect("a scaled grid is a grid")
+}
+
 /// Means of a function of the voxel over blocks of `factor` voxels along each axis; where the grid ends within a block, what is
 /// missing counts as 0.
 #[must_use]
@@ -14,11 +23,7 @@ pub fn block_means<F: Frame>(
     factor: usize,
     value: impl Fn(usize) -> f32 + Sync + Send,
 ) -> Volume<f32, F> {
-    let dims = grid.dims.map(|n| n.div_ceil(factor));
-    let middle = (factor as f64 - 1.0) / 2.0;
-    let fine_from_coarse = Matrix4::new_translation(&Vector3::repeat(middle)) * Matrix4::new_scaling(factor as f64);
-    let coarse = Grid::new(dims, grid.mm_from_voxel * fine_from_coarse).expect("a scaled grid is a grid");
-    Volume::from_voxels(coarse, |block| {
+    Volume::from_voxels(coarser(grid, factor), |block| {
         let first = block.map(|v| v * factor);
         let end = [0, 1, 2].map(|a| (first[a] + factor).min(grid.dims[a]));
         let mut sum = 0.0;

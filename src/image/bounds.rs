@@ -66,6 +66,13 @@ impl<F: Frame> Grid<F> {
         // The linear part is the one this grid was built with, so it is invertible; keep self if it ever is not.
         Self::new(to.dims(), affine).unwrap_or(*self)
     }
+
+    /// The box that [`Self::cropped`] has cut `part` out at.
+    pub fn box_of(&self, part: &Self) -> VoxelBox {
+        let corner = self.voxel_at(part.centre([0; 3]));
+        let first = [0, 1, 2].map(|a| corner[a].round().max(0.0) as usize);
+        VoxelBox { first, end: [0, 1, 2].map(|a| first[a] + part.dims[a]) }
+    }
 }
 
 impl<T: Copy, F: Frame> Volume<T, F> {
@@ -80,6 +87,14 @@ impl<T: Copy, F: Frame> Volume<T, F> {
             }
         }
         Self::from_data(grid, data)
+    }
+
+    /// The volume within a larger grid, which it was cut out of; `outside` everywhere else.
+    #[must_use]
+    pub fn within(&self, grid: &Grid<F>, outside: T) -> Self {
+        let mut whole = Self::filled(*grid, outside);
+        whole.paste(self, &grid.box_of(&self.grid));
+        whole
     }
 
     /// Writes the voxels of `part`, which was cut out with [`Volume::cropped`] at the same box, back in place.
@@ -112,6 +127,9 @@ mod tests {
         let part = volume.cropped(&around);
         let corner = part.grid.position(Point3::origin());
         assert_eq!(volume.nearest(corner), Some(part.at(0, 0, 0)));
+        assert_eq!(grid.box_of(&part.grid), around);
+        assert_eq!(part.within(&grid, -1.0).cropped(&around), part);
+        assert_eq!(part.within(&grid, -1.0).data[0], -1.0);
         let mut copy = volume.map(|_| 0.0);
         copy.paste(&part, &around);
         assert_eq!(copy.at(b[0], b[1], b[2]), 130.0);

@@ -41,6 +41,12 @@ impl LogBias {
     /// Logarithm of the gain at a voxel.
     #[inline]
     pub fn at(&self, voxel: [usize; 3]) -> f64 {
+        self.at_point(voxel.map(|v| v as f64))
+    }
+
+    /// Logarithm of the gain at a point in voxels; beyond the grid it is as at its border.
+    #[inline]
+    pub(super) fn at_point(&self, voxel: [f64; 3]) -> f64 {
         let terms = monomials(self.dims, voxel);
         let mut sum = -self.mean;
         for n in 0..TERMS {
@@ -94,7 +100,7 @@ fn products(dims: [usize; 3], used: &[usize], chunk: &[LogRatio]) -> [[f64; ROW]
     let mut sums = [[0.0; ROW]; ROW];
     let size = used.len() + 1;
     for o in chunk {
-        let terms = monomials(dims, o.voxel);
+        let terms = monomials(dims, o.voxel.map(|v| v as f64));
         let mut row = [0.0; ROW];
         row[0] = 1.0;
         for (a, &n) in used.iter().enumerate() {
@@ -112,8 +118,8 @@ fn products(dims: [usize; 3], used: &[usize], chunk: &[LogRatio]) -> [[f64; ROW]
 const DEGREE: [usize; TERMS] = [1, 1, 1, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3];
 
 #[inline]
-fn monomials(dims: [usize; 3], voxel: [usize; 3]) -> [f64; TERMS] {
-    let [x, y, z] = [0, 1, 2].map(|a| 2.0 * voxel[a] as f64 / (dims[a].max(2) - 1) as f64 - 1.0);
+fn monomials(dims: [usize; 3], voxel: [f64; 3]) -> [f64; TERMS] {
+    let [x, y, z] = [0, 1, 2].map(|a| (2.0 * voxel[a] / (dims[a].max(2) - 1) as f64 - 1.0).clamp(-1.0, 1.0));
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [
         x,

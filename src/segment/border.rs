@@ -20,7 +20,7 @@ const BEYOND: f64 = 0.5;
 const NUCLEUS: f32 = 0.25;
 
 /// Grey or white matter by the scan's intensity wherever a voxel of one has a face in common with a voxel of the other. The
-/// deep nuclei, told by place alone, stay; so does everything where the scan lies on the working grid already.
+/// deep nuclei, told by place alone, stay; so does everything where the scan's voxels are those of the working grid.
 pub(super) fn with_the_scans_border<F: Frame>(
     labels: LabelMap<F>,
     t1: &Volume<f32, F>,
@@ -30,7 +30,8 @@ pub(super) fn with_the_scans_border<F: Frame>(
 ) -> LabelMap<F> {
     let (grid, working) = (labels.grid, priors.deep_grey.grid);
     let to_working = working.voxel_from_mm() * mni_from_t1.to_matrix() * grid.mm_from_voxel;
-    if grid.dims == working.dims && (to_working - Matrix4::identity()).amax() < 1e-3 {
+    let steps = Matrix4::new_translation(&to_working.fixed_view::<3, 1>(0, 3).map(f64::round));
+    if (to_working - steps).amax() < 1e-3 {
         return labels;
     }
     let border = model.grey_white_border();

@@ -153,9 +153,9 @@ fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni
     atlas::head_from_template().then(&subject_from_mean_head(subject, &mean, Some(known)))
 }
 
-/// The template's maps read through `template_from_patient`, a map that [`fit_template`] made.
+/// The template's maps read through `template_from_patient`, a map that [`fit_template`] made, where brain may be.
 pub fn carried_priors(template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync) -> AtlasPriors {
-    AtlasPriors::through(&atlas::template().grid(), template_from_patient, MISFIT_MM)
+    AtlasPriors::near_brain(&atlas::template().grid(), template_from_patient, MISFIT_MM)
 }
 
 /// A head on the template's grid, and what its brain is looked for with.
@@ -167,50 +167,55 @@ struct BrainSearch<'a, F: Frame> {
 }
 
 /// The brain found with a carried template.
-struct FittedBrain<'a> {
+struct FittedBrain {
     carried: Carried,
-    found: FoundBrain<'a>,
+    found: FoundBrain,
     /// The template's maps; let go while another template is tried, since two of them at a time would be the peak of memory.
     priors: Option<AtlasPriors>,
     beyond: f64,
 }
 
-impl FittedBrain<'_> {
-    fn priors(&mut self) -> AtlasPriors {
-        self.priors.take().unwrap_or_else(|| priors_of(&self.carried.fit))
-    }
-}
-
-fn priors_of(fit: &AtlasFit<Mni>) -> AtlasPriors {
-    carried_priors(|p| fit.atlas_from_subject.apply(p))
-}
-
-impl<'a, F: Frame> BrainSearch<'a, F> {
-    fn with(&self, carried: Carried) -> Result<FittedBrain<'a>, SegmentError> {
-        let priors = priors_of(&carried.fit);
+impl<F: Frame> BrainSearch<'_, F> {
+    fn with(&self, carried: Carried) -> Result<FittedBrain, SegmentError> {
+        let priors = self.priors_of(&carried.fit);
         let found = find_brain(self.scan, &priors, self.given, self.settings)?;
-        let beyond = beyond(&found.brain, self.scan.known(), &priors).share;
+        let beyond = beyond(&found.brain, &found.known, &priors).share;
         Ok(FittedBrain { carried, found, priors: Some(priors), beyond })
+    }
+
+    fn priors_of(&self, fit: &AtlasFit<Mni>) -> AtlasPriors {
+        let template_from_patient = |p| fit.atlas_from_subject.apply(p);
+        // A brain that was given counts wherever it lies: the user may know better than the fit.
+        if self.given.is_some() {
+            AtlasPriors::through(&atlas::template().grid(), template_from_patient, MISFIT_MM)
+        } else {
+            carried_priors(template_from_patient)
+        }
+    }
+
+    /// Of the fit that was kept; made again where they had to be let go.
+    fn priors(&self, fitted: &mut FittedBrain) -> AtlasPriors {
+        fitted.priors.take().unwrap_or_else(|| self.priors_of(&fitted.carried.fit))
     }
 
     /// The template fitted again to the scan without a strong coil's gain, where there is one: what the first fit saw was
     /// flattened without knowing where the brain lies, and what is left hides the contrast of its dim parts.
     fn with_the_coil_known(
         &self,
-        mut first: FittedBrain<'a>,
+        mut first: FittedBrain,
         deformable: &DeformableSettings,
-    ) -> Result<FittedBrain<'a>, HeadError> {
+    ) -> Result<FittedBrain, HeadError> {
         if !first.found.warnings.iter().any(|warning| matches!(warning, SegmentWarning::StrongGain { .. })) {
             return Ok(first);
         }
-        let subject = where_known(&first.found.raw, self.scan.known());
+        let subject = where_known(&first.found.raw, &first.found.known);
         first.priors = None;
         let again = Carried::from(subject, first.carried.start, deformable)?;
         if again.correlation() > first.carried.correlation() { Ok(self.with(again)?) } else { Ok(first) }
     }
 
     /// The template made larger for as long as brain is found beyond it and that helps.
-    fn grown(&self, mut best: FittedBrain<'a>, deformable: &DeformableSettings) -> Result<FittedBrain<'a>, HeadError> {
+    fn grown(&self, mut best: FittedBrain, deformable: &DeformableSettings) -> Result<FittedBrain, HeadError> {
         let mut settings = deformable.clone();
         for way in LARGER {
             if best.beyond < CROWDED {
@@ -223,7 +228,7 @@ impl<'a, F: Frame> BrainSearch<'a, F> {
                     tried.margin_mm = (tried.margin_mm + WIDER_RIM_MM).min(DeformableSettings::WIDEST_MARGIN_MM);
                 }
                 Larger::Start => {
-                    let priors = best.priors();
+                    let priors = self.priors(&mut best);
                     start = start.then(&onto_the_brain(&best.found.brain, &priors));
                 }
             }
@@ -272,25 +277,24 @@ pub fn segment_head<F: Frame>(
     if deformable.affine && overrides.brain.is_none() {
         best = search.grown(best, deformable)?;
     }
-    let priors = best.priors();
+    let priors = search.priors(&mut best);
     let FittedBrain { carried, found, .. } = best;
+    let (outside, short) = (beyond(&found.brain, &found.known, &priors), short(&found.brain, &found.known, &priors));
+    let known = &found.known.data;
+    let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let mut segmentation = labelled(scan, found, &priors, overrides, settings)?;
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));
     }
-    let known = &segmentation.known_mni;
-    let outside = beyond(&segmentation.brain_mni, known, &priors);
     if outside.share > DOUBTFUL_SHARE || outside.worst.is_some() {
         let (place, percent) = (outside.worst.map(|worst| worst.name), 100.0 * outside.share);
         segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent, place });
     }
-    if let Some(place) = short(&segmentation.brain_mni, known, &priors).worst {
+    if let Some(place) = short.worst {
         let (place, percent) = (place.name, 100.0 * place.share);
         segmentation.warnings.push(SegmentWarning::ShortOfTemplate { place, percent });
     }
-    let known = &known.data;
-    let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (found_cc, expected_cc) = (segmentation.volumes.brain_cc, expected.volume_cc());
     if !VOLUME_RATIO.contains(&(found_cc / expected_cc.max(1.0))) {
         return Err(HeadError::UnlikeTemplate { found_cc, expected_cc });

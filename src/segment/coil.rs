@@ -10,6 +10,7 @@ use crate::image::blocks::{block_means, on_finer_grid};
 use crate::image::gaussian::gaussian;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix4, Vector3, Vector4};
+use rayon::prelude::*;
 
 /// Brightness of CSF, grey and white matter on a T1-weighted scan, over white matter's. Differences between scanners are the
 /// same everywhere and average out.
@@ -32,9 +33,9 @@ const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 /// The surface itself is left out: how much CSF lies there is the patient's.
 const DEPTH_MM: f32 = 2.0;
 
-/// The scan with its gain taken out where that is strong, and how many times brighter than its dark parts (each a sixth of
-/// the brain or so) the bright ones were; the mean over the brain stays. `None` where it is not strong.
-pub(super) fn without_strong_gain(
+/// The logarithm of a strong gain on a coarse grid, its mean over the brain 0, and how many times brighter than its dark parts
+/// (each a sixth of the brain or so) it makes the bright ones. `None` where it is not strong.
+pub(super) fn strong_gain(
     t1: &Volume<f32, Mni>,
     known: &Mask<Mni>,
     priors: &AtlasPriors,
@@ -64,15 +65,20 @@ pub(super) fn without_strong_gain(
     if spread < STRONG {
         return None;
     }
-    let mut flat = t1.clone();
+    let mut found = Volume::filled(seen.grid, -mean as f32);
     for _ in 0..ROUNDS {
-        let log_gain = sloping(&flat, &grid, usual, inside, expected);
-        let log_gain = on_finer_grid(&log_gain, &grid);
-        flat = Volume::from_fn(grid, |n| flat.data[n] * (-log_gain.data[n]).exp());
+        let more = sloping(&without_gain(t1, &found), &grid, usual * (mean as f32).exp(), inside, expected);
+        found.data.iter_mut().zip(&more.data).for_each(|(found, more)| *found += more);
     }
-    let flat = flat.map(|x| x * (mean as f32).exp());
     // One standard deviation to either side of a Gaussian leaves 16 % beyond each.
-    Some((flat, (2.0 * spread).exp()))
+    Some((found, (2.0 * spread).exp()))
+}
+
+/// A scan without a gain whose logarithm is known on a coarser grid.
+pub(super) fn without_gain(t1: &Volume<f32, Mni>, log_gain: &Volume<f32, Mni>) -> Volume<f32, Mni> {
+    let mut out = on_finer_grid(log_gain, &t1.grid);
+    out.data.par_iter_mut().zip(&t1.data).for_each(|(gain, value)| *gain = value * (-*gain).exp());
+    out
 }
 
 /// The logarithm of the gain over the usual one, found at every point with its slope there.
@@ -150,9 +156,11 @@ mod tests {
                 template.data[n] * (strength * p.z / 90.0).exp() as f32
             })
         };
-        assert!(without_strong_gain(&template, &known, &priors).is_none());
-        assert!(without_strong_gain(&coil(0.2), &known, &priors).is_none());
-        let (flat, times) = without_strong_gain(&coil(4f64.ln()), &known, &priors).unwrap();
+        assert!(strong_gain(&template, &known, &priors).is_none());
+        assert!(strong_gain(&coil(0.2), &known, &priors).is_none());
+        let strong = coil(4f64.ln());
+        let (gain, times) = strong_gain(&strong, &known, &priors).unwrap();
+        let flat = without_gain(&strong, &gain);
         assert!((1.8..6.0).contains(&times), "{times}");
         let ratio = |z: f64| {
             let n = |x: f64| grid.voxel_at(crate::geometry::Position::new(x, -20.0, z)).map(|v| v.round() as usize);
@@ -173,7 +181,7 @@ mod tests {
         let gain = |n: usize| (grid.centre(grid.voxel(n)).mm.z / 50.0).exp() as f32;
         let around = Volume::from_fn(grid, |n| if template.data[n] > 0.0 { template.data[n] } else { 100.0 });
         let seen = Volume::from_fn(grid, |n| around.data[n] * gain(n));
-        let (flat, _) = without_strong_gain(&seen, &known, &priors).unwrap();
+        let flat = without_gain(&seen, &strong_gain(&seen, &known, &priors).unwrap().0);
         let left = |wanted: &dyn Fn(f32, f64) -> bool| {
             let (mut sum, mut count) = (0.0, 0.0);
             for n in 0..grid.len() {

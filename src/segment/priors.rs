@@ -99,22 +99,28 @@ impl AtlasPriors {
         template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
         misfit_mm: f64,
     ) -> Self {
-        let template = template_maps();
-        let around = where_brain_may_be(template, grid, &template_from_patient);
         let outside = std::array::from_fn(|map| OUTSIDE[map] / UNITS[map]);
-        let mut maps = resample_each(template, &grid.cropped(&around), template_from_patient, outside);
-        // Each part is let go as soon as it is in its place: all of them twice would be the peak of memory.
-        maps.par_iter_mut().enumerate().for_each(|(map, part)| {
-            *part = part.map(|x| x * UNITS[map]);
+        let mut maps = resample_each(template_maps(), grid, template_from_patient, outside);
+        for (map, values) in maps.iter_mut().enumerate() {
+            values.data.par_iter_mut().for_each(|x| *x *= UNITS[map]);
             if map < TISSUES {
-                *part = gaussian(part, misfit_mm);
+                *values = gaussian(values, misfit_mm);
             }
-            let mut whole = Volume::filled(*grid, OUTSIDE[map]);
-            whole.paste(part, &around);
-            *part = whole;
-        });
+        }
         let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey, _] = maps;
         Self { brain_mm, tissue: [csf, grey, white], ventricle_mm, cistern_mm, deep_grey }
+    }
+
+    /// [`Self::through`] on the part of the grid where brain may be, which is most of what there is to look at: nothing is asked
+    /// of the template beyond it.
+    #[must_use]
+    pub fn near_brain(
+        grid: &Grid<Mni>,
+        template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
+        misfit_mm: f64,
+    ) -> Self {
+        let near = where_brain_may_be(template_maps(), grid, &template_from_patient);
+        Self::through(&grid.cropped(&near), template_from_patient, misfit_mm)
     }
 
     /// The template as it stands, for a patient who has only been aligned rigidly: misfits of several millimetres are

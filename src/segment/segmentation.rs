@@ -2,7 +2,7 @@
 
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
-use super::coil::without_strong_gain;
+use super::coil::{strong_gain, without_gain};
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
@@ -12,8 +12,8 @@ use super::posed_scan::PosedScan;
 use super::priors::AtlasPriors;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
 use crate::geometry::{Frame, Mni};
+use crate::image::blocks::{coarser, on_finer_grid};
 use crate::image::{BlankSlices, Grid, LabelMap, Mask, Volume};
-use std::borrow::Cow;
 use thiserror::Error;
 
 /// Everything that steers [`segment_t1`].
@@ -237,7 +237,8 @@ pub fn segment_t1<F: Frame>(
     segment_with_priors(scan, &AtlasPriors::rigid(&scan.on_template().grid), overrides, settings)
 }
 
-/// [`segment_t1`] with the template's maps already carried onto the patient, on the template's grid.
+/// [`segment_t1`] with the template's maps already carried onto the patient. The work is done on the part of the template's grid on
+/// which they lie.
 ///
 /// # Errors
 /// As [`segment_t1`].
@@ -253,9 +254,14 @@ pub fn segment_with_priors<F: Frame>(
 }
 
 /// A brain found or given, and nothing looked at inside it.
-pub(super) struct FoundBrain<'a> {
-    /// The image with a strong coil's gain taken out.
-    pub raw: Cow<'a, Volume<f32, Mni>>,
+/// The volumes lie on the priors' grid.
+pub(super) struct FoundBrain {
+    /// Logarithm of a strong coil's gain, on a coarse grid.
+    gain: Option<Volume<f32, Mni>>,
+    /// The image with that gain taken out.
+    pub raw: Volume<f32, Mni>,
+    /// Where the field of view covers the grid.
+    pub known: Mask<Mni>,
     pub brain: Mask<Mni>,
     pub warnings: Vec<SegmentWarning>,
 }
@@ -264,21 +270,20 @@ pub(super) struct FoundBrain<'a> {
 ///
 /// # Errors
 /// As [`segment_with_priors`].
-pub(super) fn find_brain<'a, F: Frame>(
-    scan: &'a PosedScan<'_, F>,
+pub(super) fn find_brain<F: Frame>(
+    scan: &PosedScan<'_, F>,
     priors: &AtlasPriors,
     given: Option<&Mask<F>>,
     settings: &SegmentSettings,
-) -> Result<FoundBrain<'a>, SegmentError> {
+) -> Result<FoundBrain, SegmentError> {
     let mut warnings = Vec::new();
-    let known = scan.known();
-    let raw = match without_strong_gain(scan.on_template(), known, priors) {
-        Some((flat, times)) => {
-            warnings.push(SegmentWarning::StrongGain { times });
-            Cow::Owned(flat)
-        }
-        None => Cow::Borrowed(scan.on_template()),
-    };
+    let near = scan.on_template().grid.box_of(&priors.brain_mm.grid);
+    let (mut raw, known) = (scan.on_template().cropped(&near), scan.known().cropped(&near));
+    let gain = strong_gain(&raw, &known, priors).map(|(gain, times)| {
+        warnings.push(SegmentWarning::StrongGain { times });
+        raw = without_gain(&raw, &gain);
+        gain
+    });
     let expected = priors.brain_mm.map(|d| d < 0.0);
     let seen = at_each(&raw, |n| expected.data[n] && known.data[n]);
     let percent = 100.0 * seen.count() as f64 / expected.count().max(1) as f64;
@@ -290,7 +295,7 @@ pub(super) fn find_brain<'a, F: Frame>(
     }
     let brain = match given {
         Some(mask) => mask_on(mask, &raw.grid, &scan.mni_from_t1.inverse()),
-        None => computed_brain(&raw, known, priors, settings)?,
+        None => computed_brain(&raw, &known, priors, settings)?,
     };
     let found_cc = brain.volume_cc();
     if !(settings.smallest_brain_cc..=settings.largest_brain_cc).contains(&found_cc) {
@@ -300,7 +305,7 @@ pub(super) fn find_brain<'a, F: Frame>(
             largest_cc: settings.largest_brain_cc,
         });
     }
-    Ok(FoundBrain { raw, brain, warnings })
+    Ok(FoundBrain { gain, raw, known, brain, warnings })
 }
 
 /// What is inside the brain.
@@ -309,13 +314,13 @@ pub(super) fn find_brain<'a, F: Frame>(
 /// As [`segment_with_priors`].
 pub(super) fn labelled<F: Frame>(
     scan: &PosedScan<'_, F>,
-    found: FoundBrain<'_>,
+    found: FoundBrain,
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
 ) -> Result<Segmentation<F>, SegmentError> {
-    let FoundBrain { raw, brain, mut warnings } = found;
-    let (PosedScan { t1, mni_from_t1, .. }, known) = (scan, scan.known());
+    let FoundBrain { gain, raw, known, brain, mut warnings } = found;
+    let PosedScan { t1, mni_from_t1, .. } = scan;
     let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
     let inside = at_each(&raw, |n| brain.data[n] && known.data[n]);
     let fitted = |stride: usize, begun: Option<&Mixture>| {
@@ -330,15 +335,15 @@ pub(super) fn labelled<F: Frame>(
     }
     let mut labels_mni = most_probable(&model, priors);
     let csf = labels_mni.map(|l| l == label::CSF);
-    let t1_mni = without_bias(&raw, &model, |_| true);
+    let even = without_bias(&raw, &model, |_| true);
     drop(raw);
     let ventricle = if let Some(mask) = overrides.ventricle {
         let given = mask_on(mask, &grid, &t1_from_mni);
-        at_each(&t1_mni, |n| given.data[n] && brain.data[n])
+        at_each(&even, |n| given.data[n] && brain.data[n])
     } else {
-        let plexus = enhanced_plexus(&t1_mni, model.means[2], priors);
+        let plexus = enhanced_plexus(&even, model.means[2], priors);
         let found = ventricles(&csf, &plexus, &brain, priors, &settings.ventricle);
-        with_shared_wall(&found, &t1_mni, &brain, &model)
+        with_shared_wall(&found, &even, &brain, &model)
     };
     if ventricle.count() == 0 {
         warnings.push(SegmentWarning::NoVentricle);
@@ -380,10 +385,10 @@ pub(super) fn labelled<F: Frame>(
             .cloned()
             .unwrap_or_else(|| labels.map(|l| l > 0)),
         labels,
-        t1_mni,
-        known_mni: known.clone(),
-        brain_mni: brain,
-        labels_mni,
+        t1_mni: without_gain(scan.on_template(), &whole_gain(&scan.on_template().grid, &grid, &model, gain.as_ref())),
+        known_mni: scan.known().clone(),
+        brain_mni: brain.within(&scan.on_template().grid, false),
+        labels_mni: labels_mni.within(&scan.on_template().grid, label::BACKGROUND),
         tissue_means: model.means,
         csf_grey_border: model.csf_grey_border(),
         volumes,
@@ -452,6 +457,24 @@ fn computed_brain(
     let flat = without_bias(raw, &model, |n| known.data[n] && priors.brain_mm.data[n] < reach + ROOM_MM);
     let calm = calmed(&flat, known, priors, &model);
     Ok(brain_mask(calm.as_ref().unwrap_or(&flat), known, &model, priors, &settings.brain))
+}
+
+/// The logarithm of all gain that was found on the grid `near` the brain, on a coarse one over all of `whole`; far from the brain
+/// it is as where it was last looked for.
+fn whole_gain(
+    whole: &Grid<Mni>,
+    near: &Grid<Mni>,
+    model: &Mixture,
+    strong: Option<&Volume<f32, Mni>>,
+) -> Volume<f32, Mni> {
+    /// Finer than any gain.
+    const FACTOR: usize = 4;
+    let coarse = coarser(whole, FACTOR);
+    let strong = strong.map(|gain| on_finer_grid(gain, &coarse));
+    Volume::from_fn(coarse, |n| {
+        let place = near.voxel_at(coarse.centre(coarse.voxel(n)));
+        model.bias.at_point([place.x, place.y, place.z]) as f32 + strong.as_ref().map_or(0.0, |gain| gain.data[n])
+    })
 }
 
 /// The image with its bias taken out where it is `wanted`, 0 elsewhere.
