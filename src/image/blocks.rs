@@ -7,6 +7,9 @@ use nalgebra::{Matrix4, Vector3};
 use rayon::prelude::*;
 
 /// A voxel for each block of `factor` voxels along each axis.
+///
+/// # Panics
+/// For a factor of 0.
 #[must_use]
 pub fn coarser<F: Frame>(grid: &Grid<F>, factor: usize) -> Grid<F> {
     let middle = (factor as f64 - 1.0) / 2.0;
