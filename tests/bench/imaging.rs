@@ -78,7 +78,7 @@ fn prep_bars(folder: &Path) -> Vec<Bar> {
     let equal = one.ok && two.ok && a == b;
     let said = if equal { format!("{} files equal", a.len()) } else { "files differ".to_owned() };
     vec![
-        wall(name, 30.0, &two),
+        wall(name, 20.0, &two),
         memory(name, 2.0, &two),
         Bar::new(&format!("{name}, 1 and 2 threads"), "same bytes", said, equal),
     ]
