@@ -11,6 +11,7 @@ pub mod morphology;
 pub mod nifti;
 pub mod resample;
 pub mod seg_nrrd;
+mod spline;
 mod volume;
 
 pub use blank_slices::{BlankSlices, blank_slices, with_filled};

@@ -3,7 +3,6 @@
 //! The ball is exact (thresholds of the Euclidean distance). Beyond the grid nothing is known: the border is not a
 //! surface, so an erosion does not eat into a structure that the field of view cuts, and a closing never shrinks.
 
-use super::bounds::VoxelBox;
 use super::distance::squared_distance_mm2;
 use super::volume::Mask;
 use crate::geometry::Frame;
@@ -25,7 +24,7 @@ pub fn dilations<const N: usize, F: Frame>(mask: &Mask<F>, radii_mm: [f64; N]) -
     let squared = squared_distance_mm2(&mask.cropped(&around), true, squared_limit(largest_mm));
     radii_mm.map(|radius_mm| {
         let limit = squared_limit(radius_mm);
-        pasted(mask, &around, &squared.map(|d2| d2 <= limit))
+        squared.map(|d2| d2 <= limit).within(&mask.grid, false)
     })
 }
 
@@ -38,7 +37,7 @@ pub fn erode<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
     let around = around.grown(&mask.grid, 1e-3 * smallest_mm);
     let part = mask.cropped(&around);
     let limit = squared_limit(radius_mm);
-    pasted(mask, &around, &squared_distance_mm2(&part, false, limit).map(|d2| d2 > limit))
+    squared_distance_mm2(&part, false, limit).map(|d2| d2 > limit).within(&mask.grid, false)
 }
 
 /// Erosion, then dilation: removes what is thinner than twice the radius.
@@ -57,12 +56,6 @@ pub fn close<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
 fn squared_limit(radius_mm: f64) -> f32 {
     let radius_mm = radius_mm.max(0.0);
     (radius_mm * radius_mm * (1.0 + 1e-6)) as f32
-}
-
-fn pasted<F: Frame>(mask: &Mask<F>, at: &VoxelBox, part: &Mask<F>) -> Mask<F> {
-    let mut out = Mask::filled(mask.grid, false);
-    out.paste(part, at);
-    out
 }
 
 #[cfg(test)]

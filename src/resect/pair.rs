@@ -327,9 +327,7 @@ fn labels_through(labels: &LabelMap<Mni>, sag: &AtlasFit<Mni>) -> LabelMap<Mni> 
 fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
     let near = around(cavity, NEAR_MM);
     let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid.cropped(&near));
-    let mut undone_whole = Mask::filled(cavity.grid, false);
-    undone_whole.paste(&undone.map(|share| share >= 0.5), &near);
-    both(&undone_whole, &before.brain_mni)
+    both(&undone.map(|share| share >= 0.5).within(&cavity.grid, false), &before.brain_mni)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

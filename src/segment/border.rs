@@ -76,8 +76,8 @@ pub(super) fn with_the_scans_border<F: Frame>(
 mod tests {
     use super::*;
     use crate::geometry::{Position, Pre};
-    use crate::image::Grid;
     use crate::image::resample::{Interpolation, resample};
+    use crate::image::{Grid, VoxelBox};
     use crate::segment::bias::LogBias;
     use crate::segment::native::labels_on;
     use nalgebra::Vector3;
@@ -189,5 +189,11 @@ mod tests {
         let found =
             with_the_scans_border(turned.clone(), &scan, &still, &model(&working), &priors(&working, |_| false));
         assert_eq!(found, turned);
+        // A part of it has the same voxels.
+        let part = working.cropped(&VoxelBox { first: [3, 1, 0], end: [40, 48, 45] });
+        assert_eq!(
+            with_the_scans_border(turned.clone(), &scan, &still, &model(&part), &priors(&part, |_| false)),
+            turned
+        );
     }
 }

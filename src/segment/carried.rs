@@ -349,6 +349,21 @@ mod tests {
     }
 
     #[test]
+    fn slow_a_brain_given_by_hand_counts_wherever_it_lies() {
+        let (scan, pose) = a_child_askew();
+        // Far from any brain, within the scan.
+        let hand = |p: Position<Mni>| (p.mm - Point3::new(0.0, -20.0, 10.0)).norm() < 60.0 || p.mm.x > 90.0;
+        let given = Mask::from_fn(scan.grid, |n| hand(pose.apply(scan.grid.centre(scan.grid.voxel(n)))));
+        let overrides = SegmentOverrides { brain: Some(&given), ventricle: None };
+        let (deformable, settings) = (DeformableSettings::default(), SegmentSettings::default());
+        let (found, _) = segment_head(&PosedScan::new(&scan, &pose), &overrides, &deformable, &settings).unwrap();
+        let there = super::super::native::mask_on(&given, &found.brain_mni.grid, &pose.inverse());
+        assert_eq!(found.brain_mni, there);
+        let grid = found.brain_mni.grid;
+        assert_eq!(found.brain_mni.bounding_box().unwrap().end[0], grid.dims[0], "the side of the template's grid");
+    }
+
+    #[test]
     fn an_image_without_a_head_is_refused_with_its_likeness() {
         let grid = Grid::<Pre>::axis_aligned([48, 48, 48], [4.0; 3], [-94.0, -94.0, -94.0]);
         let stripes = Volume::from_fn(grid, |n| {

@@ -33,8 +33,8 @@ const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 /// The surface itself is left out: how much CSF lies there is the patient's.
 const DEPTH_MM: f32 = 2.0;
 
-/// The logarithm of a strong gain on a coarse grid, its mean over the brain 0, and how many times brighter than its dark parts
-/// (each a sixth of the brain or so) it makes the bright ones. `None` where it is not strong.
+/// The logarithm of a strong gain on a coarse grid, and how many times brighter than its dark parts (each a sixth of the brain or
+/// so) it makes the bright ones; without it the brain is as bright as before on average. `None` where it is not strong.
 pub(super) fn strong_gain(
     t1: &Volume<f32, Mni>,
     known: &Mask<Mni>,
@@ -67,15 +67,15 @@ pub(super) fn strong_gain(
     }
     let mut found = Volume::filled(seen.grid, -mean as f32);
     for _ in 0..ROUNDS {
-        let more = sloping(&without_gain(t1, &found), &grid, usual * (mean as f32).exp(), inside, expected);
+        let more = sloping(&evened(t1, &found), &grid, usual * (mean as f32).exp(), inside, expected);
         found.data.iter_mut().zip(&more.data).for_each(|(found, more)| *found += more);
     }
     // One standard deviation to either side of a Gaussian leaves 16 % beyond each.
     Some((found, (2.0 * spread).exp()))
 }
 
-/// A scan without a gain whose logarithm is known on a coarser grid.
-pub(super) fn without_gain(t1: &Volume<f32, Mni>, log_gain: &Volume<f32, Mni>) -> Volume<f32, Mni> {
+/// A scan with a gain taken out whose logarithm is known on a coarser grid.
+pub(super) fn evened(t1: &Volume<f32, Mni>, log_gain: &Volume<f32, Mni>) -> Volume<f32, Mni> {
     let mut out = on_finer_grid(log_gain, &t1.grid);
     out.data.par_iter_mut().zip(&t1.data).for_each(|(gain, value)| *gain = value * (-*gain).exp());
     out
@@ -160,7 +160,7 @@ mod tests {
         assert!(strong_gain(&coil(0.2), &known, &priors).is_none());
         let strong = coil(4f64.ln());
         let (gain, times) = strong_gain(&strong, &known, &priors).unwrap();
-        let flat = without_gain(&strong, &gain);
+        let flat = evened(&strong, &gain);
         assert!((1.8..6.0).contains(&times), "{times}");
         let ratio = |z: f64| {
             let n = |x: f64| grid.voxel_at(crate::geometry::Position::new(x, -20.0, z)).map(|v| v.round() as usize);
@@ -181,7 +181,7 @@ mod tests {
         let gain = |n: usize| (grid.centre(grid.voxel(n)).mm.z / 50.0).exp() as f32;
         let around = Volume::from_fn(grid, |n| if template.data[n] > 0.0 { template.data[n] } else { 100.0 });
         let seen = Volume::from_fn(grid, |n| around.data[n] * gain(n));
-        let flat = without_gain(&seen, &strong_gain(&seen, &known, &priors).unwrap().0);
+        let flat = evened(&seen, &strong_gain(&seen, &known, &priors).unwrap().0);
         let left = |wanted: &dyn Fn(f32, f64) -> bool| {
             let (mut sum, mut count) = (0.0, 0.0);
             for n in 0..grid.len() {

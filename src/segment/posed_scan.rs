@@ -43,3 +43,25 @@ impl<'a, F: Frame> PosedScan<'a, F> {
         &self.read().inside
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pre;
+    use crate::image::Grid;
+    use nalgebra::{Point3, Vector3};
+
+    #[test]
+    fn a_scan_is_read_once_by_the_spline_and_is_never_below_nothing() {
+        let grid = Grid::<Pre>::axis_aligned([24; 3], [3.0; 3], [-34.5; 3]);
+        let t1 = Volume::from_voxels(grid, |[i, j, k]| if (i / 3 + j / 4 + k / 5) % 2 == 0 { 90.0 } else { 0.0 });
+        let pose = RigidTransform::about(Point3::origin(), Vector3::new(0.1, -0.2, 0.3), Vector3::new(2.0, -9.0, 4.0));
+        let scan = PosedScan::new(&t1, &pose);
+        let template = atlas::template().grid();
+        let read = resample(&t1, &template, &pose.inverse().to_affine(), Interpolation::CubicBSpline, 0.0);
+        assert!(read.volume.data.iter().any(|&x| x < -1.0), "the spline overshoots at edges");
+        assert_eq!(scan.on_template(), &read.volume.map(|x| x.max(0.0)));
+        assert_eq!(scan.known(), &read.inside);
+        assert!(std::ptr::eq(scan.on_template(), scan.on_template()));
+    }
+}

@@ -111,8 +111,7 @@ impl AtlasPriors {
         Self { brain_mm, tissue: [csf, grey, white], ventricle_mm, cistern_mm, deep_grey }
     }
 
-    /// [`Self::through`] on the part of the grid where brain may be, which is most of what there is to look at: nothing is asked
-    /// of the template beyond it.
+    /// [`Self::through`] on the part of the grid where brain may be: nothing is asked of the template beyond it.
     #[must_use]
     pub fn near_brain(
         grid: &Grid<Mni>,

@@ -2,7 +2,7 @@
 
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
-use super::coil::{strong_gain, without_gain};
+use super::coil::{evened, strong_gain};
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
@@ -253,8 +253,7 @@ pub fn segment_with_priors<F: Frame>(
     labelled(scan, found, priors, overrides, settings)
 }
 
-/// A brain found or given, and nothing looked at inside it.
-/// The volumes lie on the priors' grid.
+/// A brain found or given, and nothing looked at inside it; the volumes lie on the priors' grid.
 pub(super) struct FoundBrain {
     /// Logarithm of a strong coil's gain, on a coarse grid.
     gain: Option<Volume<f32, Mni>>,
@@ -281,7 +280,7 @@ pub(super) fn find_brain<F: Frame>(
     let (mut raw, known) = (scan.on_template().cropped(&near), scan.known().cropped(&near));
     let gain = strong_gain(&raw, &known, priors).map(|(gain, times)| {
         warnings.push(SegmentWarning::StrongGain { times });
-        raw = without_gain(&raw, &gain);
+        raw = evened(&raw, &gain);
         gain
     });
     let expected = priors.brain_mm.map(|d| d < 0.0);
@@ -385,7 +384,7 @@ pub(super) fn labelled<F: Frame>(
             .cloned()
             .unwrap_or_else(|| labels.map(|l| l > 0)),
         labels,
-        t1_mni: without_gain(scan.on_template(), &whole_gain(&scan.on_template().grid, &grid, &model, gain.as_ref())),
+        t1_mni: evened(scan.on_template(), &whole_gain(&scan.on_template().grid, &grid, &model, gain.as_ref())),
         known_mni: scan.known().clone(),
         brain_mni: brain.within(&scan.on_template().grid, false),
         labels_mni: labels_mni.within(&scan.on_template().grid, label::BACKGROUND),
