@@ -86,6 +86,7 @@ impl Model {
         if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
             let mut u = state.u.clone();
             self.move_prescribed(&mut u, 1.0);
+            self.supports.push_out(&mut u, &self.nodes_m, self.held_components.as_deref().map(Vec::as_slice));
             let stored = self.energy(&u, &laws);
             if stored.is_finite() {
                 let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);

@@ -74,6 +74,9 @@ impl Mass {
             }
             []
         });
+        for v in tangent.walls.iter_mut().flat_map(|(_, block)| block) {
+            *v *= stiffness_factor;
+        }
         if let Some(nodal) = &mut tangent.nodal {
             by_rows(&mut nodal.moduli, |_, moduli| {
                 for v in moduli.as_flattened_mut() {

@@ -315,7 +315,8 @@ impl Model {
         if let Some(held) = &self.held_components {
             matrix.hold_components(held);
         }
-        Tangent { matrix, nodal: self.body.nodal_tangent(u, laws, self.held_components.clone(), project) }
+        let nodal = self.body.nodal_tangent(u, laws, self.held_components.clone(), project);
+        Tangent { matrix, nodal, walls: Vec::new() }
     }
 
     /// Entries of the free rows; held components are zero.

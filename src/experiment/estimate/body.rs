@@ -113,6 +113,10 @@ pub struct Body<'a> {
     gravity: Vector3<f64>,
     /// The last point solved.
     last: Option<Last>,
+    /// Where the next equilibrium is looked for, if not from the last one.
+    start: Option<State>,
+    /// Relative residual of the sensitivities' linear systems.
+    sensitive: f64,
     /// Solves for an equilibrium so far.
     pub solves: usize,
     /// Linear solves for sensitivities so far.
@@ -204,6 +208,8 @@ impl<'a> Body<'a> {
             model,
             gravity,
             last: None,
+            start: None,
+            sensitive: SENSITIVE,
             solves: 0,
             tangent_solves: 0,
         })
@@ -272,6 +278,18 @@ impl<'a> Body<'a> {
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     }
 
+    /// The same with sensitivities to this relative residual of their linear systems.
+    #[must_use]
+    pub(in crate::experiment) fn sensitive_within(mut self, relative_residual: f64) -> Self {
+        self.sensitive = relative_residual;
+        self
+    }
+
+    /// The next equilibrium is looked for from this displacement (mm, every node of the mesh), if it is a possible one.
+    pub(in crate::experiment) fn start_from(&mut self, displacement_mm: &[[f64; 3]]) {
+        self.start = self.model.state(displacement_mm).ok();
+    }
+
     /// Equilibrium alone at these parameters.
     ///
     /// # Errors
@@ -293,7 +311,8 @@ impl<'a> Body<'a> {
             }
         }
         let materials = materials(&self.template, &self.unknowns, log_parameters, self.poisson_ratio)?;
-        let start = self.last.as_ref().map(|last| last.towards(log_parameters, &self.model));
+        let last = || self.last.as_ref().map(|last| last.towards(log_parameters, &self.model));
+        let start = self.start.take().or_else(last);
         let (outcome, state) = self.model.solve(&materials, start.as_ref(), &|_| {})?;
         self.solves += 1;
         Ok((materials, outcome, state))
@@ -320,11 +339,37 @@ impl<'a> Body<'a> {
         if let Some(last) = self.last.as_ref().filter(|last| last.log_parameters == log_parameters) {
             return Ok(last.solved.clone());
         }
+        let all = vec![true; self.unknowns.len()];
+        let (state, solved) = self.solve_by(log_parameters, &all)?;
+        self.last = Some(Last { log_parameters: log_parameters.to_vec(), state, solved: solved.clone() });
+        Ok(solved)
+    }
+
+    /// Equilibrium and the sensitivities to some of the unknowns; those of the others are empty.
+    ///
+    /// # Errors
+    /// The solver's.
+    pub(in crate::experiment) fn solve_partly(
+        &mut self,
+        log_parameters: &[f64],
+        wanted: &[bool],
+    ) -> Result<Solved, BodyError> {
+        self.solve_by(log_parameters, wanted).map(|(_, solved)| solved)
+    }
+
+    fn solve_by(&mut self, log_parameters: &[f64], wanted: &[bool]) -> Result<(State, Solved), BodyError> {
         let (materials, outcome, state) = self.balanced(log_parameters)?;
+        // A turn of gravity needs weight along all three axes, of which the weight of a denser tissue is a sum.
+        let turns = self.unknowns.iter().zip(wanted).any(|(u, wanted)| *wanted && matches!(u, Unknown::GravityTurn(_)));
+        let along_axes = turns && self.template.loads.csf.is_none();
         // What to differentiate by, with the unknown it belongs to and its weight there.
         let mut by = Vec::new();
-        for (n, unknown) in self.unknowns.iter().enumerate() {
+        for (n, unknown) in self.unknowns.iter().enumerate().filter(|(n, _)| wanted[*n]) {
             match unknown {
+                Unknown::Density if along_axes => {
+                    let gravity = self.turned(log_parameters);
+                    by.extend((0..3).map(|axis| (By::Gravity(axis), n, gravity[axis])));
+                }
                 Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
                 Unknown::CsfLevel => by.push((By::CsfLevel, n, 1.0)),
                 Unknown::Pressure(number) => by.push((By::Load(Load::Pressure(*number)), n, 1.0)),
@@ -358,9 +403,11 @@ impl<'a> Body<'a> {
         let mut different: Vec<By> = by.iter().map(|(by, ..)| by.clone()).collect();
         different.sort_unstable();
         different.dedup();
-        let parts = self.model.sensitivities_within(SENSITIVE, &materials, &state, &different)?;
+        let parts = self.model.sensitivities_within(self.sensitive, &materials, &state, &different)?;
         self.tangent_solves += different.len();
-        let mut sensitivities = vec![vec![[0.0; 3]; outcome.displacement_mm.len()]; self.unknowns.len()];
+        let nodes = outcome.displacement_mm.len();
+        let mut sensitivities: Vec<Vec<[f64; 3]>> =
+            wanted.iter().map(|wanted| if *wanted { vec![[0.0; 3]; nodes] } else { Vec::new() }).collect();
         for (by, n, weight) in by {
             let part = parts.iter().zip(&different).find(|(_, b)| **b == by).map_or(&[][..], |(part, _)| part);
             for (sum, s) in sensitivities[n].iter_mut().zip(part) {
@@ -369,9 +416,7 @@ impl<'a> Body<'a> {
                 }
             }
         }
-        let solved = Solved { outcome, sensitivities };
-        self.last = Some(Last { log_parameters: log_parameters.to_vec(), state, solved: solved.clone() });
-        Ok(solved)
+        Ok((state, Solved { outcome, sensitivities }))
     }
 
     fn residuals(&self, solved: &Solved) -> Linearisation {

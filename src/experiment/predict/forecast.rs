@@ -1,9 +1,10 @@
 //! From a body whose unknowns have priors to draws of its displacement.
 
 use super::check::{Check, checked};
+use super::path::Path;
 use super::response::{Coordinates, Response, SolvedState};
 use super::uncertain::Uncertainty;
-use crate::experiment::estimate::{Body, BodyError, Observation};
+use crate::experiment::estimate::{Body, BodyError, Observation, Solved};
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
 use rayon::prelude::*;
@@ -24,6 +25,18 @@ pub struct Posed {
     pub poisson_ratio: f64,
     /// What is not known.
     pub uncertainty: Uncertainty,
+}
+
+impl Posed {
+    fn has_walls(&self) -> bool {
+        !self.scenario.contact.is_empty()
+    }
+
+    /// How many equilibria its forecast solves, with so many checks: for whoever is told of each.
+    pub fn solutions(&self, checks: usize) -> usize {
+        let path = Path::new(&self.uncertainty, self.has_walls());
+        path.points(&self.uncertainty).len() + path.beside(&self.uncertainty) + checks
+    }
 }
 
 /// What one way of supporting a body comes to.
@@ -49,6 +62,10 @@ pub struct ForecastError {
     pub source: BodyError,
 }
 
+/// Relative residual of a surface's equilibria and of their sensitivities: what it is off by is more (docs/evidence/prediction.md).
+const BALANCED: f64 = 1e-4;
+const SENSITIVE: f64 = 1e-3;
+
 /// Solves the states of a surface, reads `draws` from it and solves the first `checks` of them whole. `step` is called after
 /// each solution.
 ///
@@ -58,42 +75,57 @@ pub fn forecast(
     posed: &Posed,
     nodes: usize,
     (draws, checks): (usize, usize),
-    step: &dyn Fn(),
+    step: &(dyn Fn() + Sync),
 ) -> Result<Forecast, ForecastError> {
     let refused = |source| ForecastError { supports: posed.supports.clone(), source };
     let uncertainty = &posed.uncertainty;
-    let mut body = Body::new(
-        &posed.mesh,
-        &posed.scenario,
-        uncertainty.unknowns(),
-        posed.poisson_ratio,
-        Observation::Nodes(Vec::new()),
-    )
-    .map_err(refused)?;
-    let mut solve = |at: &[f64]| -> Result<SolvedState, ForecastError> {
-        let mut solved = body.solve(at).map_err(refused)?;
-        solved.outcome.displacement_mm.truncate(nodes);
-        solved.sensitivities.iter_mut().for_each(|slope| slope.truncate(nodes));
-        step();
-        let (displacement_mm, slopes_mm) = (solved.outcome.displacement_mm, solved.sensitivities);
-        Ok(SolvedState { at: at.to_vec(), displacement_mm, slopes_mm })
+    let body = |scenario: &Scenario| {
+        let nothing = Observation::Nodes(Vec::new());
+        Body::new(&posed.mesh, scenario, uncertainty.unknowns(), posed.poisson_ratio, nothing).map_err(refused)
     };
-    let centre = solve(&uncertainty.centre())?;
-    let coordinates = Coordinates::new(uncertainty, &centre);
-    let mut states = vec![centre];
-    for at in coordinates.design() {
-        states.push(solve(&at)?);
+    let mut roughly = posed.scenario.clone();
+    roughly.solver.relative_residual = roughly.solver.relative_residual.max(BALANCED);
+    let mut rough = body(&roughly)?.sensitive_within(SENSITIVE);
+    let solved = |at: Vec<f64>, found: Solved| {
+        step();
+        SolvedState { at, displacement_mm: found.outcome.displacement_mm, slopes_mm: found.sensitivities }
+    };
+    // From stiff and light to soft and heavy, each from the one before it; where much of the body has come to a wall, slopes do
+    // not say enough of the next, and the way goes on through a state between.
+    let path = Path::new(uncertainty, posed.has_walls());
+    let mut states: Vec<SolvedState> = Vec::new();
+    for at in path.points(uncertainty) {
+        if let Some(last) = states.last().filter(|_| posed.has_walls() && states.len() > path.middle()) {
+            let half = rough.equilibrium(&last.half_way_to(&at)).map_err(refused)?;
+            rough.start_from(&last.through(&half.displacement_mm, &at));
+        }
+        let found = rough.solve(&at).map_err(refused)?;
+        states.push(solved(at, found));
+    }
+    let middle = path.middle();
+    let coordinates = Coordinates::new(uncertainty, path, &states[middle]);
+    let first = Response::fitted(coordinates.clone(), &states);
+    for beside in coordinates.beside() {
+        rough.start_from(&first.at(&beside.at));
+        let found = rough.solve_partly(&beside.at, &beside.slopes).map_err(refused)?;
+        states.push(solved(beside.at, found));
     }
     let response = Response::fitted(coordinates, &states);
-    let draws_mm: Vec<Vec<[f64; 3]>> = (0..draws).into_par_iter().map(|n| response.at(&uncertainty.draw(n))).collect();
-    let mut pairs = Vec::new();
-    for (n, read) in draws_mm.iter().enumerate().take(checks) {
-        let mut solved = body.equilibrium(&uncertainty.draw(n)).map_err(refused)?.displacement_mm;
+    let read = |n: usize| response.at(&uncertainty.draw(n));
+    let (mut pairs, mut exact) = (Vec::new(), body(&posed.scenario)?);
+    for n in 0..checks.min(draws) {
+        let mut read = read(n);
+        exact.start_from(&read);
+        let mut solved = exact.equilibrium(&uncertainty.draw(n)).map_err(refused)?.displacement_mm;
+        read.truncate(nodes);
         solved.truncate(nodes);
         step();
-        pairs.push((read.clone(), solved));
+        pairs.push((read, solved));
     }
     let check = (!pairs.is_empty()).then(|| checked(&posed.supports, &pairs));
+    // Nodes that the supports have added come last.
+    let response = response.thinned(&(0..nodes).collect::<Vec<_>>());
+    let draws_mm: Vec<Vec<[f64; 3]>> = (0..draws).into_par_iter().map(|n| response.at(&uncertainty.draw(n))).collect();
     Ok(Forecast { response, draws_mm, check, states: states.len() })
 }
 

@@ -1,11 +1,14 @@
 //! How every node answers to the unknowns: a surface through a few equilibria and their sensitivities.
 //!
-//! A linear-elastic body moves in proportion to load over stiffness; a large shift less, and one that the skull ends hardly
-//! any more. So the displacement is u = C w with C, the load over a mean stiffness, and w smooth and almost constant: a
-//! polynomial (a polynomial chaos fitted to values and slopes; Xiu, "Numerical Methods for Stochastic Computations", 2010)
-//! in s = ln C, in each tissue's share of the compliance, and in what else is not known. Gravity that turns pulls less the
-//! old way (a part of C) and some across it. So a linear body is followed exactly where its tissues' compliances add up.
+//! A linear-elastic body moves in proportion to C, the load over its stiffness. Before a wall there is one more length, the
+//! room: such a body's u / C is the same wherever C over the room is (u of a linear body with room r under load C is r times
+//! that of room 1 under C / r). So u = C v, and v hangs mostly on t = ln C - ln room: it is a cubic spline in t through values
+//! and slopes of states along a path from little load to much. What else is not known has the slopes of those states, and where
+//! states lie off the path a second power (docs/evidence/prediction.md). C is made of the tissues' moduli by their shares of the
+//! compliance, in logarithms. Gravity that turns pulls less the old way and some across it: v is multiplied by the cosine of
+//! the turn and has slopes in its sine, as a linear body has exactly.
 
+use super::path::{BESIDE, Kind, Path};
 use super::uncertain::Uncertainty;
 use crate::experiment::estimate::Unknown;
 use nalgebra::DMatrix;
@@ -18,58 +21,60 @@ pub struct SolvedState {
     pub at: Vec<f64>,
     /// Displacement of every node, mm.
     pub displacement_mm: Vec<[f64; 3]>,
-    /// How it changes with each number, mm per unit.
+    /// How it changes with each number, mm per unit; empty where that was not asked.
     pub slopes_mm: Vec<Vec<[f64; 3]>>,
 }
 
-/// What a number is to the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    /// ln(modulus) of a tissue with its share of the compliance.
-    Modulus(f64),
-    /// ln(density).
-    Density,
-    /// ln(room): the room itself counts.
-    Room,
-    /// A turn of gravity, radians, about one of two axes across it.
-    Turn,
-    /// Anything else, by itself; the second power as well where states lie to both sides.
-    Other { curved: bool },
-}
+impl SolvedState {
+    /// Half way from here to other numbers.
+    pub fn half_way_to(&self, at: &[f64]) -> Vec<f64> {
+        self.at.iter().zip(at).map(|(here, there)| 0.5 * (here + there)).collect()
+    }
 
-/// How many states lie off the centre in a coordinate, and so which powers of it count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Bend {
-    /// None: slopes alone.
-    Straight,
-    /// One.
-    Once,
-    /// To both sides.
-    Both,
+    /// Displacement at other numbers (mm) by the parabola through this state with its slopes and through the one half way there.
+    pub fn through(&self, half_mm: &[[f64; 3]], at: &[f64]) -> Vec<[f64; 3]> {
+        let mut there: Vec<[f64; 3]> = half_mm.iter().map(|u| u.map(|x| 4.0 * x)).collect();
+        for (sum, u) in there.iter_mut().zip(&self.displacement_mm) {
+            (0..3).for_each(|i| sum[i] -= 3.0 * u[i]);
+        }
+        for ((to, from), slopes) in at.iter().zip(&self.at).zip(&self.slopes_mm) {
+            for (sum, slope) in there.iter_mut().zip(slopes) {
+                (0..3).for_each(|i| sum[i] -= (to - from) * slope[i]);
+            }
+        }
+        there
+    }
+
+    /// The same with the slopes that count at this place.
+    #[must_use]
+    pub fn of(mut self, beside: &Beside) -> Self {
+        let slopes = self.slopes_mm.iter_mut().zip(&beside.slopes);
+        slopes.filter(|(_, counts)| !**counts).for_each(|(slope, _)| slope.clear());
+        self
+    }
 }
 
 /// The coordinates of the surface.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
+    path: Path,
     centre: Vec<f64>,
     sd: Vec<f64>,
     kinds: Vec<Kind>,
-    /// Standard deviation of ln C.
-    log_sd: f64,
 }
 
-/// Highest power of ln C: three values and slopes fix six.
-const POWERS: usize = 4;
-/// Where states lie, in standard deviations of ln C from the centre. The outer nodes of Gauss and Hermite's rule of three.
-const ALONG_LOAD: f64 = 1.732_050_807_568_877_2;
-/// Beyond this turn the part across gravity is no small one any more, radians.
-const LARGEST_TURN: f64 = 1.2;
-/// The same along an unknown whose second power counts.
-const ALONG_CURVED: f64 = 1.3;
+/// A state beside the path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beside {
+    /// The unknowns' numbers.
+    pub at: Vec<f64>,
+    /// Slopes of which numbers count there.
+    pub slopes: Vec<bool>,
+}
 
 impl Coordinates {
     /// Coordinates around the state in the middle of the prior, which tells each tissue's share.
-    pub fn new(uncertainty: &Uncertainty, centre: &SolvedState) -> Self {
+    pub fn new(uncertainty: &Uncertainty, path: Path, centre: &SolvedState) -> Self {
         let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
             a.iter().zip(b).map(|(a, b)| (0..3).map(|i| a[i] * b[i]).sum::<f64>()).sum()
         };
@@ -78,122 +83,91 @@ impl Coordinates {
             .filter(|&n| matches!(uncertainty.list[n].unknown, Unknown::ShearModulus(_)))
             .collect();
         let all: f64 = moduli.iter().map(|&n| share(n)).sum();
-        let kind = |n: usize| match &uncertainty.list[n].unknown {
-            Unknown::ShearModulus(_) if all > 0.0 => Kind::Modulus(share(n) / all),
-            Unknown::ShearModulus(_) => Kind::Modulus(1.0 / moduli.len() as f64),
-            Unknown::Density => Kind::Density,
-            Unknown::Gap(_) => Kind::Room,
-            Unknown::CsfLevel => Kind::Other { curved: true },
-            Unknown::GravityTurn(_) => Kind::Turn,
-            Unknown::Shape(..) | Unknown::Pressure(_) => Kind::Other { curved: false },
-        };
-        let kinds: Vec<Kind> = (0..uncertainty.list.len()).map(kind).collect();
-        let sd = uncertainty.sds();
-        let variance: f64 = kinds
-            .iter()
-            .zip(&sd)
-            .map(|(kind, sd)| match kind {
-                Kind::Modulus(share) => (share * sd).powi(2),
-                Kind::Density => sd * sd,
-                Kind::Room | Kind::Turn | Kind::Other { .. } => 0.0,
-            })
-            .sum();
-        Self { centre: uncertainty.centre(), sd, kinds, log_sd: variance.sqrt().max(1e-9) }
+        let equal = 1.0 / moduli.len().max(1) as f64;
+        let part = |n: usize| if all > 0.0 && moduli.contains(&n) { share(n) / all } else { equal };
+        let kinds = uncertainty.list.iter().enumerate().map(|(n, u)| Kind::of(&u.unknown, part(n))).collect();
+        Self { path, centre: uncertainty.centre(), sd: uncertainty.sds(), kinds }
     }
 
-    /// Where states are needed besides the centre: softer and stiffer, tissues apart, and to both sides of what is curved. Only moduli are
-    /// changed for the load over stiffness: a body of half the stiffness moves like one of twice the weight.
-    pub fn design(&self) -> Vec<Vec<f64>> {
+    /// Where states are needed besides the path: to both sides of what is curved, before walls of gravity's direction as well
+    /// (there the slopes by the direction alone), without them with the tissues apart.
+    pub fn beside(&self) -> Vec<Beside> {
         let mut points = Vec::new();
-        for side in [1.0, -1.0] {
-            let mut point = self.centre.clone();
-            for (x, kind) in point.iter_mut().zip(&self.kinds) {
-                if matches!(kind, Kind::Modulus(_)) {
-                    *x -= side * ALONG_LOAD * self.log_sd;
-                }
+        let mut add = |changes: &[(usize, f64)], slopes: Vec<bool>| {
+            let mut at = self.centre.clone();
+            for &(n, by) in changes {
+                at[n] += by * BESIDE * self.sd[n];
             }
-            points.push(point);
-        }
-        // Each tissue but the first softer, the first stiffer.
+            points.push(Beside { at, slopes });
+        };
+        let all = vec![true; self.kinds.len()];
         let moduli: Vec<usize> = (0..self.kinds.len()).filter(|&n| matches!(self.kinds[n], Kind::Modulus(_))).collect();
-        for &n in moduli.iter().skip(1) {
-            let mut point = self.centre.clone();
-            point[moduli[0]] += ALONG_CURVED * self.sd[moduli[0]];
-            point[n] -= ALONG_CURVED * self.sd[n];
-            points.push(point);
+        // Each tissue but the first softer, the first stiffer.
+        for &n in moduli.iter().skip(1).filter(|_| self.path.tissues_bend()) {
+            add(&[(moduli[0], 1.0), (n, -1.0)], all.clone());
         }
-        for n in (0..self.kinds.len()).filter(|&n| self.is_curved(n)) {
+        for n in (0..self.kinds.len()).filter(|&n| self.path.bends(self.kinds[n])) {
+            let turns = || self.kinds.iter().map(|kind| *kind == Kind::Turn).collect();
+            let slopes = if self.kinds[n] == Kind::Turn { turns() } else { all.clone() };
             for side in [1.0, -1.0] {
-                let mut point = self.centre.clone();
-                point[n] += side * ALONG_CURVED * self.sd[n];
-                points.push(point);
+                add(&[(n, side)], slopes.clone());
             }
         }
         points
     }
 
-    fn is_curved(&self, n: usize) -> bool {
-        matches!(self.kinds[n], Kind::Room | Kind::Other { curved: true })
-    }
-
-    /// By how much gravity has turned, radians.
-    fn turned(&self, point: &[f64]) -> f64 {
-        let turns = point.iter().zip(&self.kinds).filter(|(_, kind)| **kind == Kind::Turn);
-        turns.map(|(x, _)| x * x).sum::<f64>().sqrt().min(LARGEST_TURN)
-    }
-
-    /// C at a point.
-    fn compliance(&self, point: &[f64]) -> f64 {
-        let (mut soft, mut load) = (0.0, self.turned(point).cos());
+    /// ln C at a point.
+    fn log_compliance(&self, point: &[f64]) -> f64 {
+        let mut sum = 0.0;
         for ((x, centre), kind) in point.iter().zip(&self.centre).zip(&self.kinds) {
             match kind {
-                Kind::Modulus(share) => soft += share * (centre - x).exp(),
-                Kind::Density => load *= (x - centre).exp(),
+                Kind::Modulus(share) => sum += share * (centre - x),
+                Kind::Density => sum += x - centre,
                 Kind::Room | Kind::Turn | Kind::Other { .. } => {}
             }
         }
-        soft * load
+        sum
     }
 
     /// C times every term of the polynomial, at a point.
     fn features(&self, point: &[f64]) -> Vec<f64> {
-        let (compliance, turned) = (self.compliance(point), self.turned(point));
-        // The part of gravity across its old way for each radian, over the part along it.
-        let across = if turned > 0.0 { turned.tan() / turned } else { 1.0 };
-        let s = compliance.ln() / self.log_sd;
-        let soft: f64 = point
-            .iter()
-            .zip(&self.centre)
-            .zip(&self.kinds)
-            .map(|((x, centre), kind)| if let Kind::Modulus(share) = kind { share * (centre - x).exp() } else { 0.0 })
+        let away = |n: usize| point[n] - self.centre[n];
+        let of = |kind: Kind| (0..self.kinds.len()).filter(move |&n| self.kinds[n] == kind);
+        let log_compliance = self.log_compliance(point);
+        let log_room: f64 = of(Kind::Room).map(away).sum();
+        let t = log_compliance - log_room;
+        let turned = of(Kind::Turn).map(|n| away(n).powi(2)).sum::<f64>().sqrt();
+        let sine = if turned > 0.0 { turned.sin() / turned } else { 1.0 };
+        let soft: f64 = (0..self.kinds.len())
+            .map(|n| if let Kind::Modulus(share) = self.kinds[n] { -share * away(n) } else { 0.0 })
             .sum();
-        let mut others: Vec<(f64, Bend)> = Vec::new();
+        // What hangs on t only by slopes, and whether it bends.
+        let mut others: Vec<(f64, bool)> = Vec::new();
         let mut first = true;
         for (n, kind) in self.kinds.iter().enumerate() {
-            let away = point[n] - self.centre[n];
             match kind {
                 // The shares sum to one: the first says nothing new.
                 Kind::Modulus(_) if std::mem::take(&mut first) => {}
-                Kind::Modulus(share) => others.push((share * ((-away).exp() / soft - 1.0), Bend::Once)),
+                Kind::Modulus(_) => others.push((-away(n) - soft, self.path.tissues_bend())),
                 Kind::Density => {}
-                Kind::Turn => others.push((across * away / self.sd[n], Bend::Straight)),
-                Kind::Room => others.push((away.exp() - 1.0, Bend::Both)),
-                Kind::Other { curved: true } => others.push((away / self.sd[n], Bend::Both)),
-                Kind::Other { curved: false } => others.push((away / self.sd[n], Bend::Straight)),
+                Kind::Turn => others.push((sine * away(n) / self.sd[n], self.path.bends(*kind))),
+                // Off the path: on it the room is less where the load is more.
+                Kind::Room => others.push((away(n) + (1.0 - self.path.of_load) * t, false)),
+                Kind::Other { .. } => others.push((away(n) / self.sd[n], self.path.bends(*kind))),
             }
         }
-        let mut terms: Vec<f64> = (0..=POWERS).map(|p| s.powi(p as i32)).collect();
-        for (n, &(y, bend)) in others.iter().enumerate() {
-            terms.extend([y, s * y, s * s * y]);
-            match bend {
-                Bend::Straight => {}
-                Bend::Once => terms.push(y * y),
-                Bend::Both => terms.extend([y * y, s * y * y]),
+        let (values, slopes) = self.path.hermite(t);
+        let mut terms: Vec<f64> = values.into_iter().chain(slopes).map(|x| x * turned.cos()).collect();
+        let cardinal = self.path.cardinal(t);
+        for (n, &(y, bends)) in others.iter().enumerate() {
+            terms.extend(cardinal.iter().map(|x| y * x));
+            if bends {
+                terms.push(y * y);
             }
-            // A state off the centre in either of two tells what they do together.
-            let pairs = others[..n].iter().filter(|(_, other)| bend != Bend::Straight || *other != Bend::Straight);
-            terms.extend(pairs.map(|(other, _)| y * other));
+            // A state off the path in either of two tells what they do together.
+            terms.extend(others[..n].iter().filter(|(_, other)| bends || *other).map(|(other, _)| y * other));
         }
+        let compliance = log_compliance.exp();
         terms.into_iter().map(|term| term * compliance).collect()
     }
 
@@ -227,11 +201,12 @@ impl Response {
         // Of which state each row is, of which slope, and by what it is weighed.
         let mut data: Vec<(&[[f64; 3]], f64)> = Vec::new();
         for state in states {
-            let weight = 1.0 / coordinates.compliance(&state.at);
+            let weight = (-coordinates.log_compliance(&state.at)).exp();
             let scaled = |row: Vec<f64>, by: f64| row.into_iter().map(|x| x * by).collect::<Vec<f64>>();
             rows.push(scaled(coordinates.features(&state.at), weight));
             data.push((&state.displacement_mm, weight));
-            for (n, row) in coordinates.slopes(&state.at).into_iter().enumerate() {
+            let known = |n: &usize| !state.slopes_mm[*n].is_empty();
+            for (n, row) in coordinates.slopes(&state.at).into_iter().enumerate().filter(|(n, _)| known(n)) {
                 let weight = weight * coordinates.sd[n];
                 rows.push(scaled(row, weight));
                 data.push((&state.slopes_mm[n], weight));
@@ -268,7 +243,9 @@ impl Response {
     /// Displacement of every node at a point, mm.
     pub fn at(&self, point: &[f64]) -> Vec<[f64; 3]> {
         let mut sum = vec![[0.0; 3]; self.coefficients_mm.first().map_or(0, Vec::len)];
-        for (term, coefficients) in self.coordinates.features(point).iter().zip(&self.coefficients_mm) {
+        // Most knots are far away.
+        let terms = self.coordinates.features(point).into_iter().zip(&self.coefficients_mm);
+        for (term, coefficients) in terms.filter(|(term, _)| *term != 0.0) {
             for (sum, c) in sum.iter_mut().zip(coefficients) {
                 (0..3).for_each(|i| sum[i] += term * c[i]);
             }
@@ -280,6 +257,7 @@ impl Response {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::uncertain::tests::of_two_tissues;
+    use super::super::uncertain::{Cause, Uncertain};
     use super::*;
 
     /// A formula as a body: nodes that grey matter, white matter or both let move, under gravity that turns.
@@ -309,16 +287,27 @@ pub(super) mod tests {
     }
 
     pub fn response(body: &dyn Fn(&[f64]) -> Vec<[f64; 3]>, uncertainty: &Uncertainty) -> Response {
-        let centre = solved(body, &uncertainty.centre());
-        let coordinates = Coordinates::new(uncertainty, &centre);
-        let mut states = vec![centre];
-        states.extend(coordinates.design().iter().map(|at| solved(body, at)));
+        before(false, body, uncertainty)
+    }
+
+    /// The surface of a body before walls, or of one without.
+    fn before(walls: bool, body: &dyn Fn(&[f64]) -> Vec<[f64; 3]>, uncertainty: &Uncertainty) -> Response {
+        let path = Path::new(uncertainty, walls);
+        let mut states: Vec<SolvedState> = path.points(uncertainty).iter().map(|at| solved(body, at)).collect();
+        let middle = path.middle();
+        let number = path.beside(uncertainty);
+        let coordinates = Coordinates::new(uncertainty, path, &states[middle]);
+        assert_eq!(coordinates.beside().len(), number);
+        states.extend(coordinates.beside().into_iter().map(|beside| solved(body, &beside.at).of(&beside)));
         Response::fitted(coordinates, &states)
     }
 
     fn worst(body: &dyn Fn(&[f64]) -> Vec<[f64; 3]>, sd: f64) -> f64 {
-        let uncertainty = of_two_tissues(sd);
-        let surface = response(body, &uncertainty);
+        worst_of(false, body, &of_two_tissues(sd))
+    }
+
+    fn worst_of(walls: bool, body: &dyn Fn(&[f64]) -> Vec<[f64; 3]>, uncertainty: &Uncertainty) -> f64 {
+        let surface = before(walls, body, uncertainty);
         let off = |n: usize| {
             let point = uncertainty.draw(n);
             let (found, truth) = (surface.at(&point), body(&point));
@@ -331,8 +320,25 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_linear_body_is_followed_exactly_however_large_the_spread() {
-        assert!(worst(&linear_body, 1.0) < 1e-6, "{}", worst(&linear_body, 1.0));
+    fn a_state_half_way_tells_a_parabola_s_next_one() {
+        let parabola = |p: &[f64]| vec![[1.0 + p[0] - 2.0 * p[0] * p[1], p[1] * p[1], p[0]]];
+        let (state, to) = (solved(&parabola, &[0.3, -0.2]), [1.1, 0.7]);
+        let found = state.through(&parabola(&state.half_way_to(&to)), &to);
+        for (found, truth) in found[0].iter().zip(parabola(&to)[0]) {
+            assert!((found - truth).abs() < 1e-8, "{found} {truth}");
+        }
+    }
+
+    #[test]
+    fn a_linear_body_is_followed_exactly_but_for_its_tissues_however_large_the_spread() {
+        // Load, direction and all stiffness together; of tissues apart the surface has the second power.
+        let together = |point: &[f64]| {
+            let mean = 0.5 * (point[0] + point[1]);
+            linear_body(&[&[mean, mean], &point[2..]].concat())
+        };
+        assert!(worst(&together, 1.0) < 1e-6, "{}", worst(&together, 1.0));
+        let [large, half] = [1.0, 0.5].map(|sd| worst(&linear_body, sd));
+        assert!(large < 0.2 && half < large / 5.0, "{large} {half}");
     }
 
     #[test]
@@ -347,5 +353,39 @@ pub(super) mod tests {
         let [large, half, quarter] = [1.0, 0.5, 0.25].map(|sd| worst(&ended, sd));
         assert!(large < 0.25, "{large}");
         assert!(half < large / 3.0 && quarter < half / 3.0, "{large} {half} {quarter}");
+    }
+
+    #[test]
+    fn before_a_wall_load_and_room_in_proportion_move_a_linear_body_in_proportion() {
+        let mut list = of_two_tissues(1.0).list;
+        list.push(Uncertain {
+            unknown: Unknown::Gap(0),
+            prior: Unknown::Gap(0).prior(0.0, 0.5),
+            cause: Cause::Room,
+            levels_mm: Vec::new(),
+        });
+        let uncertainty = Uncertainty::new(list);
+        // Each node goes as far as its load, and ever less beyond its room.
+        let walled = |point: &[f64]| -> Vec<[f64; 3]> {
+            let room = point[5].exp();
+            let mean = 0.5 * (point[0] + point[1]);
+            let node = |part: f64| {
+                let x = part * (point[2] - mean).exp() * 10.0 / room;
+                [0.0, room * (x.powi(-2) + 1.0).powf(-0.5), 0.0]
+            };
+            [0.5, 1.0, 2.0].map(node).into()
+        };
+        let surface = before(true, &walled, &uncertainty);
+        let [load, room] = [2, 5].map(|n| uncertainty.sds()[n]);
+        let of = |by: f64, load_over_room: f64| {
+            let mut point = uncertainty.centre();
+            (point[2], point[5]) = (point[2] + by + load_over_room, point[5] + by);
+            surface.at(&point)[1][1]
+        };
+        for over in [-load, 0.0, load] {
+            let grown = of(room, over) / of(0.0, over);
+            assert!((grown / room.exp() - 1.0).abs() < 2e-3, "{over} {grown}");
+        }
+        assert!(worst_of(true, &walled, &uncertainty) < 0.02, "{}", worst_of(true, &walled, &uncertainty));
     }
 }

@@ -106,6 +106,11 @@ impl Uncertainty {
         self.list.iter().map(half).collect()
     }
 
+    /// Variance of a sum of the prior's variables with these weights, one for each unknown.
+    pub fn variance(&self, weights: &[f64]) -> f64 {
+        (self.factor.transpose() * DVector::from_column_slice(weights)).norm_squared()
+    }
+
     /// The places of the unknowns of a cause.
     pub fn of(&self, cause: Cause) -> Vec<usize> {
         (0..self.list.len()).filter(|&n| self.list[n].cause == cause).collect()
@@ -147,6 +152,7 @@ pub(super) mod tests {
         let covariance =
             |a: usize, b: usize| draws.iter().map(|d| (d[a] - mean(a)) * (d[b] - mean(b))).sum::<f64>() / 512.0;
         assert!((covariance(0, 1) / 0.16 - 0.6).abs() < 0.05 && (covariance(0, 0) / 0.16 - 1.0).abs() < 0.05);
+        assert!((all.variance(&[1.0, 1.0, 0.0, 0.0, 0.0]) - 2.0 * 0.16 * 1.6).abs() < 1e-12);
         assert!(covariance(0, 2).abs() < 0.01 && (mean(1) - 700f64.ln()).abs() < 0.01);
     }
 

@@ -227,6 +227,26 @@ impl Supports {
         self.standing.par_iter().with_min_len(256).map(one).collect()
     }
 
+    /// Brings nodes that are through their wall's soft layer back to its middle, along the wall's normal: a state that was
+    /// foretold has many, and they would take Newton's method more steps than all else that it got wrong.
+    pub(super) fn push_out(&self, u: &mut [[f64; 3]], nodes_m: &[[f64; 3]], held: Option<&[[bool; 3]]>) {
+        let one = |s: &Standing| -> Option<Vector3<f64>> {
+            let (gap, mut way, _) = self.gap(s, u, nodes_m);
+            if gap >= -0.5 * self.walls[s.wall as usize].potential.softness_m {
+                return None;
+            }
+            let held = held.map_or([false; 3], |h| h[s.row as usize]);
+            (0..3).filter(|&i| held[i]).for_each(|i| way[i] = 0.0);
+            let square = way.norm_squared();
+            (square > 1e-6).then(|| way * (-gap / square))
+        };
+        let back: Vec<Option<Vector3<f64>>> = self.standing.par_iter().with_min_len(256).map(one).collect();
+        for (s, back) in self.standing.iter().zip(back) {
+            let back = back.unwrap_or_default();
+            (0..3).for_each(|i| u[s.node as usize][i] += back[i]);
+        }
+    }
+
     /// Stored energy, J, with walls so many times softer than they are.
     pub(super) fn energy(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]], softer: f64) -> f64 {
         if self.is_empty() {
@@ -286,14 +306,21 @@ impl Supports {
             s.area_m2 * (stiffness * normal * normal.transpose() + curved)
         });
         let matrix = &mut tangent.matrix;
+        let walls = &mut tangent.walls;
         let mut add = |row: u32, block: Matrix3<f64>| {
+            if block == Matrix3::zeros() {
+                return;
+            }
             let held = held.map_or([false; 3], |h| h[row as usize]);
             let target = &mut matrix.blocks[matrix.pattern.diagonal[row as usize] as usize];
+            let mut own = [0.0; 9];
             for c in (0..3).filter(|&c| !held[c]) {
                 for r in (0..3).filter(|&r| !held[r]) {
+                    own[3 * c + r] = block[(r, c)];
                     target[3 * c + r] += block[(r, c)];
                 }
             }
+            walls.push((row, own));
         };
         for (s, part) in self.standing.iter().zip(parts) {
             add(s.row, part);

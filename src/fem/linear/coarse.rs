@@ -5,7 +5,7 @@
 //! every piece, and Z (Z^T K Z)^-1 Z^T is added to the preconditioner (Nicolaides, "Deflation of conjugate gradients",
 //! SIAM J. Numer. Anal. 24, 1987; rigid motions as in smoothed aggregation, Vanek, Mandel and Brezina, 1996). Z^T K Z is as
 //! sparse as K and factored as sparsely, so that the pieces can grow in number with the rows. K changes little from one Newton
-//! iteration to the next: the factor of the first is kept, but for bodies before walls.
+//! iteration to the next: the factor of the first is kept, but for bodies before walls, whose part alone is taken anew.
 
 use super::super::reduce::{by_rows, by_tasks};
 use super::super::sparse::{BlockMatrix, BlockPattern};
@@ -25,7 +25,7 @@ pub(in super::super) struct Rows {
     /// Components held on rows that are otherwise free.
     pub held: Option<Arc<Vec<[bool; 3]>>>,
     /// The tangent changes from one iteration to the next by far more than the body's does: a wall pushes or does not. Then
-    /// the correction is made anew for every tangent.
+    /// the walls' part of the correction is made anew for every tangent.
     pub change: bool,
 }
 
@@ -46,6 +46,8 @@ struct Pieces {
 /// The correction, ready to be applied.
 pub(super) struct Coarse {
     pieces: Pieces,
+    /// Z^T K Z of the body without its walls.
+    body: Coupling,
     /// Of Z^T K Z, two block rows a piece: translations and rotations.
     factor: Factor,
     /// Force and moment on every piece, and its motion.
@@ -120,19 +122,28 @@ impl Coarse {
             return None;
         }
         let pieces = Pieces::new(at, count);
-        let matrix = matrix(&pieces.coupling(tangent), count);
+        let coupling = pieces.coupling(tangent);
+        let matrix = matrix(&coupling, count);
         let centres: Vec<[f64; 3]> = pieces.centre.iter().flat_map(|&c| [c, c]).collect();
         let symbolic = Arc::new(Symbolic::new(&matrix.pattern, None, &centres)?);
-        let factor = Factor::new(&symbolic, &Tangent { matrix, nodal: None })?;
+        let factor = Factor::new(&symbolic, &Tangent { matrix, nodal: None, walls: Vec::new() })?;
         let zero = vec![[0.0; 3]; 2 * count];
-        Some(Self { pieces, factor, loads: zero.clone(), motion: zero })
+        let body = pieces.with_walls(coupling, -1.0, tangent);
+        Some(Self { pieces, body, factor, loads: zero.clone(), motion: zero })
     }
 
     /// The correction for another tangent of the same body, whose pieces and order of elimination are the same; `None` as for
     /// [`Self::new`].
     pub(super) fn renewed(self, tangent: &Tangent) -> Option<Self> {
-        let matrix = matrix(&self.pieces.coupling(tangent), self.pieces.centre.len());
-        let factor = Factor::new(self.factor.symbolic(), &Tangent { matrix, nodal: None })?;
+        let body = self.pieces.with_walls(self.pieces.coupling(tangent), -1.0, tangent);
+        Self { body, ..self }.before_walls(tangent)
+    }
+
+    /// The correction with the walls of this tangent, the body as it was; `None` as for [`Self::new`].
+    pub(super) fn before_walls(self, tangent: &Tangent) -> Option<Self> {
+        let coupling = self.pieces.with_walls(self.body.clone(), 1.0, tangent);
+        let matrix = matrix(&coupling, self.pieces.centre.len());
+        let factor = Factor::new(self.factor.symbolic(), &Tangent { matrix, nodal: None, walls: Vec::new() })?;
         Some(Self { factor, ..self })
     }
 }
@@ -166,6 +177,29 @@ impl Pieces {
         self.held.as_ref().map_or([false; 3], |h| h[row])
     }
 
+    /// Adds what the columns of K Z on a row are to its piece.
+    fn add_wrenches(&self, row: usize, columns: &[[f64; 3]; 6], factor: f64, block: &mut [[f64; 6]; 6]) {
+        for (c, column) in columns.iter().enumerate() {
+            let mut force = *column;
+            (0..3).filter(|&i| self.is_held(row)[i]).for_each(|i| force[i] = 0.0);
+            for (r, w) in wrench(self.place[row].map(f64::from), force).into_iter().enumerate() {
+                block[c][r] += factor * w;
+            }
+        }
+    }
+
+    /// Z^T K Z with a tangent's walls added so many times.
+    fn with_walls(&self, mut coupling: Coupling, factor: f64, tangent: &Tangent) -> Coupling {
+        for (row, block) in &tangent.walls {
+            let row = *row as usize;
+            let mut sum = [[0.0; 3]; 6];
+            times_rigid(block, self.place[row].map(f64::from), &mut sum);
+            let own = coupling.entry((self.piece[row], self.piece[row])).or_default();
+            self.add_wrenches(row, &sum, factor, own);
+        }
+        coupling
+    }
+
     /// Z^T K Z.
     fn coupling(&self, tangent: &Tangent) -> Coupling {
         let mut coupling = Coupling::new();
@@ -186,13 +220,7 @@ impl Pieces {
             }
             for (of, sum) in &sums {
                 let block = coupling.entry((self.piece[row], *of)).or_default();
-                for (c, column) in sum.iter().enumerate() {
-                    let mut force = *column;
-                    (0..3).filter(|&i| self.is_held(row)[i]).for_each(|i| force[i] = 0.0);
-                    for (r, w) in wrench(place(row), force).into_iter().enumerate() {
-                        block[c][r] += w;
-                    }
-                }
+                self.add_wrenches(row, sum, 1.0, block);
             }
         }
         if let Some(nodal) = &tangent.nodal {
@@ -240,7 +268,7 @@ impl Pieces {
 impl Coarse {
     /// z += Z (Z^T K Z)^-1 Z^T r; returns r . z.
     pub(super) fn add<T: Real>(&mut self, r: &[Lanes<T>], z: &mut [Lanes<T>]) -> f64 {
-        let Self { pieces, factor, loads, motion } = self;
+        let Self { pieces, factor, loads, motion, .. } = self;
         by_tasks(1, loads.as_chunks_mut::<2>().0, |first, loads| {
             for (p, load) in (first..).zip(loads) {
                 *load = [[0.0; 3]; 2];

@@ -193,10 +193,8 @@ impl Pcg {
 impl LinearSolver for Pcg {
     fn prepare(&mut self, tangent: &Tangent) {
         if let Some(rows) = self.rows.as_ref().filter(|rows| rows.change || self.coarse.is_none()) {
-            self.coarse = match self.coarse.take() {
-                Some(coarse) => coarse.renewed(tangent),
-                None => Coarse::new(tangent, rows),
-            };
+            let coarse = self.coarse.take().and_then(|coarse| coarse.before_walls(tangent));
+            self.coarse = coarse.or_else(|| Coarse::new(tangent, rows));
         }
         match &mut self.single {
             Some(single) => {
@@ -216,7 +214,9 @@ impl LinearSolver for Pcg {
                 self.double = None;
             }
             _ => {
-                self.coarse = self.coarse.take().and_then(|coarse| coarse.renewed(tangent));
+                if anew {
+                    self.coarse = self.coarse.take().and_then(|coarse| coarse.renewed(tangent));
+                }
                 self.prepare(tangent);
             }
         }

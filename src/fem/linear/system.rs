@@ -2,12 +2,14 @@
 
 use super::super::element::NodalTangent;
 use super::super::reduce::by_rows;
-use super::super::sparse::BlockMatrix;
+use super::super::sparse::{Block, BlockMatrix};
 
 /// A tangent: sparse blocks and, for elements with averaged deformation, the nodes' part on top.
 pub(in super::super) struct Tangent {
     pub matrix: BlockMatrix,
     pub nodal: Option<NodalTangent>,
+    /// What walls and springs are of the diagonal blocks of their rows: what changes most from one tangent to the next.
+    pub walls: Vec<(u32, Block)>,
 }
 
 /// How a linear solve went.
@@ -49,7 +51,9 @@ impl Tangent {
 
     /// K + factor other.
     pub(in super::super) fn plus(&self, factor: f64, other: &Self) -> Self {
-        let mut sum = Self { matrix: self.matrix.clone(), nodal: self.nodal.clone() };
+        let mut walls = self.walls.clone();
+        walls.extend(other.walls.iter().map(|(row, block)| (*row, block.map(|x| factor * x))));
+        let mut sum = Self { matrix: self.matrix.clone(), nodal: self.nodal.clone(), walls };
         by_rows(&mut sum.matrix.blocks, |first, blocks| add_scaled(blocks, factor, &other.matrix.blocks[first..]));
         if let (Some(own), Some(more)) = (&mut sum.nodal, &other.nodal) {
             by_rows(&mut own.moduli, |first, moduli| add_scaled(moduli, factor, &more.moduli[first..]));

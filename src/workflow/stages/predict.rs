@@ -10,9 +10,9 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, Forecast, Found, Head, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction, Spread,
-    SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95, forecast,
-    spread, variance_shares,
+    Check, Forecast, ForecastError, Found, Head, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
+    Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95,
+    forecast, spread, variance_shares,
 };
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
 use crate::image::morphology::dilate;
@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -74,15 +74,14 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             supports,
             ..Prediction::default()
         };
-        for (number, head) in settings.predict.heads.iter().enumerate() {
-            let bodies = patient.posed(work, head)?;
-            if number == 0 {
-                // The body with the most unknowns has them all.
-                let most = bodies.iter().max_by_key(|posed| posed.uncertainty.list.len());
-                prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
-            }
-            let checks = if number == 0 { settings.predict.checks } else { 0 };
-            let found = Lying::of(work, &patient, head, &bodies, checks, &mut produced)?;
+        let heads = &settings.predict.heads;
+        let bodies: Vec<Vec<Posed>> = heads.iter().map(|head| patient.posed(work, head)).collect::<Result<_, _>>()?;
+        // The body with the most unknowns has them all.
+        let most = bodies[0].iter().max_by_key(|posed| posed.uncertainty.list.len());
+        prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
+        let forecasts = forecasts(work, &bodies, patient.input.mesh.0.nodes_mm().len());
+        for (number, ((head, bodies), forecasts)) in heads.iter().zip(&bodies).zip(forecasts).enumerate() {
+            let found = Lying::of(work, &patient, head, (bodies, forecasts), &mut produced)?;
             let state = if number == 0 { PREDICTED.to_owned() } else { format!("{PREDICTED}-{}", head.name(number)) };
             prediction.checks.extend(found.checks.iter().cloned());
             prediction.heads.push(found.in_numbers(&patient, head, &state));
@@ -97,6 +96,31 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         produced.facts = facts(&prediction);
         Ok(produced)
     })
+}
+
+/// Every body of every head solved, heads side by side; the first one's are checked.
+fn forecasts(work: &Work<'_>, bodies: &[Vec<Posed>], nodes: usize) -> Vec<Vec<Result<Forecast, ForecastError>>> {
+    let settings = &work.settings.predict;
+    let checks = |head: usize| if head == 0 { settings.checks } else { 0 };
+    let solutions =
+        |(head, posed): (usize, &Vec<Posed>)| posed.iter().map(|p| p.solutions(checks(head))).sum::<usize>();
+    work.tell(|p| p.begin("prediction", bodies.iter().enumerate().map(solutions).sum()));
+    let of = |head: usize, step: &(dyn Fn() + Sync)| -> Vec<_> {
+        bodies[head].iter().map(|posed| forecast(posed, nodes, (settings.draws, checks(head)), step)).collect()
+    };
+    let (tell, told) = std::sync::mpsc::channel();
+    let found = std::thread::scope(|scope| {
+        let solving = scope.spawn(move || {
+            let step = || tell.send(()).unwrap_or_default();
+            (0..bodies.len()).into_par_iter().map(|head| of(head, &step)).collect()
+        });
+        for () in told {
+            work.tell(|p| p.step());
+        }
+        solving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    });
+    work.tell(|p| p.end());
+    found
 }
 
 /// A target in both frames.
@@ -246,28 +270,23 @@ struct Lying {
 }
 
 impl Lying {
-    /// Solves what is needed; supports without an equilibrium are left out, unless nothing is left.
+    /// One head of what was found; supports without an equilibrium are left out, unless nothing is left.
     fn of(
         work: &Work<'_>,
         patient: &Patient<'_>,
         head: &Head,
-        bodies: &[Posed],
-        checks: usize,
+        (bodies, forecasts): (&[Posed], Vec<Result<Forecast, ForecastError>>),
         produced: &mut Produced,
     ) -> Result<Self, WorkflowError> {
         let settings = &work.settings.predict;
         let nodes = patient.input.mesh.0.nodes_mm().len();
         let (mut found, mut refused): (Vec<(&Posed, Forecast)>, Vec<String>) = (Vec::new(), Vec::new());
-        // States of the surface and solved draws.
-        work.tell(|p| p.begin("prediction", bodies.len() * (6 + checks)));
-        work.tell(|p| p.doing(&head.to_string()));
-        for posed in bodies {
-            match forecast(posed, nodes, (settings.draws, checks), &|| work.tell(|p| p.step())) {
+        for (posed, forecast) in bodies.iter().zip(forecasts) {
+            match forecast {
                 Ok(forecast) => found.push((posed, forecast)),
                 Err(error) => refused.push(error.to_string()),
             }
         }
-        work.tell(|p| p.end());
         if found.is_empty() {
             return Err(PredictError::NoEquilibrium { reason: refused.join("; ") }.into());
         }
