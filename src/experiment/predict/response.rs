@@ -357,14 +357,13 @@ pub(super) mod tests {
 
     #[test]
     fn before_a_wall_load_and_room_in_proportion_move_a_linear_body_in_proportion() {
-        let mut list = of_two_tissues(1.0).list;
-        list.push(Uncertain {
-            unknown: Unknown::Gap(0),
-            prior: Unknown::Gap(0).prior(0.0, 0.5),
-            cause: Cause::Room,
-            levels_mm: Vec::new(),
-        });
-        let uncertainty = Uncertainty::new(list);
+        let of_spread = |sd: f64| {
+            let unknown = Unknown::Gap(0);
+            let prior = unknown.prior(0.0, 0.5 * sd);
+            let room = Uncertain { unknown, prior, cause: Cause::Room, levels_mm: Vec::new() };
+            Uncertainty::new(of_two_tissues(sd).list.into_iter().chain([room]).collect())
+        };
+        let uncertainty = of_spread(1.0);
         // Each node goes as far as its load, and ever less beyond its room.
         let walled = |point: &[f64]| -> Vec<[f64; 3]> {
             let room = point[5].exp();
@@ -386,6 +385,8 @@ pub(super) mod tests {
             let grown = of(room, over) / of(0.0, over);
             assert!((grown / room.exp() - 1.0).abs() < 2e-3, "{over} {grown}");
         }
-        assert!(worst_of(true, &walled, &uncertainty) < 0.02, "{}", worst_of(true, &walled, &uncertainty));
+        // The worst draws lie beyond the ends of the path, where the surface goes straight on.
+        let [large, half] = [1.0, 0.5].map(|sd| worst_of(true, &walled, &of_spread(sd)));
+        assert!(large < 0.12 && half < large / 3.0, "{large} {half}");
     }
 }
