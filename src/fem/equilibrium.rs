@@ -7,8 +7,8 @@
 //! the next be longer.
 
 use super::element::Laws;
-use super::linear::{LinearReport, LinearSolver};
-use super::model::Model;
+use super::linear::{LinearReport, LinearSolver, Tangent};
+use super::model::{Model, Projected};
 use super::outcome::worst;
 use super::scenario::Materials;
 use super::solver;
@@ -85,7 +85,7 @@ impl Model {
         let mut doubtful = None;
         if let Some(state) = warm_start.filter(|s| s.u.len() == nodes) {
             let mut u = state.u.clone();
-            self.move_prescribed(&mut u, 1.0);
+            self.hold(&mut u);
             self.supports.push_out(&mut u, &self.nodes_m, self.held_components.as_deref().map(Vec::as_slice));
             let stored = self.energy(&u, &laws);
             if stored.is_finite() {
@@ -222,6 +222,15 @@ impl Model {
         Some(u)
     }
 
+    /// Puts held components where they belong at the whole load, whatever a start says of them.
+    pub(super) fn hold(&self, u: &mut [[f64; 3]]) {
+        for (u, &row) in u.iter_mut().zip(&self.row_of) {
+            let held = self.held_of_row(row);
+            (0..3).filter(|&i| held[i]).for_each(|i| u[i] = 0.0);
+        }
+        self.move_prescribed(u, 1.0);
+    }
+
     /// Puts prescribed components where they belong at a part of the load.
     pub(super) fn move_prescribed(&self, u: &mut [[f64; 3]], factor: f64) {
         for (node, components, to) in &self.prescribed {
@@ -274,7 +283,7 @@ impl Model {
         let mut moved = u.to_vec();
         self.move_prescribed(&mut moved, reached + small * (factor - reached));
         let (mut here, mut there) = (vec![[0.0; 3]; u.len()], vec![[0.0; 3]; u.len()]);
-        let tangent = self.tangent(u, laws, &mut here, true, None);
+        let tangent = self.tangent(u, laws, &mut here, Projected::All, None);
         self.internal_forces(&moved, laws, &mut there);
         let difference: Vec<[f64; 3]> =
             there.iter().zip(&here).map(|(t, h)| [0, 1, 2].map(|i| (h[i] - t[i]) / small)).collect();
@@ -317,9 +326,15 @@ impl Model {
         let mut project = false;
         let (mut best, mut since_best) = (f64::INFINITY, 0);
         let mut spare = None;
-        let mut watch: Option<Watch> = None;
         for iteration in 0..=settings.newton_iterations {
-            let mut tangent = self.tangent(u, laws, forces, project, spare.take());
+            let projected = if project {
+                Projected::All
+            } else if last_size > reference {
+                Projected::Walls
+            } else {
+                Projected::Nothing
+            };
+            let mut tangent = self.tangent(u, laws, forces, projected, spare.take());
             let rhs = self.out_of_balance(forces, factor);
             let size = reduce::norm(&rhs);
             if !size.is_finite() {
@@ -354,12 +369,20 @@ impl Model {
             (last_size, last_forcing) = (size, forcing);
             let mut step = vec![[0.0; 3]; rhs.len()];
             solver.prepare(&tangent);
-            let mut report = solver.solve(&tangent, &rhs, &mut step, forcing);
+            let through_walls = relative > 1.0 && self.supports.has_walls();
+            let solve = |solver: &mut dyn LinearSolver, tangent: &Tangent, step: &mut [[f64; 3]]| {
+                if through_walls {
+                    solver.solve_by_energy(tangent, &rhs, step, (THROUGH_WALLS, 0.0))
+                } else {
+                    solver.solve(tangent, &rhs, step, forcing)
+                }
+            };
+            let mut report = solve(solver, &tangent, &mut step);
             if report.negative_curvature && !project {
                 // Not a minimum's neighbourhood: with projected elements the step certainly goes down.
-                tangent = self.tangent(u, laws, forces, true, Some(tangent));
+                tangent = self.tangent(u, laws, forces, Projected::All, Some(tangent));
                 solver.prepare(&tangent);
-                let again = solver.solve(&tangent, &rhs, &mut step, forcing);
+                let again = solve(solver, &tangent, &mut step);
                 report = LinearReport { iterations: report.iterations + again.iterations, ..again };
                 project = true;
             } else {
@@ -377,28 +400,14 @@ impl Model {
             // Close to the solution the fall of energy drowns in rounding: any finite step is taken.
             let noise = 1e-11 * energy_scale;
             let mut length = 1.0;
-            let mut watched = if self.supports.is_empty() { 0 } else { WATCHED };
             let (trial, next) = loop {
                 let mut trial = u.clone();
                 self.add_free(&mut trial, length, &step);
                 let stored = self.energy(&trial, laws);
                 let next = stored - work(&trial);
-                let [from, fall] = watch.as_ref().map_or([potential, slope], |w| [w.potential, w.slope]);
-                if next <= from + ARMIJO * length * fall + noise {
+                if next <= potential + ARMIJO * length * slope + noise {
                     energy_scale = stored.abs() + work(&trial).abs();
-                    watch = None;
                     break (trial, next);
-                }
-                let left = watch.as_ref().map_or(watched, |w| w.left);
-                if next.is_finite() && left > 0 && length >= SHORTEST_WATCHED {
-                    let start = || Watch { u: u.clone(), potential, slope, step: step.clone(), left };
-                    watch.get_or_insert_with(start).left = left - 1;
-                    break (trial, next);
-                }
-                if let Some(start) = watch.take_if(|_| next.is_finite()) {
-                    // The way led nowhere: back to where it began, and shorter.
-                    Watch { u: *u, potential, slope, step, .. } = start;
-                    (length, watched) = (1.0, 0);
                 }
                 length *= 0.5;
                 if length < 1e-9 {
@@ -455,24 +464,9 @@ struct Stage<'a> {
     progress: &'a dyn Fn(&Progress),
 }
 
-/// Steps before walls that need not lower the energy at once. A step through a wall costs more energy than it gains, however
-/// right its direction; the next one is pushed back by the wall and mends that. Where they lead nowhere, the way goes back to
-/// their start (the watchdog technique: Chamberlain, Powell, Lemarechal and Pedersen, Math. Programming Study 16, 1982;
-/// Nocedal and Wright, ch. 15).
-const WATCHED: usize = 4;
-
-/// Shortest part of a step that is taken so; a shorter one is better searched for.
-const SHORTEST_WATCHED: f64 = 1.0 / 16.0;
-
-/// Where steps that need not lower the energy began.
-struct Watch {
-    u: Vec<[f64; 3]>,
-    potential: f64,
-    slope: f64,
-    step: Vec<[f64; 3]>,
-    /// Steps left.
-    left: usize,
-}
+/// How good a step is by its energy where forces are larger than the load: nodes are pressed through walls then, and a residual
+/// says little of the body.
+const THROUGH_WALLS: f64 = 0.1;
 
 /// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.
 fn forcing_term(ratio: f64, last: f64, needed: f64) -> f64 {

@@ -33,6 +33,7 @@ mod warning;
 pub use contact::{Contact, ContactOutcome, Support, Tether, Wall};
 pub use element::ElementKind;
 pub use error::FemError;
+pub(crate) use linear::Within;
 pub use load::Load;
 pub use model::Model;
 pub use outcome::{ConvergenceRecord, Frame, Motion, NewtonIteration, Outcome, Progress};

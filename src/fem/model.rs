@@ -53,6 +53,18 @@ pub struct Model {
     symbolic: OnceLock<Option<Arc<Symbolic>>>,
 }
 
+/// What of a tangent is made positive semi-definite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Projected {
+    /// Nothing: the derivative of the forces as it is.
+    Nothing,
+    /// What walls add by their curvature. Far from equilibrium nodes are pressed through walls by pressures that are none;
+    /// those times a wall's curvature would make a tangent indefinite that is not so at the solution.
+    Walls,
+    /// Every element and every wall.
+    All,
+}
+
 impl Model {
     /// Finds numbering, pattern, held nodes and loads; checks every name and number of the scenario.
     ///
@@ -286,12 +298,12 @@ impl Model {
         u: &[[f64; 3]],
         laws: &Laws,
         forces: &mut [[f64; 3]],
-        project: bool,
+        projected: Projected,
         spare: Option<Tangent>,
     ) -> Tangent {
-        let mut tangent = self.tangent_of_body(u, laws, forces, project, spare);
+        let mut tangent = self.tangent_of_body(u, laws, forces, projected == Projected::All, spare);
         self.supports.add_forces(u, &self.nodes_m, laws.walls_softer, forces);
-        self.add_stiffness_of_supports(u, laws.walls_softer, project, &mut tangent);
+        self.add_stiffness_of_supports(u, laws.walls_softer, projected != Projected::Nothing, &mut tangent);
         tangent
     }
 

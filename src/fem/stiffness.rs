@@ -1,7 +1,7 @@
 //! Forces and stiffness of a body at a state.
 
 use super::linear::Tangent;
-use super::model::Model;
+use super::model::{Model, Projected};
 use super::scenario::Materials;
 use super::{FemError, State};
 
@@ -22,7 +22,7 @@ impl Model {
     pub fn stiffness(&self, materials: &Materials, state: &State) -> Result<Stiffness<'_>, FemError> {
         let laws = self.laws(materials)?;
         let mut forces = vec![[0.0; 3]; self.nodes_m.len()];
-        let tangent = self.tangent(&state.u, &laws, &mut forces, false, None);
+        let tangent = self.tangent(&state.u, &laws, &mut forces, Projected::Nothing, None);
         Ok(Stiffness { model: self, tangent, forces })
     }
 }

@@ -4,7 +4,7 @@ use super::levenberg_marquardt::{Forward, Linearisation};
 use super::{LogPrior, Scale};
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::sample::Tissue;
-use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State};
+use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State, Within};
 use crate::material::law::{Material, Parameter};
 use crate::material::meta_model::MetaModel;
 use crate::mesh::TetMesh;
@@ -115,8 +115,10 @@ pub struct Body<'a> {
     last: Option<Last>,
     /// Where the next equilibrium is looked for, if not from the last one.
     start: Option<State>,
-    /// Relative residual of the sensitivities' linear systems.
-    sensitive: f64,
+    /// How good sensitivities are.
+    sensitive: Within,
+    /// What the next sensitivities are like, mm.
+    near: Vec<Vec<[f64; 3]>>,
     /// Solves for an equilibrium so far.
     pub solves: usize,
     /// Linear solves for sensitivities so far.
@@ -154,7 +156,7 @@ const FORETOLD: f64 = 0.7;
 const STIFFER: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
 /// Relative residual of the sensitivities' linear systems: a Gauss-Newton step needs no better ones.
-const SENSITIVE: f64 = 1e-6;
+const SENSITIVE: Within = Within::Residual(1e-6);
 
 impl Last {
     /// Where to look for the equilibrium at other parameters.
@@ -210,6 +212,7 @@ impl<'a> Body<'a> {
             last: None,
             start: None,
             sensitive: SENSITIVE,
+            near: Vec::new(),
             solves: 0,
             tangent_solves: 0,
         })
@@ -278,16 +281,21 @@ impl<'a> Body<'a> {
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     }
 
-    /// The same with sensitivities to this relative residual of their linear systems.
+    /// The same with sensitivities so good.
     #[must_use]
-    pub(in crate::experiment) fn sensitive_within(mut self, relative_residual: f64) -> Self {
-        self.sensitive = relative_residual;
+    pub(in crate::experiment) fn sensitive_within(mut self, sensitive: Within) -> Self {
+        self.sensitive = sensitive;
         self
     }
 
     /// The next equilibrium is looked for from this displacement (mm, every node of the mesh), if it is a possible one.
     pub(in crate::experiment) fn start_from(&mut self, displacement_mm: &[[f64; 3]]) {
         self.start = self.model.state(displacement_mm).ok();
+    }
+
+    /// The next sensitivities are looked for from sums of these displacements (mm, every node of the mesh).
+    pub(in crate::experiment) fn sensitivities_are_like(&mut self, slopes_mm: &[Vec<[f64; 3]>]) {
+        self.near = slopes_mm.to_vec();
     }
 
     /// Equilibrium alone at these parameters.
@@ -403,7 +411,8 @@ impl<'a> Body<'a> {
         let mut different: Vec<By> = by.iter().map(|(by, ..)| by.clone()).collect();
         different.sort_unstable();
         different.dedup();
-        let parts = self.model.sensitivities_within(self.sensitive, &materials, &state, &different)?;
+        let near = std::mem::take(&mut self.near);
+        let parts = self.model.sensitivities_near(&near, self.sensitive, &materials, &state, &different)?;
         self.tangent_solves += different.len();
         let nodes = outcome.displacement_mm.len();
         let mut sensitivities: Vec<Vec<[f64; 3]>> =
@@ -526,4 +535,64 @@ fn shape_slopes(law: MetaModel, shape: f64) -> [(&'static str, f64); 2] {
 
 fn normal_of([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {
     (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector3::x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::block;
+
+    #[test]
+    fn a_denser_body_sags_as_much_more_whether_or_not_gravity_may_turn_and_what_is_not_asked_is_empty() {
+        let mesh = block(3);
+        let scenario = Scenario::from_toml(
+            "fixed = ['base']\n[loads]\ngravity_m_per_s2 = [1.0, 2.0, -9.0]\ndensity_kg_per_m3 = 100.0\n",
+        )
+        .unwrap();
+        let body = |more: &[Unknown]| {
+            let list = [&[Unknown::ShearModulus(Tissue::whole_brain().remove(0)), Unknown::Density], more].concat();
+            Body::new(&mesh, &scenario, list, 0.45, Observation::Nodes(Vec::new())).unwrap()
+        };
+        let (modulus, density) = (700f64.ln(), 120f64.ln());
+        let straight = body(&[]).solve(&[modulus, density]).unwrap().sensitivities;
+        let turns = [Unknown::GravityTurn(Turn::Nodding), Unknown::GravityTurn(Turn::Rolling)];
+        let turned = body(&turns).solve(&[modulus, density, 0.0, 0.0]).unwrap().sensitivities;
+        let largest = straight[1].iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let off = straight[1].iter().flatten().zip(turned[1].iter().flatten());
+        assert!(largest > 0.1 && off.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) < 1e-5 * largest);
+        let partly = body(&turns).solve_partly(&[modulus, density, 0.0, 0.0], &[false, false, true, false]).unwrap();
+        assert!([0, 1, 3].iter().all(|&n| partly.sensitivities[n].is_empty()));
+        let off = partly.sensitivities[2].iter().flatten().zip(turned[2].iter().flatten());
+        assert!(off.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) < 1e-5 * largest);
+    }
+
+    #[test]
+    fn rough_sensitivities_begun_from_another_states_are_those_of_a_body_pressed_on_its_wall() {
+        let mesh = block(5);
+        let scenario = Scenario::from_toml(
+            "fixed = ['base']\n[loads]\ngravity_m_per_s2 = [1.0, 2.0, 9.0]\ndensity_kg_per_m3 = 100.0\n\
+             [[contact]]\nset = 'superior'\nwall = { shape = 'own-surface' }\ngap_mm = 0.3\n\
+             [solver]\nelement = 'tet4-nodal'\n",
+        )
+        .unwrap();
+        let list = [Unknown::ShearModulus(Tissue::whole_brain().remove(0)), Unknown::Density, Unknown::Gap(0)];
+        let body = || Body::new(&mesh, &scenario, list.to_vec(), 0.45, Observation::Nodes(Vec::new())).unwrap();
+        let point = [700f64.ln(), 120f64.ln(), 0.3f64.ln()];
+        let exact = body().solve(&point).unwrap();
+        assert!(exact.outcome.contact[0].area_mm2 > 0.0);
+        let other = body().solve(&[900f64.ln(), 100f64.ln(), 0.4f64.ln()]).unwrap().sensitivities;
+        let off = |near: &[Vec<[f64; 3]>]| -> Vec<f64> {
+            let mut rough = body().sensitive_within(Within::Energy(0.01));
+            rough.sensitivities_are_like(near);
+            let found = rough.solve(&point).unwrap().sensitivities;
+            let size = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+            let of = |(found, exact): (&Vec<[f64; 3]>, &Vec<[f64; 3]>)| {
+                let apart = found.iter().flatten().zip(exact.iter().flatten()).map(|(a, b)| a - b);
+                size(&mut { apart }) / size(&mut exact.iter().flatten().copied())
+            };
+            found.iter().zip(&exact.sensitivities).map(of).collect()
+        };
+        assert!(off(&[]).iter().chain(&off(&other)).all(|off| *off < 0.03), "{:?} {:?}", off(&[]), off(&other));
+        assert!(off(&exact.sensitivities).iter().all(|off| *off < 0.01), "{:?}", off(&exact.sensitivities));
+    }
 }

@@ -53,7 +53,7 @@ pub struct HeadPrediction {
     pub over_threshold_cc: f64,
     /// Which unknown contributes how much to the variance.
     pub shares: Shares,
-    /// Equilibria behind the response surfaces.
+    /// Equilibria that were solved for it, checks apart.
     pub states_solved: usize,
     /// Points that were asked for.
     pub targets: Vec<TargetPrediction>,

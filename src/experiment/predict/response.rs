@@ -25,35 +25,6 @@ pub struct SolvedState {
     pub slopes_mm: Vec<Vec<[f64; 3]>>,
 }
 
-impl SolvedState {
-    /// Half way from here to other numbers.
-    pub fn half_way_to(&self, at: &[f64]) -> Vec<f64> {
-        self.at.iter().zip(at).map(|(here, there)| 0.5 * (here + there)).collect()
-    }
-
-    /// Displacement at other numbers (mm) by the parabola through this state with its slopes and through the one half way there.
-    pub fn through(&self, half_mm: &[[f64; 3]], at: &[f64]) -> Vec<[f64; 3]> {
-        let mut there: Vec<[f64; 3]> = half_mm.iter().map(|u| u.map(|x| 4.0 * x)).collect();
-        for (sum, u) in there.iter_mut().zip(&self.displacement_mm) {
-            (0..3).for_each(|i| sum[i] -= 3.0 * u[i]);
-        }
-        for ((to, from), slopes) in at.iter().zip(&self.at).zip(&self.slopes_mm) {
-            for (sum, slope) in there.iter_mut().zip(slopes) {
-                (0..3).for_each(|i| sum[i] -= (to - from) * slope[i]);
-            }
-        }
-        there
-    }
-
-    /// The same with the slopes that count at this place.
-    #[must_use]
-    pub fn of(mut self, beside: &Beside) -> Self {
-        let slopes = self.slopes_mm.iter_mut().zip(&beside.slopes);
-        slopes.filter(|(_, counts)| !**counts).for_each(|(slope, _)| slope.clear());
-        self
-    }
-}
-
 /// The coordinates of the surface.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
@@ -240,12 +211,25 @@ impl Response {
         Self { coordinates: self.coordinates.clone(), coefficients_mm: self.coefficients_mm.iter().map(of).collect() }
     }
 
+    /// Load over stiffness at a point, of that in the middle of the prior.
+    pub fn load_at(&self, point: &[f64]) -> f64 {
+        self.coordinates.log_compliance(point).exp()
+    }
+
     /// Displacement of every node at a point, mm.
     pub fn at(&self, point: &[f64]) -> Vec<[f64; 3]> {
+        self.sum(self.coordinates.features(point))
+    }
+
+    /// How it changes with every number, mm per unit.
+    pub fn slopes_at(&self, point: &[f64]) -> Vec<Vec<[f64; 3]>> {
+        self.coordinates.slopes(point).into_iter().map(|terms| self.sum(terms)).collect()
+    }
+
+    fn sum(&self, terms: Vec<f64>) -> Vec<[f64; 3]> {
         let mut sum = vec![[0.0; 3]; self.coefficients_mm.first().map_or(0, Vec::len)];
         // Most knots are far away.
-        let terms = self.coordinates.features(point).into_iter().zip(&self.coefficients_mm);
-        for (term, coefficients) in terms.filter(|(term, _)| *term != 0.0) {
+        for (term, coefficients) in terms.into_iter().zip(&self.coefficients_mm).filter(|(term, _)| *term != 0.0) {
             for (sum, c) in sum.iter_mut().zip(coefficients) {
                 (0..3).for_each(|i| sum[i] += term * c[i]);
             }
@@ -286,6 +270,13 @@ pub(super) mod tests {
         SolvedState { at: at.to_vec(), displacement_mm: body(at), slopes_mm: (0..at.len()).map(slope).collect() }
     }
 
+    /// The state with the slopes that count beside the path.
+    fn partly(mut state: SolvedState, beside: &Beside) -> SolvedState {
+        let slopes = state.slopes_mm.iter_mut().zip(&beside.slopes);
+        slopes.filter(|(_, counts)| !**counts).for_each(|(slope, _)| slope.clear());
+        state
+    }
+
     pub fn response(body: &dyn Fn(&[f64]) -> Vec<[f64; 3]>, uncertainty: &Uncertainty) -> Response {
         before(false, body, uncertainty)
     }
@@ -298,7 +289,7 @@ pub(super) mod tests {
         let number = path.beside(uncertainty);
         let coordinates = Coordinates::new(uncertainty, path, &states[middle]);
         assert_eq!(coordinates.beside().len(), number);
-        states.extend(coordinates.beside().into_iter().map(|beside| solved(body, &beside.at).of(&beside)));
+        states.extend(coordinates.beside().iter().map(|beside| partly(solved(body, &beside.at), beside)));
         Response::fitted(coordinates, &states)
     }
 
@@ -317,16 +308,6 @@ pub(super) mod tests {
             errors.fold(0.0, f64::max)
         };
         (0..64).map(off).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn a_state_half_way_tells_a_parabola_s_next_one() {
-        let parabola = |p: &[f64]| vec![[1.0 + p[0] - 2.0 * p[0] * p[1], p[1] * p[1], p[0]]];
-        let (state, to) = (solved(&parabola, &[0.3, -0.2]), [1.1, 0.7]);
-        let found = state.through(&parabola(&state.half_way_to(&to)), &to);
-        for (found, truth) in found[0].iter().zip(parabola(&to)[0]) {
-            assert!((found - truth).abs() < 1e-8, "{found} {truth}");
-        }
     }
 
     #[test]

@@ -227,8 +227,8 @@ impl Supports {
         self.standing.par_iter().with_min_len(256).map(one).collect()
     }
 
-    /// Brings nodes that are through their wall's soft layer back to its middle, along the wall's normal: a state that was
-    /// foretold has many, and they would take Newton's method more steps than all else that it got wrong.
+    /// Brings nodes that are through their wall's soft layer back to its middle, along the wall's normal. A state that was foretold
+    /// has many, and the steps that mend them cost time (docs/evidence/prediction.md).
     pub(super) fn push_out(&self, u: &mut [[f64; 3]], nodes_m: &[[f64; 3]], held: Option<&[[bool; 3]]>) {
         let one = |s: &Standing| -> Option<Vector3<f64>> {
             let (gap, mut way, _) = self.gap(s, u, nodes_m);

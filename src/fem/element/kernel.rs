@@ -205,8 +205,8 @@ fn projected_exchange(exchange: f64, mu: f64, h: &M3) -> f64 {
     let mut f = *h;
     (0..3).for_each(|i| f[i][i] += 1.0);
     let f = matrix(&f);
-    let mut stretches: Vec<f64> = SymmetricEigen::new(f.transpose() * f).eigenvalues.iter().copied().collect();
-    stretches.sort_by(f64::total_cmp);
+    let mut stretches: [f64; 3] = (f.transpose() * f).symmetric_eigenvalues().into();
+    stretches.sort_unstable_by(f64::total_cmp);
     let s = [stretches[0].max(0.0).sqrt(), stretches[1].max(0.0).sqrt()];
     exchange.clamp(-mu * s[0] * s[0], mu * s[0] * s[1])
 }
@@ -214,11 +214,13 @@ fn projected_exchange(exchange: f64, mu: f64, h: &M3) -> f64 {
 /// Eigenvalues below zero become zero (Teran, Sifakis, Irving and Fedkiw, SCA 2005).
 pub(super) fn projected(tangent: &Tangent) -> Tangent {
     let eigen = SymmetricEigen::new(*tangent);
-    if eigen.eigenvalues.iter().all(|&v| v >= 0.0) {
-        return *tangent;
+    let mut raised = *tangent;
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value < 0.0 {
+            raised.ger(-value, &vector, &vector, 1.0);
+        }
     }
-    let q = eigen.eigenvectors;
-    q * Tangent::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0))) * q.transpose()
+    raised
 }
 
 fn matrix(h: &M3) -> Matrix3<f64> {

@@ -272,15 +272,13 @@ impl NodalTangent {
         let held = self.held.as_ref().map_or([false; 3], |h| h[row]);
         for at in rings.group_start[row]..rings.group_start[row + 1] {
             let (moduli, b) = (&self.moduli[rings.groups[at] as usize], rings.gradients_of_row[at]);
-            for (i, entry) in block.iter_mut().enumerate() {
-                let (r, k) = (i % 3, i / 3);
-                if r != k && (held[r] || held[k]) {
-                    continue;
-                }
-                for c in 0..3 {
-                    for d in 0..3 {
-                        *entry += b[c] * b[d] * moduli[(r + 3 * c) + 9 * (k + 3 * d)];
-                    }
+            let columns = moduli.as_chunks::<9>().0;
+            for k in 0..3 {
+                // Stress for a displacement of the node along k.
+                let stress: [f64; 9] =
+                    std::array::from_fn(|i| b[0] * columns[k][i] + b[1] * columns[k + 3][i] + b[2] * columns[k + 6][i]);
+                for r in (0..3).filter(|&r| r == k || !(held[r] || held[k])) {
+                    block[r + 3 * k] += b[0] * stress[r] + b[1] * stress[r + 3] + b[2] * stress[r + 6];
                 }
             }
         }

@@ -300,3 +300,59 @@ impl Coarse {
         product
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_taken_anew_are_a_correction_made_anew_where_the_body_is_the_same() {
+        // A chain of 2000 rows in space, each tied to the next one.
+        let rows = 2000_usize;
+        let (mut pattern, mut body) =
+            (BlockPattern { row_start: vec![0], columns: Vec::new(), diagonal: Vec::new() }, Vec::new());
+        let diagonal = |x: f64| std::array::from_fn(|n| if n % 4 == 0 { x } else { 0.0 });
+        for row in 0..rows {
+            for column in [row.wrapping_sub(1), row, row + 1].into_iter().filter(|&c| c < rows) {
+                if column == row {
+                    pattern.diagonal.push(pattern.columns.len() as u32);
+                }
+                pattern.columns.push(column as u32);
+                body.push(diagonal(if column == row { 2.1 } else { -1.0 }));
+            }
+            pattern.row_start.push(pattern.columns.len());
+        }
+        let pattern = Arc::new(pattern);
+        let before = |pushed: &dyn Fn(usize) -> f64| {
+            let mut matrix = BlockMatrix { pattern: Arc::clone(&pattern), blocks: body.clone() };
+            let mut walls = Vec::new();
+            for row in (0..rows).filter(|&row| pushed(row) > 0.0) {
+                let mut block = diagonal(0.0);
+                block[4] = pushed(row);
+                matrix.blocks[pattern.diagonal[row] as usize][4] += pushed(row);
+                walls.push((row as u32, block));
+            }
+            Tangent { matrix, nodal: None, walls }
+        };
+        let place = |row: usize| [row as f64, (row as f64 * 0.37).sin() * 20.0, (row as f64 * 0.21).cos() * 30.0];
+        let at = Rows { positions: (0..rows).map(place).collect(), held: None, change: true };
+        let first = before(&|row| if row % 3 == 0 { 40.0 } else { 0.0 });
+        let second = before(&|row| if row > 900 { 90.0 } else { 0.0 });
+        let residual: Vec<Lanes<f64>> = (0..rows).map(|row| [(row as f64).sin(), 1.0, -0.5, 0.0]).collect();
+        let corrected = |coarse: Option<Coarse>| {
+            let mut z = vec![[0.0; 4]; rows];
+            coarse.unwrap().add(&residual, &mut z);
+            z
+        };
+        let size = |z: &[Lanes<f64>]| dot(z, z).sqrt();
+        let apart = |a: &[Lanes<f64>], b: &[Lanes<f64>]| {
+            size(&a.iter().zip(b).map(|(a, b)| std::array::from_fn(|i| a[i] - b[i])).collect::<Vec<_>>())
+        };
+        let old = corrected(Coarse::new(&first, &at));
+        let whole = corrected(Coarse::new(&second, &at));
+        let walls = corrected(Coarse::new(&first, &at).unwrap().before_walls(&second));
+        let renewed = corrected(Coarse::new(&first, &at).unwrap().renewed(&second));
+        assert!(apart(&walls, &whole) < 1e-9 * size(&whole) && apart(&renewed, &whole) < 1e-9 * size(&whole));
+        assert!(apart(&old, &whole) > 0.1 * size(&whole), "the walls make a difference");
+    }
+}

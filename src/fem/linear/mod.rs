@@ -13,4 +13,5 @@ pub(super) use coarse::Rows;
 pub(super) use direct::Direct;
 pub(super) use factor::Symbolic;
 pub(super) use pcg::Pcg;
+pub(crate) use system::Within;
 pub(super) use system::{LinearReport, LinearSolver, Tangent};

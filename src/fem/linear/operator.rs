@@ -96,20 +96,8 @@ impl<T: Real> PackedNodal<T> {
         by_rows(&mut self.stresses, |first, stresses| {
             for (g, out) in (first..).zip(stresses) {
                 let range = rings.row_start[g]..rings.row_start[g + 1];
-                let mut h = [[T::default(); 4]; 3];
-                for (&row, b) in rings.rows[range.clone()].iter().zip(&gradients[range]) {
-                    let x = &p[row as usize];
-                    for c in 0..3 {
-                        add_scaled(&mut h[c], x, b[c]);
-                    }
-                }
-                let mut stress = [[T::default(); 4]; 3];
-                for (k, column) in moduli[g].iter().enumerate() {
-                    for c in 0..3 {
-                        add_scaled(&mut stress[c], &column[c], h[k / 3][k % 3]);
-                    }
-                }
-                *out = stress;
+                let h = displacement_gradient(&rings.rows[range.clone()], &gradients[range], p);
+                *out = stress(&moduli[g], &h);
             }
             []
         });
@@ -119,13 +107,7 @@ impl<T: Real> PackedNodal<T> {
     #[inline(always)]
     fn add_force(&self, row: usize, sum: &mut Lanes<T>) {
         let range = self.rings.group_start[row]..self.rings.group_start[row + 1];
-        let mut force = [T::default(); 4];
-        for (&g, b) in self.rings.groups[range.clone()].iter().zip(&self.gradients_of_row[range]) {
-            let stress = &self.stresses[g as usize];
-            for c in 0..3 {
-                add_scaled(&mut force, &stress[c], b[c]);
-            }
-        }
+        let force = force(&self.rings.groups[range.clone()], &self.gradients_of_row[range], &self.stresses);
         let held = self.held.as_ref().map_or([false; 3], |h| h[row]);
         (0..3).filter(|&i| !held[i]).for_each(|i| sum[i] += force[i]);
     }
@@ -153,8 +135,48 @@ fn add_scaled<T: Real>(sum: &mut Lanes<T>, column: &[T], factor: T) {
     }
 }
 
-/// Blocks of one row times the entries of their columns. Apart from what else happens to the row, so that the compiler
-/// keeps four lanes together, and with a sum for each column of the blocks: additions to one sum would wait for each other.
+// What follows is apart from what else happens to a row, so that the compiler keeps four lanes together, and has several sums:
+// additions to one would wait for each other.
+
+/// Gradient of the displacement of a group's nodes.
+#[inline(never)]
+fn displacement_gradient<T: Real>(rows: &[u32], gradients: &[Lanes<T>], p: &[Lanes<T>]) -> [Lanes<T>; 3] {
+    let mut h = [[T::default(); 4]; 3];
+    for (&row, b) in rows.iter().zip(gradients) {
+        let x = &p[row as usize];
+        for c in 0..3 {
+            add_scaled(&mut h[c], x, b[c]);
+        }
+    }
+    h
+}
+
+/// Stress of a group.
+#[inline(never)]
+fn stress<T: Real>(moduli: &[[Lanes<T>; 3]; 9], h: &[Lanes<T>; 3]) -> [Lanes<T>; 3] {
+    let mut stress = [[T::default(); 4]; 3];
+    for (k, column) in moduli.iter().enumerate() {
+        for c in 0..3 {
+            add_scaled(&mut stress[c], &column[c], h[k / 3][k % 3]);
+        }
+    }
+    stress
+}
+
+/// Force of a row's groups on it.
+#[inline(never)]
+fn force<T: Real>(groups: &[u32], gradients: &[Lanes<T>], stresses: &[[Lanes<T>; 3]]) -> Lanes<T> {
+    let mut sums = [[T::default(); 4]; 3];
+    for (&g, b) in groups.iter().zip(gradients) {
+        let stress = &stresses[g as usize];
+        for c in 0..3 {
+            add_scaled(&mut sums[c], &stress[c], b[c]);
+        }
+    }
+    std::array::from_fn(|lane| sums[0][lane] + sums[1][lane] + sums[2][lane])
+}
+
+/// Blocks of one row times the entries of their columns.
 #[inline(never)]
 fn row_product<T: Real>(values: &[T], columns: &[u32], p: &[Lanes<T>]) -> Lanes<T> {
     let mut sums = [[T::default(); 4]; 3];

@@ -62,19 +62,31 @@ struct Inner {
     negative_curvature: bool,
 }
 
+/// When a run has gone far enough, M being the preconditioner.
+#[derive(Clone, Copy)]
+enum Goal {
+    /// |r| as a part of |b|.
+    Residual(f64),
+    /// sqrt(r . M^-1 r) as a part of the same of b and what energy is known besides.
+    Energy { part: f64, known: f64 },
+}
+
 fn conjugate_gradients<T: Real>(
     operator: &mut Operator<T>,
     preconditioner: &mut Preconditioner<T>,
     b: &[Lanes<T>],
     x: &mut [Lanes<T>],
-    tolerance: f64,
+    goal: Goal,
     most_iterations: usize,
 ) -> Inner {
     let n = operator.rows();
     let zero = vec![[T::default(); 4]; n];
     let (mut r, mut z, mut q) = (b.to_vec(), zero.clone(), zero);
     let [square, mut rho] = preconditioner.advance(T::default(), &q, &mut r, &mut z);
-    let goal = tolerance * tolerance * square;
+    let [enough, enough_energy] = match goal {
+        Goal::Residual(part) => [part * part * square, f64::NEG_INFINITY],
+        Goal::Energy { part, known } => [0.0, part * part * (known + rho)],
+    };
     let mut p = z.clone();
     let mut best = f64::INFINITY;
     let mut since_best = 0;
@@ -102,7 +114,7 @@ fn conjugate_gradients<T: Real>(
             }
             []
         });
-        if square <= goal {
+        if square <= enough || rho <= enough_energy {
             return end(true, false);
         }
         // Rounding has eaten the iteration when the residual has not fallen for long.
@@ -117,6 +129,11 @@ fn conjugate_gradients<T: Real>(
         }
     }
     Inner { iterations: most_iterations, reached: false, negative_curvature: false }
+}
+
+/// So many times a vector, in an iteration's arithmetic; to about one, so that single precision keeps its range.
+fn scaled<T: Real>(vector: &[[f64; 3]], by: f64) -> Vec<Lanes<T>> {
+    vector.iter().map(|v| [T::of(v[0] * by), T::of(v[1] * by), T::of(v[2] * by), T::default()]).collect()
 }
 
 impl<T: Real> Packed<T> {
@@ -143,16 +160,11 @@ impl<T: Real> Packed<T> {
         x.fill([0.0; 3]);
         let mut size = whole;
         while size > 0.0 && report.iterations < most_iterations {
-            // Scaled to one, so that single precision keeps its range.
-            let scale = 1.0 / size;
-            let b: Vec<Lanes<T>> = residual
-                .iter()
-                .map(|v| [T::of(v[0] * scale), T::of(v[1] * scale), T::of(v[2] * scale), T::default()])
-                .collect();
+            let b = scaled(&residual, 1.0 / size);
             let mut step = vec![[T::default(); 4]; rhs.len()];
             let wanted = (tolerance * whole / size).max(finest);
             let most = most_iterations - report.iterations;
-            let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, wanted, most);
+            let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, Goal::Residual(wanted), most);
             report.iterations += inner.iterations;
             for (x, s) in x.iter_mut().zip(&step) {
                 (0..3).for_each(|i| x[i] += size * s[i].wide());
@@ -234,5 +246,33 @@ impl LinearSolver for Pcg {
         let mut double = double.refine(self.coarse.as_mut(), most, tangent, rhs, x, tolerance);
         double.iterations += single.iterations;
         double
+    }
+
+    fn solve_by_energy(
+        &mut self,
+        tangent: &Tangent,
+        rhs: &[[f64; 3]],
+        x: &mut [[f64; 3]],
+        (part, known): (f64, f64),
+    ) -> LinearReport {
+        let (blocks, size) = (self.blocks, reduce::norm(rhs));
+        if size == 0.0 {
+            x.fill([0.0; 3]);
+            return LinearReport { reached: true, ..LinearReport::default() };
+        }
+        let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));
+        let Packed { operator, preconditioner, .. } = single;
+        let preconditioner = &mut Preconditioner { jacobi: preconditioner, coarse: self.coarse.as_mut() };
+        let mut step = vec![[0.0; 4]; rhs.len()];
+        let goal = Goal::Energy { part, known: known / (size * size) };
+        let b = scaled(rhs, 1.0 / size);
+        let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, goal, self.most_iterations);
+        if !inner.reached {
+            return self.solve(tangent, rhs, x, 1e-3 * part);
+        }
+        for (x, s) in x.iter_mut().zip(&step) {
+            *x = [0, 1, 2].map(|i| size * s[i].wide());
+        }
+        LinearReport { iterations: inner.iterations, reached: true, negative_curvature: false }
     }
 }

@@ -12,6 +12,16 @@ pub(in super::super) struct Tangent {
     pub walls: Vec<(u32, Block)>,
 }
 
+/// How good a solution is to be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Within {
+    /// |rhs - K x| as a part of |rhs|.
+    Residual(f64),
+    /// sqrt(e . K e) of its error e, as the preconditioner tells it, as a part of sqrt(x . K x). A stiff wall weighs much in
+    /// a residual and little here.
+    Energy(f64),
+}
+
 /// How a linear solve went.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct LinearReport {
@@ -38,6 +48,19 @@ pub(in super::super) trait LinearSolver: Send {
     /// `x` comes back as the best solution found, also when the report says that it was not reached; on negative
     /// curvature it is a descent direction.
     fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport;
+
+    /// The same to an error of this part by energy ([`Within::Energy`]) of a solution of which x is what is missing; the rest
+    /// of it has the energy x . K x that is `known`.
+    fn solve_by_energy(
+        &mut self,
+        tangent: &Tangent,
+        rhs: &[[f64; 3]],
+        x: &mut [[f64; 3]],
+        (part, known): (f64, f64),
+    ) -> LinearReport {
+        let _ = known;
+        self.solve(tangent, rhs, x, 1e-3 * part)
+    }
 }
 
 impl Tangent {

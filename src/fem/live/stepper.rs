@@ -208,10 +208,8 @@ impl Stepper {
     pub fn start_from(&mut self, displacement_mm: &[[f64; 3]]) -> Result<bool, FemError> {
         let state = self.model.state(displacement_mm)?;
         self.rest();
-        for (n, to) in state.u.iter().enumerate() {
-            let held = self.model.held_of_row(self.model.row_of[n]);
-            (0..3).filter(|&i| !held[i]).for_each(|i| self.u[n][i] = to[i]);
-        }
+        self.u = state.u;
+        self.model.hold(&mut self.u);
         let taken = self.model.energy(&self.u, &self.laws).is_finite();
         if !taken {
             self.rest();

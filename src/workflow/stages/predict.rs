@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -102,9 +102,10 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
 fn forecasts(work: &Work<'_>, bodies: &[Vec<Posed>], nodes: usize) -> Vec<Vec<Result<Forecast, ForecastError>>> {
     let settings = &work.settings.predict;
     let checks = |head: usize| if head == 0 { settings.checks } else { 0 };
-    let solutions =
-        |(head, posed): (usize, &Vec<Posed>)| posed.iter().map(|p| p.solutions(checks(head))).sum::<usize>();
-    work.tell(|p| p.begin("prediction", bodies.iter().enumerate().map(solutions).sum()));
+    let steps = |(head, posed): (usize, &Vec<Posed>)| {
+        posed.iter().map(|p| p.steps((settings.draws, checks(head)))).sum::<usize>()
+    };
+    work.tell(|p| p.begin("prediction", bodies.iter().enumerate().map(steps).sum()));
     let of = |head: usize, step: &(dyn Fn() + Sync)| -> Vec<_> {
         bodies[head].iter().map(|posed| forecast(posed, nodes, (settings.draws, checks(head)), step)).collect()
     };

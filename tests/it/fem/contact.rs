@@ -228,6 +228,23 @@ fn a_wall_that_is_moved_away_is_the_wall_put_there() {
     assert!(apart(&moved.displacement_mm, &before.displacement_mm) > 0.2);
 }
 
+/// A foretold start has nodes far behind the wall.
+#[test]
+fn from_a_start_through_its_wall_a_body_comes_to_where_it_comes_from_rest() {
+    let mesh = cube(3, 40.0);
+    let scenario = leaning(height_of_the_lowest(&mesh) + 2.0 * 1.01f64.sqrt());
+    let model = Model::new(&mesh, &scenario).unwrap();
+    let (outcome, _) = model.solve(&scenario.materials, None, &|_| ()).unwrap();
+    assert!(outcome.contact[0].area_mm2 > 0.0 && outcome.contact[0].depth_mm < 0.05);
+    let through: Vec<[f64; 3]> = outcome.displacement_mm.iter().map(|u| [u[0], u[1], 1.3 * u[2] - 0.7]).collect();
+    let start = model.state(&through).unwrap();
+    let found = model.solve(&scenario.materials, Some(&start), &|_| ()).unwrap().0;
+    assert_eq!(found.convergence.load_steps, [1.0]);
+    let off = found.displacement_mm.iter().flatten().zip(outcome.displacement_mm.iter().flatten());
+    let farthest = off.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    assert!(farthest < 1e-6, "{farthest} mm; {:?} {:?}", found.convergence, outcome.convergence);
+}
+
 /// Away from the wall, just within its layer, and pressed against it.
 #[test]
 fn sensitivities_before_a_wall_are_the_slopes_of_solutions() {
