@@ -9,7 +9,7 @@
 
 use super::element::Laws;
 use super::equilibrium::{INSIDE_OUT, largest_ratio};
-use super::linear::{self, Tangent};
+use super::linear::{self, Tangent, Within};
 use super::mass::Mass;
 use super::model::Model;
 use super::outcome::worst;
@@ -160,7 +160,7 @@ impl Moving<'_> {
                 report = if iteration == 0 {
                     self.solve_along_velocity(solver, &system, &rhs, &mut change, finest)
                 } else {
-                    solver.solve(&system, &rhs, &mut change, finest)
+                    solver.solve(&system, &rhs, &mut change, Within::Residual(finest))
                 };
                 spare = Some(system);
                 if !report.negative_curvature {
@@ -218,12 +218,12 @@ impl Moving<'_> {
         // The multiple with the least error in the norm of the system, as of the first step of conjugate gradients.
         let multiple = reduce::dot(&self.v, rhs) / reduce::dot(&self.v, &image);
         if !(multiple.is_finite() && multiple > 0.0) {
-            return solver.solve(system, rhs, change, tolerance);
+            return solver.solve(system, rhs, change, Within::Residual(tolerance));
         }
         let mut rest = rhs.to_vec();
         add(&mut rest, -multiple, &image);
         let left = reduce::norm(&rest) / reduce::norm(rhs);
-        let report = solver.solve(system, &rest, change, (tolerance / left).min(0.5));
+        let report = solver.solve(system, &rest, change, Within::Residual((tolerance / left).min(0.5)));
         add(change, multiple, &self.v);
         report
     }

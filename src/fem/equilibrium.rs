@@ -7,7 +7,7 @@
 //! the next be longer.
 
 use super::element::Laws;
-use super::linear::{LinearReport, LinearSolver, Tangent};
+use super::linear::{LinearReport, LinearSolver, Within};
 use super::model::{Model, Projected};
 use super::outcome::worst;
 use super::scenario::Materials;
@@ -290,7 +290,7 @@ impl Model {
         let rhs = self.free_part(&difference);
         let mut answer = vec![[0.0; 3]; rhs.len()];
         solver.prepare(&tangent);
-        solver.solve(&tangent, &rhs, &mut answer, 1e-3);
+        solver.solve(&tangent, &rhs, &mut answer, Within::Residual(1e-3));
         let mut predicted = u.to_vec();
         self.add_free(&mut predicted, 1.0, &answer);
         predicted
@@ -370,19 +370,13 @@ impl Model {
             let mut step = vec![[0.0; 3]; rhs.len()];
             solver.prepare(&tangent);
             let through_walls = relative > 1.0 && self.supports.has_walls();
-            let solve = |solver: &mut dyn LinearSolver, tangent: &Tangent, step: &mut [[f64; 3]]| {
-                if through_walls {
-                    solver.solve_by_energy(tangent, &rhs, step, (THROUGH_WALLS, 0.0))
-                } else {
-                    solver.solve(tangent, &rhs, step, forcing)
-                }
-            };
-            let mut report = solve(solver, &tangent, &mut step);
+            let within = if through_walls { THROUGH_WALLS } else { Within::Residual(forcing) };
+            let mut report = solver.solve(&tangent, &rhs, &mut step, within);
             if report.negative_curvature && !project {
                 // Not a minimum's neighbourhood: with projected elements the step certainly goes down.
                 tangent = self.tangent(u, laws, forces, Projected::All, Some(tangent));
                 solver.prepare(&tangent);
-                let again = solve(solver, &tangent, &mut step);
+                let again = solver.solve(&tangent, &rhs, &mut step, within);
                 report = LinearReport { iterations: report.iterations + again.iterations, ..again };
                 project = true;
             } else {
@@ -464,9 +458,9 @@ struct Stage<'a> {
     progress: &'a dyn Fn(&Progress),
 }
 
-/// How good a step is by its energy where forces are larger than the load: nodes are pressed through walls then, and a residual
-/// says little of the body.
-const THROUGH_WALLS: f64 = 0.1;
+/// How good a step is where forces are larger than the load: nodes are pressed through walls then, and a residual says little of
+/// the body.
+const THROUGH_WALLS: Within = Within::Energy(0.1);
 
 /// Eisenstat and Walker's choice 2 with their safeguard; never finer than the outer iteration needs.
 fn forcing_term(ratio: f64, last: f64, needed: f64) -> f64 {

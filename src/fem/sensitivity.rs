@@ -13,7 +13,6 @@ use super::solver;
 use super::units::millimetres;
 use super::{FemError, State, reduce};
 use crate::material::law::Parameter;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
 /// What a displacement is differentiated by: the logarithm of it, but for [`By::CsfLevel`],
@@ -50,8 +49,8 @@ pub enum By {
 /// Ogden's exponents, see it.
 const STEP: f64 = 1.0 / 512.0;
 
-/// Relative residual of the tangent solves.
-const TOLERANCE: f64 = 1e-10;
+/// How good tangent solves are where nothing else is asked.
+const TOLERANCE: Within = Within::Residual(1e-10);
 
 impl Model {
     /// du / dln(parameter) at an equilibrium, mm per unit of the logarithm: one vector per node for each entry of
@@ -65,26 +64,21 @@ impl Model {
         state: &State,
         by: &[By],
     ) -> Result<Vec<Vec<[f64; 3]>>, FemError> {
-        self.sensitivities_near(&[], Within::Residual(TOLERANCE), materials, state, by)
+        self.sensitivities_within(TOLERANCE, materials, state, by)
     }
 
-    /// [`Model::sensitivities`] no better than is asked for, begun from the sums of some displacements (mm) that come nearest to
-    /// them; another state's sensitivities come near.
+    /// [`Model::sensitivities`] no better than is asked for.
     ///
     /// # Errors
     /// As [`Model::sensitivities`].
-    pub(crate) fn sensitivities_near(
+    pub(crate) fn sensitivities_within(
         &self,
-        near_mm: &[Vec<[f64; 3]>],
         within: Within,
         materials: &Materials,
         state: &State,
         by: &[By],
     ) -> Result<Vec<Vec<[f64; 3]>>, FemError> {
         let mut at = Linearised::new(self, materials, state)?;
-        let near: Vec<Vec<[f64; 3]>> =
-            near_mm.iter().flat_map(|u| self.state(u)).map(|s| self.free_part(&s.u)).collect();
-        let known = Span::new(near, &at.tangent);
         by.iter()
             .map(|by| {
                 let rhs = self.free_part(&at.driving_force(by)?);
@@ -93,7 +87,7 @@ impl Model {
                     (Within::Energy(part), By::Gap(_)) => Within::Energy(0.01 * part),
                     _ => within,
                 };
-                let step = at.solve_from(&known, &rhs, within)?;
+                let step = at.solve(&rhs, within)?;
                 let mut change = vec![[0.0; 3]; state.u.len()];
                 if *by == By::AllLoads {
                     self.move_prescribed(&mut change, 1.0);
@@ -134,40 +128,6 @@ impl Model {
     }
 }
 
-/// Displacements of the rows that span a space, m, with the forces K v that go with them.
-struct Span {
-    vectors: Vec<Vec<[f64; 3]>>,
-    forces: Vec<Vec<[f64; 3]>>,
-    /// Of v . K v; `None` where that is not positive definite.
-    energies: Option<Cholesky<f64, Dyn>>,
-}
-
-impl Span {
-    fn new(vectors: Vec<Vec<[f64; 3]>>, tangent: &Tangent) -> Self {
-        let force = |v: &Vec<[f64; 3]>| {
-            let mut force = vec![[0.0; 3]; v.len()];
-            tangent.product(v, &mut force);
-            force
-        };
-        let forces: Vec<_> = vectors.iter().map(force).collect();
-        let energies = DMatrix::from_fn(vectors.len(), vectors.len(), |a, b| reduce::dot(&vectors[a], &forces[b]));
-        Self { vectors, forces, energies: energies.cholesky() }
-    }
-
-    /// The vector of the space nearest in energy to the solution of K x = `force`, the force that is left, and x . K x.
-    fn nearest(&self, force: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<[f64; 3]>, f64) {
-        let (mut x, mut rest) = (vec![[0.0; 3]; force.len()], force.to_vec());
-        let Some(energies) = &self.energies else { return (x, rest, 0.0) };
-        let work = DVector::from_iterator(self.vectors.len(), self.vectors.iter().map(|v| reduce::dot(v, force)));
-        let parts = energies.solve(&work);
-        for ((by, v), f) in parts.iter().zip(&self.vectors).zip(&self.forces) {
-            x.iter_mut().flatten().zip(v.iter().flatten()).for_each(|(x, v)| *x += by * v);
-            rest.iter_mut().flatten().zip(f.iter().flatten()).for_each(|(rest, f)| *rest -= by * f);
-        }
-        (x, rest, parts.dot(&work))
-    }
-}
-
 /// A model with its tangent at a state.
 struct Linearised<'a> {
     model: &'a Model,
@@ -187,34 +147,10 @@ impl<'a> Linearised<'a> {
         Ok(Self { model, materials, u: &state.u, tangent, solver })
     }
 
-    fn solve(&mut self, rhs: &[[f64; 3]], relative_residual: f64) -> Result<Vec<[f64; 3]>, FemError> {
+    fn solve(&mut self, rhs: &[[f64; 3]], within: Within) -> Result<Vec<[f64; 3]>, FemError> {
         let mut x = vec![[0.0; 3]; rhs.len()];
-        let report = self.solver.solve(&self.tangent, rhs, &mut x, relative_residual);
+        let report = self.solver.solve(&self.tangent, rhs, &mut x, within);
         if report.negative_curvature { Err(FemError::UnstableState) } else { Ok(x) }
-    }
-
-    /// The solution, begun from what is known.
-    fn solve_from(&mut self, known: &Span, rhs: &[[f64; 3]], within: Within) -> Result<Vec<[f64; 3]>, FemError> {
-        let (mut x, rest, energy) = known.nearest(rhs);
-        let more = match within {
-            Within::Residual(part) => {
-                let [goal, left] = [part * reduce::norm(rhs), reduce::norm(&rest)];
-                if left <= goal {
-                    return Ok(x);
-                }
-                self.solve(&rest, goal / left)?
-            }
-            Within::Energy(part) => {
-                let mut more = vec![[0.0; 3]; rhs.len()];
-                let report = self.solver.solve_by_energy(&self.tangent, &rest, &mut more, (part, energy));
-                if report.negative_curvature {
-                    return Err(FemError::UnstableState);
-                }
-                more
-            }
-        };
-        x.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(x, by)| *x += by);
-        Ok(x)
     }
 
     /// -dR / dln(parameter) on all nodes, N.

@@ -1,10 +1,10 @@
-//! How far the response surface is off: some draws solved whole.
+//! How far a prediction's draws are off: some solved whole.
 
 use super::spread::{length, spread, weighed_quantile};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Draws read from the response surface against the same draws solved whole.
+/// Draws as they are predicted against the same draws solved whole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {

@@ -51,9 +51,9 @@ pub struct Forecast {
     pub response: Response,
     /// Displacement of every node in each draw, mm.
     pub draws_mm: Vec<Vec<[f64; 3]>>,
-    /// How far the surface is off; `None` where nothing was solved to tell.
+    /// How far the draws are off; `None` where nothing was solved to tell.
     pub check: Option<Check>,
-    /// Equilibria that were solved for the surface.
+    /// Equilibria that were solved, checks apart.
     pub states: usize,
 }
 
@@ -104,9 +104,6 @@ pub fn forecast(
     let path = Path::new(uncertainty, posed.has_walls());
     let mut states = Vec::new();
     for at in path.points(uncertainty) {
-        if let Some(SolvedState { slopes_mm, .. }) = states.last() {
-            rough.sensitivities_are_like(slopes_mm);
-        }
         let found = rough.solve(&at).map_err(refused)?;
         states.push(solved(at, found));
     }
@@ -115,7 +112,6 @@ pub fn forecast(
     let first = Response::fitted(coordinates.clone(), &states);
     for beside in coordinates.beside() {
         rough.start_from(&first.at(&beside.at));
-        rough.sensitivities_are_like(&first.slopes_at(&beside.at));
         let found = rough.solve_partly(&beside.at, &beside.slopes).map_err(refused)?;
         states.push(solved(beside.at, found));
     }
@@ -125,11 +121,12 @@ pub fn forecast(
     let mut heaviest: Vec<usize> = (0..draws).collect();
     heaviest.sort_by(|&a, &b| response.load_at(&points[b]).total_cmp(&response.load_at(&points[a])));
     heaviest.truncate(posed.solved_of(draws));
+    let mut equilibria = states.len();
     for &n in &heaviest {
         rough.start_from(&draws_mm[n]);
         // So heavy a draw may have none; then it is read like the others.
         if let Ok(found) = rough.equilibrium(&points[n]) {
-            draws_mm[n] = found.displacement_mm;
+            (draws_mm[n], equilibria) = (found.displacement_mm, equilibria + 1);
         }
         step();
     }
@@ -147,7 +144,7 @@ pub fn forecast(
     }
     let check = (!pairs.is_empty()).then(|| checked(&posed.supports, &pairs));
     let response = response.thinned(&(0..nodes).collect::<Vec<_>>());
-    Ok(Forecast { response, draws_mm, check, states: states.len() + heaviest.len() })
+    Ok(Forecast { response, draws_mm, check, states: equilibria })
 }
 
 #[cfg(test)]

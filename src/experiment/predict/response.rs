@@ -218,18 +218,10 @@ impl Response {
 
     /// Displacement of every node at a point, mm.
     pub fn at(&self, point: &[f64]) -> Vec<[f64; 3]> {
-        self.sum(self.coordinates.features(point))
-    }
-
-    /// How it changes with every number, mm per unit.
-    pub fn slopes_at(&self, point: &[f64]) -> Vec<Vec<[f64; 3]>> {
-        self.coordinates.slopes(point).into_iter().map(|terms| self.sum(terms)).collect()
-    }
-
-    fn sum(&self, terms: Vec<f64>) -> Vec<[f64; 3]> {
         let mut sum = vec![[0.0; 3]; self.coefficients_mm.first().map_or(0, Vec::len)];
         // Most knots are far away.
-        for (term, coefficients) in terms.into_iter().zip(&self.coefficients_mm).filter(|(term, _)| *term != 0.0) {
+        let terms = self.coordinates.features(point).into_iter().zip(&self.coefficients_mm);
+        for (term, coefficients) in terms.filter(|(term, _)| *term != 0.0) {
             for (sum, c) in sum.iter_mut().zip(coefficients) {
                 (0..3).for_each(|i| sum[i] += term * c[i]);
             }

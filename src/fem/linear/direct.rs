@@ -3,7 +3,7 @@
 
 use super::super::reduce;
 use super::factor::{Factor, Symbolic};
-use super::system::{LinearReport, LinearSolver, Tangent};
+use super::system::{LinearReport, LinearSolver, Tangent, Within};
 use std::sync::Arc;
 
 /// Iterations with an old factor that cost about as much as a new one.
@@ -41,7 +41,8 @@ impl LinearSolver for Direct {
         }
     }
 
-    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
+    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], within: Within) -> LinearReport {
+        let tolerance = within.residual();
         let mut report = LinearReport::default();
         loop {
             let Some(factor) = self.factor.as_mut().filter(|_| !self.indefinite) else {

@@ -6,7 +6,7 @@ use super::super::reduce::{self, by_row_pairs};
 use super::block_jacobi::BlockJacobi;
 use super::coarse::{Coarse, Rows};
 use super::operator::{Lanes, Operator, Real, dot};
-use super::system::{LinearReport, LinearSolver, Tangent};
+use super::system::{LinearReport, LinearSolver, Tangent, Within};
 
 /// Conjugate gradients with a Jacobi or block-Jacobi preconditioner.
 pub(in super::super) struct Pcg {
@@ -62,30 +62,22 @@ struct Inner {
     negative_curvature: bool,
 }
 
-/// When a run has gone far enough, M being the preconditioner.
-#[derive(Clone, Copy)]
-enum Goal {
-    /// |r| as a part of |b|.
-    Residual(f64),
-    /// sqrt(r . M^-1 r) as a part of the same of b and what energy is known besides.
-    Energy { part: f64, known: f64 },
-}
-
+/// M being the preconditioner, the energy of an error is r . M^-1 r of its residual.
 fn conjugate_gradients<T: Real>(
     operator: &mut Operator<T>,
     preconditioner: &mut Preconditioner<T>,
     b: &[Lanes<T>],
     x: &mut [Lanes<T>],
-    goal: Goal,
+    within: Within,
     most_iterations: usize,
 ) -> Inner {
     let n = operator.rows();
     let zero = vec![[T::default(); 4]; n];
     let (mut r, mut z, mut q) = (b.to_vec(), zero.clone(), zero);
     let [square, mut rho] = preconditioner.advance(T::default(), &q, &mut r, &mut z);
-    let [enough, enough_energy] = match goal {
-        Goal::Residual(part) => [part * part * square, f64::NEG_INFINITY],
-        Goal::Energy { part, known } => [0.0, part * part * (known + rho)],
+    let [enough, enough_energy] = match within {
+        Within::Residual(part) => [part * part * square, f64::NEG_INFINITY],
+        Within::Energy(part) => [0.0, part * part * rho],
     };
     let mut p = z.clone();
     let mut best = f64::INFINITY;
@@ -141,6 +133,34 @@ impl<T: Real> Packed<T> {
         Self { operator: Operator::new(tangent), preconditioner: BlockJacobi::new(tangent, blocks), finest }
     }
 
+    /// One run, refined by nothing.
+    fn once(
+        &mut self,
+        coarse: Option<&mut Coarse>,
+        most_iterations: usize,
+        within: Within,
+        rhs: &[[f64; 3]],
+        x: &mut [[f64; 3]],
+    ) -> LinearReport {
+        x.fill([0.0; 3]);
+        let size = reduce::norm(rhs);
+        if size == 0.0 {
+            return LinearReport { reached: true, ..LinearReport::default() };
+        }
+        let preconditioner = &mut Preconditioner { jacobi: &self.preconditioner, coarse };
+        let mut step = vec![[T::default(); 4]; rhs.len()];
+        let b = scaled(rhs, 1.0 / size);
+        let inner = conjugate_gradients(&mut self.operator, preconditioner, &b, &mut step, within, most_iterations);
+        for (x, s) in x.iter_mut().zip(&step) {
+            *x = [0, 1, 2].map(|i| size * s[i].wide());
+        }
+        LinearReport {
+            iterations: inner.iterations,
+            reached: inner.reached,
+            negative_curvature: inner.negative_curvature,
+        }
+    }
+
     fn refine(
         &mut self,
         coarse: Option<&mut Coarse>,
@@ -164,7 +184,7 @@ impl<T: Real> Packed<T> {
             let mut step = vec![[T::default(); 4]; rhs.len()];
             let wanted = (tolerance * whole / size).max(finest);
             let most = most_iterations - report.iterations;
-            let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, Goal::Residual(wanted), most);
+            let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, Within::Residual(wanted), most);
             report.iterations += inner.iterations;
             for (x, s) in x.iter_mut().zip(&step) {
                 (0..3).for_each(|i| x[i] += size * s[i].wide());
@@ -234,9 +254,15 @@ impl LinearSolver for Pcg {
         }
     }
 
-    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport {
-        let (blocks, most) = (self.blocks, self.most_iterations);
+    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], within: Within) -> LinearReport {
+        let (blocks, most, tolerance) = (self.blocks, self.most_iterations, within.residual());
         let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));
+        if let Within::Energy(_) = within {
+            let report = single.once(self.coarse.as_mut(), most, within, rhs, x);
+            if report.reached {
+                return report;
+            }
+        }
         let single = single.refine(self.coarse.as_mut(), most, tangent, rhs, x, tolerance);
         if single.reached {
             return single;
@@ -246,33 +272,5 @@ impl LinearSolver for Pcg {
         let mut double = double.refine(self.coarse.as_mut(), most, tangent, rhs, x, tolerance);
         double.iterations += single.iterations;
         double
-    }
-
-    fn solve_by_energy(
-        &mut self,
-        tangent: &Tangent,
-        rhs: &[[f64; 3]],
-        x: &mut [[f64; 3]],
-        (part, known): (f64, f64),
-    ) -> LinearReport {
-        let (blocks, size) = (self.blocks, reduce::norm(rhs));
-        if size == 0.0 {
-            x.fill([0.0; 3]);
-            return LinearReport { reached: true, ..LinearReport::default() };
-        }
-        let single = self.single.get_or_insert_with(|| Packed::new(tangent, blocks, 1e-5));
-        let Packed { operator, preconditioner, .. } = single;
-        let preconditioner = &mut Preconditioner { jacobi: preconditioner, coarse: self.coarse.as_mut() };
-        let mut step = vec![[0.0; 4]; rhs.len()];
-        let goal = Goal::Energy { part, known: known / (size * size) };
-        let b = scaled(rhs, 1.0 / size);
-        let inner = conjugate_gradients(operator, preconditioner, &b, &mut step, goal, self.most_iterations);
-        if !inner.reached {
-            return self.solve(tangent, rhs, x, 1e-3 * part);
-        }
-        for (x, s) in x.iter_mut().zip(&step) {
-            *x = [0, 1, 2].map(|i| size * s[i].wide());
-        }
-        LinearReport { iterations: inner.iterations, reached: true, negative_curvature: false }
     }
 }

@@ -17,9 +17,19 @@ pub(in super::super) struct Tangent {
 pub(crate) enum Within {
     /// |rhs - K x| as a part of |rhs|.
     Residual(f64),
-    /// sqrt(e . K e) of its error e, as the preconditioner tells it, as a part of sqrt(x . K x). A stiff wall weighs much in
-    /// a residual and little here.
+    /// sqrt(e . K e) of its error e, as the preconditioner tells it, as a part of sqrt(x . K x). A stiff wall weighs much in a
+    /// residual and little here.
     Energy(f64),
+}
+
+impl Within {
+    /// What a solver asks of the residual that knows nothing else.
+    pub(super) fn residual(self) -> f64 {
+        match self {
+            Self::Residual(part) => part,
+            Self::Energy(part) => 1e-3 * part,
+        }
+    }
 }
 
 /// How a linear solve went.
@@ -33,7 +43,7 @@ pub(in super::super) struct LinearReport {
     pub negative_curvature: bool,
 }
 
-/// Solves `tangent x = rhs` until |rhs - tangent x| <= tolerance |rhs|.
+/// Solves `tangent x = rhs`.
 pub(in super::super) trait LinearSolver: Send {
     /// Takes up a new tangent; to be called before the first solve with it.
     fn prepare(&mut self, tangent: &Tangent);
@@ -47,20 +57,7 @@ pub(in super::super) trait LinearSolver: Send {
 
     /// `x` comes back as the best solution found, also when the report says that it was not reached; on negative
     /// curvature it is a descent direction.
-    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], tolerance: f64) -> LinearReport;
-
-    /// The same to an error of this part by energy ([`Within::Energy`]) of a solution of which x is what is missing; the rest
-    /// of it has the energy x . K x that is `known`.
-    fn solve_by_energy(
-        &mut self,
-        tangent: &Tangent,
-        rhs: &[[f64; 3]],
-        x: &mut [[f64; 3]],
-        (part, known): (f64, f64),
-    ) -> LinearReport {
-        let _ = known;
-        self.solve(tangent, rhs, x, 1e-3 * part)
-    }
+    fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], within: Within) -> LinearReport;
 }
 
 impl Tangent {

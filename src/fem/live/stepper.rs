@@ -7,7 +7,7 @@
 
 use super::super::element::Laws;
 use super::super::equilibrium::largest_ratio;
-use super::super::linear::{LinearReport, LinearSolver, Tangent};
+use super::super::linear::{LinearReport, LinearSolver, Tangent, Within};
 use super::super::load::area_m2;
 use super::super::mass::Mass;
 use super::super::model::Model;
@@ -429,7 +429,7 @@ impl Stepper {
             self.solver.prepare(&tangent);
             let mut change = vec![[0.0; 3]; rhs.len()];
             let finest = (0.1 * report.relative_residual).clamp(1e-4, 1e-2);
-            let solved = self.solver.solve(&tangent, &rhs, &mut change, finest);
+            let solved = self.solver.solve(&tangent, &rhs, &mut change, Within::Residual(finest));
             report.linear_iterations += solved.iterations;
             self.spare = Some(tangent);
             let slope = reduce::dot(&rhs, &change);
@@ -481,12 +481,12 @@ fn solve_along(
         multiple = reduce::dot(velocity, rhs) / reduce::dot(velocity, &image);
     }
     if !(multiple.is_finite() && multiple > 0.0) {
-        return solver.solve(system, rhs, change, tolerance);
+        return solver.solve(system, rhs, change, Within::Residual(tolerance));
     }
     let mut rest = rhs.to_vec();
     add(&mut rest, -multiple, &image);
     let left = reduce::norm(&rest) / reduce::norm(rhs);
-    let report = solver.solve(system, &rest, change, (tolerance / left).min(0.5));
+    let report = solver.solve(system, &rest, change, Within::Residual((tolerance / left).min(0.5)));
     add(change, multiple, velocity);
     report
 }
