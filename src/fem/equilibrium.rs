@@ -56,8 +56,8 @@ const NEW_BEST: f64 = 0.98;
 /// How many times softer walls are on the way from rest to their own softness.
 const SOFTER: [f64; 3] = [40.0, 13.0, 4.0];
 
-/// Relative residual that ends a step whose walls are not yet what they are.
-const ROUGHLY: f64 = 0.6;
+/// What ends a step whose walls are not yet what they are.
+const ROUGHLY: Within = Within::Residual(0.6);
 
 /// Newton iterations of all load steps together, in units of the most for one: the whole call ends with a verdict.
 const BUDGET: usize = 8;
@@ -69,6 +69,22 @@ impl Model {
     /// [`FemError::NoEquilibrium`] with the load reached, the reason and the worst element.
     pub fn solve(
         &self,
+        materials: &Materials,
+        warm_start: Option<&State>,
+        progress: &dyn Fn(&Progress),
+    ) -> Result<(Outcome, State), FemError> {
+        let goal = Within::Residual(self.scenario.solver.relative_residual);
+        self.solve_within(goal, materials, warm_start, progress)
+    }
+
+    /// [`Model::solve`] no better than is asked for: its residual, or the energy of the last step as a part of the body's and
+    /// the loads'. What is then left is that of the step's own linear solution and the square of the step.
+    ///
+    /// # Errors
+    /// As [`Model::solve`].
+    pub(crate) fn solve_within(
+        &self,
+        goal: Within,
         materials: &Materials,
         warm_start: Option<&State>,
         progress: &dyn Fn(&Progress),
@@ -91,14 +107,8 @@ impl Model {
             if stored.is_finite() {
                 let all_whole = |u: &[[f64; 3]]| self.body.state(u, &laws).iter().all(|s| s[1] > 0.0);
                 let start_whole = all_whole(&u);
-                let stage = Stage {
-                    laws: &laws,
-                    factor: 1.0,
-                    load_scale,
-                    first_forcing: FIRST_FORCING[1],
-                    goal: self.scenario.solver.relative_residual,
-                    progress,
-                };
+                let stage =
+                    Stage { laws: &laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], goal, progress };
                 let found = self.newton(&stage, &mut u, &mut forces, solver.as_mut(), &mut record).is_ok();
                 // A start far off may lead to an equilibrium with cells inside out: then the way is from rest.
                 if found && all_whole(&u) {
@@ -114,8 +124,8 @@ impl Model {
             }
         }
 
-        let from_rest =
-            self.solve_from_rest(&mut laws, load_scale, &mut forces, solver.as_mut(), &mut record, progress);
+        let way = (goal, load_scale, progress);
+        let from_rest = self.solve_from_rest(&mut laws, way, &mut forces, solver.as_mut(), &mut record);
         let (u, forces) = match (from_rest, doubtful) {
             (Ok(u), Some((.., lower))) if self.energy(&u, &laws) - work(&u) < lower => (u, forces),
             (_, Some((u, forces, relative_residual, _))) => {
@@ -131,13 +141,11 @@ impl Model {
     fn solve_from_rest(
         &self,
         laws: &mut Laws,
-        load_scale: f64,
+        (goal, load_scale, progress): (Within, f64, &dyn Fn(&Progress)),
         forces: &mut [[f64; 3]],
         solver: &mut dyn LinearSolver,
         record: &mut ConvergenceRecord,
-        progress: &dyn Fn(&Progress),
     ) -> Result<Vec<[f64; 3]>, FemError> {
-        let goal = self.scenario.solver.relative_residual;
         if let Some(u) = self.through_soft_walls(laws, load_scale, forces, solver, record, progress) {
             let stage = Stage { laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], goal, progress };
             let mut hardened = u;
@@ -350,9 +358,9 @@ impl Model {
                 fraction: factor,
                 iteration: record.iterations.len(),
                 relative_residual: relative,
-                goal: stage.goal,
+                goal: stage.goal.residual(),
             });
-            if relative <= stage.goal {
+            if relative <= stage.goal.residual() {
                 return Ok(());
             }
             (best, since_best) = if size < NEW_BEST * best { (size, 0) } else { (best.min(size), since_best + 1) };
@@ -360,7 +368,7 @@ impl Model {
             if iteration == settings.newton_iterations || since_best > PATIENCE || spent {
                 return Err(Stuck::Iterations);
             }
-            let needed = (0.5 * stage.goal / relative).min(COARSEST);
+            let needed = (0.5 * stage.goal.residual() / relative).min(COARSEST);
             let forcing = if iteration == 0 {
                 stage.first_forcing.max(needed)
             } else {
@@ -385,8 +393,7 @@ impl Model {
             let mut slope = -reduce::dot(&rhs, &step);
             if slope.is_nan() || slope >= 0.0 {
                 // The linear solver lost its way: straight downhill, scaled by the diagonal.
-                for (row, (s, r)) in step.iter_mut().zip(&rhs).enumerate() {
-                    let d = tangent.diagonal_block(row);
+                for ((s, r), d) in step.iter_mut().zip(&rhs).zip(tangent.diagonal_blocks()) {
                     *s = [0, 1, 2].map(|i| r[i] / d[4 * i].abs().max(f64::MIN_POSITIVE));
                 }
                 slope = -reduce::dot(&rhs, &step);
@@ -417,6 +424,11 @@ impl Model {
             });
             *u = trial;
             potential = next;
+            if matches!(stage.goal, Within::Energy(part) if length == 1.0 && -slope <= part * part * energy_scale) {
+                self.internal_forces(u, laws, forces);
+                record.relative_residual = reduce::norm(&self.out_of_balance(forces, factor)) / reference;
+                return Ok(());
+            }
             spare = Some(tangent);
         }
         Err(Stuck::Iterations)
@@ -453,8 +465,8 @@ struct Stage<'a> {
     factor: f64,
     load_scale: f64,
     first_forcing: f64,
-    /// Relative residual that is low enough.
-    goal: f64,
+    /// What is good enough.
+    goal: Within,
     progress: &'a dyn Fn(&Progress),
 }
 

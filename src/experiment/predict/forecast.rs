@@ -67,8 +67,8 @@ pub struct ForecastError {
     pub source: BodyError,
 }
 
-/// Relative residual of a surface's equilibria; checks are solved as the scenario asks.
-const BALANCED: f64 = 1e-4;
+/// How good a surface's equilibria are; checks are solved as the scenario asks.
+const BALANCED: Within = Within::Energy(0.01);
 /// How good its sensitivities are.
 const SENSITIVE: Within = Within::Energy(0.01);
 
@@ -89,13 +89,11 @@ pub fn forecast(
 ) -> Result<Forecast, ForecastError> {
     let refused = |source| ForecastError { supports: posed.supports.clone(), source };
     let uncertainty = &posed.uncertainty;
-    let body = |scenario: &Scenario| {
+    let body = || {
         let nothing = Observation::Nodes(Vec::new());
-        Body::new(&posed.mesh, scenario, uncertainty.unknowns(), posed.poisson_ratio, nothing).map_err(refused)
+        Body::new(&posed.mesh, &posed.scenario, uncertainty.unknowns(), posed.poisson_ratio, nothing).map_err(refused)
     };
-    let mut roughly = posed.scenario.clone();
-    roughly.solver.relative_residual = roughly.solver.relative_residual.max(BALANCED);
-    let mut rough = body(&roughly)?.sensitive_within(SENSITIVE);
+    let mut rough = body()?.within(BALANCED, SENSITIVE);
     let solved = |at: Vec<f64>, found: Solved| {
         step();
         SolvedState { at, displacement_mm: found.outcome.displacement_mm, slopes_mm: found.sensitivities }
@@ -134,8 +132,13 @@ pub fn forecast(
     for u in &mut draws_mm {
         u.truncate(nodes);
     }
-    let (mut pairs, mut exact) = (Vec::new(), body(&posed.scenario)?);
+    let mut pairs = Vec::new();
+    let mut exact = None;
     for (point, told) in points.iter().zip(&draws_mm).take(checks) {
+        let exact = match &mut exact {
+            Some(exact) => exact,
+            none => none.insert(body()?),
+        };
         exact.start_from(&response.at(point));
         let mut solved = exact.equilibrium(point).map_err(refused)?.displacement_mm;
         solved.truncate(nodes);

@@ -59,6 +59,9 @@ pub(in super::super) struct Rings {
     pub gradients_of_row: Vec<[f64; 3]>,
 }
 
+/// Entries of a symmetric 3 x 3 matrix.
+const PAIRS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
+
 /// The nodal part of a tangent: sum_a B_a^T moduli_a B_a.
 #[derive(Clone)]
 pub(in super::super) struct NodalTangent {
@@ -266,21 +269,42 @@ impl NodalTangent {
         });
     }
 
-    /// Adds the part of the diagonal block of a row, column-major.
-    pub(in super::super) fn add_diagonal_block(&self, row: usize, block: &mut [f64; 9]) {
+    /// Adds its part of the diagonal block, column-major, of every row.
+    ///
+    /// Entry (r, k) of B_a^T C B_a is sum_cd b_c b_d C(r c, k d): the 6 products of b times what C has for each of them.
+    pub(in super::super) fn add_diagonal_blocks(&self, blocks: &mut [[f64; 9]]) {
         let rings = &*self.rings;
-        let held = self.held.as_ref().map_or([false; 3], |h| h[row]);
-        for at in rings.group_start[row]..rings.group_start[row + 1] {
-            let (moduli, b) = (&self.moduli[rings.groups[at] as usize], rings.gradients_of_row[at]);
-            let columns = moduli.as_chunks::<9>().0;
-            for k in 0..3 {
-                // Stress for a displacement of the node along k.
-                let stress: [f64; 9] =
-                    std::array::from_fn(|i| b[0] * columns[k][i] + b[1] * columns[k + 3][i] + b[2] * columns[k + 6][i]);
-                for r in (0..3).filter(|&r| r == k || !(held[r] || held[k])) {
-                    block[r + 3 * k] += b[0] * stress[r] + b[1] * stress[r + 3] + b[2] * stress[r + 6];
+        let mut by_product = vec![[[0.0; 6]; 6]; self.moduli.len()];
+        reduce::by_rows(&mut by_product, |first, groups| {
+            for (out, moduli) in groups.iter_mut().zip(&self.moduli[first..]) {
+                let c = |r: usize, c: usize, k: usize, d: usize| moduli[r + 3 * c + 9 * (k + 3 * d)];
+                *out = PAIRS.map(|[p, q]| {
+                    PAIRS.map(|[r, k]| if p == q { c(r, p, k, p) } else { c(r, p, k, q) + c(r, q, k, p) })
+                });
+            }
+            []
+        });
+        reduce::by_rows(blocks, |first, rows| {
+            for (row, block) in (first..).zip(rows) {
+                let mut sum = [0.0; 6];
+                for at in rings.group_start[row]..rings.group_start[row + 1] {
+                    let (of, b) = (&by_product[rings.groups[at] as usize], rings.gradients_of_row[at]);
+                    for (of, [p, q]) in of.iter().zip(PAIRS) {
+                        let product = b[p] * b[q];
+                        (0..6).for_each(|i| sum[i] += product * of[i]);
+                    }
+                }
+                let held = self.held.as_ref().map_or([false; 3], |h| h[row]);
+                for (sum, [r, k]) in sum.into_iter().zip(PAIRS) {
+                    if r == k {
+                        block[4 * r] += sum;
+                    } else if !(held[r] || held[k]) {
+                        block[r + 3 * k] += sum;
+                        block[k + 3 * r] += sum;
+                    }
                 }
             }
-        }
+            []
+        });
     }
 }

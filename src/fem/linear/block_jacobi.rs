@@ -13,11 +13,12 @@ pub(super) struct BlockJacobi<T> {
 impl<T: Real> BlockJacobi<T> {
     /// With `blocks` false only the diagonal entries are used.
     pub(super) fn new(tangent: &Tangent, blocks: bool) -> Self {
-        let inverse = (0..tangent.matrix.pattern.rows())
+        let inverse = tangent
+            .diagonal_blocks()
             .into_par_iter()
             .with_min_len(256)
-            .map(|row| {
-                let block = Matrix3::from_column_slice(&tangent.diagonal_block(row));
+            .map(|block| {
+                let block = Matrix3::from_column_slice(&block);
                 let diagonal =
                     || Matrix3::from_diagonal(&block.diagonal().map(|d| if d > 0.0 { 1.0 / d } else { 1.0 }));
                 // An indefinite diagonal block (a tangent that is not positive definite) would break the iteration.

@@ -24,7 +24,7 @@ pub(crate) enum Within {
 
 impl Within {
     /// What a solver asks of the residual that knows nothing else.
-    pub(super) fn residual(self) -> f64 {
+    pub(in super::super) fn residual(self) -> f64 {
         match self {
             Self::Residual(part) => part,
             Self::Energy(part) => 1e-3 * part,
@@ -81,17 +81,69 @@ impl Tangent {
         sum
     }
 
-    /// The 3 x 3 diagonal block of a row, column-major.
-    pub(in super::super) fn diagonal_block(&self, row: usize) -> [f64; 9] {
-        let mut block = self.matrix.blocks[self.matrix.pattern.diagonal[row] as usize];
+    /// The 3 x 3 diagonal blocks of all rows, column-major.
+    pub(in super::super) fn diagonal_blocks(&self) -> Vec<[f64; 9]> {
+        let mut blocks: Vec<Block> =
+            self.matrix.pattern.diagonal.iter().map(|&at| self.matrix.blocks[at as usize]).collect();
         if let Some(nodal) = &self.nodal {
-            nodal.add_diagonal_block(row, &mut block);
+            nodal.add_diagonal_blocks(&mut blocks);
         }
-        block
+        blocks
     }
 }
 
 fn add_scaled<const N: usize>(a: &mut [[f64; N]], factor: f64, b: &[[f64; N]]) -> [f64; 0] {
     a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += factor * b);
     []
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fem::model::Projected;
+    use crate::fem::{Model, Scenario};
+    use crate::mesh::TetMesh;
+
+    #[test]
+    fn diagonal_blocks_are_those_of_the_products_with_unit_vectors() {
+        // Two tissues around an edge, one end of which slides in a plane.
+        let nodes = vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 8.0, 0.0],
+            [9.0, 0.0, 1.0],
+            [0.0, -7.0, 2.0],
+            [-8.0, 1.0, 0.0],
+            [0.5, 1.0, 9.0],
+        ];
+        let tets = vec![[0, 2, 1, 5], [0, 3, 2, 5], [0, 4, 3, 5], [0, 1, 4, 5]];
+        let mut mesh = TetMesh::new(nodes, tets, vec![2, 2, 3, 3]).unwrap();
+        mesh.set_nodes("ring", vec![1, 2]).unwrap();
+        mesh.set_nodes("end", vec![0]).unwrap();
+        let material = "law = 'neo-hookean'\nshear_modulus_pa = 900.0\npoisson_ratio = 0.45\n";
+        let scenario = Scenario::from_toml(&format!(
+            "fixed = ['ring']\n[[prescribed]]\nset = 'end'\ndisplacement_mm = [0, 0, 0]\n\
+             components = [false, true, false]\n[materials.grey_matter]\n{material}\
+             [materials.white_matter]\n{material}[solver]\nelement = 'tet4-nodal'\n"
+        ))
+        .unwrap();
+        let model = Model::new(&mesh, &scenario).unwrap();
+        let bent = |n: usize| [0.3 * n as f64, 0.1 * (n * n % 5) as f64, -0.2 * (n % 3) as f64];
+        let state = model.state(&(0..6).map(bent).collect::<Vec<_>>()).unwrap();
+        let laws = model.laws(&scenario.materials).unwrap();
+        let tangent = model.tangent(&state.u, &laws, &mut [[0.0; 3]; 6], Projected::Nothing, None);
+        let blocks = tangent.diagonal_blocks();
+        assert_eq!(blocks.len(), 4);
+        let largest = blocks.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (row, block) in blocks.iter().enumerate() {
+            for k in 0..3 {
+                let (mut unit, mut product) = (vec![[0.0; 3]; 4], vec![[0.0; 3]; 4]);
+                unit[row][k] = 1.0;
+                tangent.product(&unit, &mut product);
+                let held = model.held_components.as_ref().unwrap()[row];
+                for r in (0..3).filter(|&r| r == k || !(held[r] || held[k])) {
+                    let off = block[r + 3 * k] - product[row][r];
+                    assert!(off.abs() < 1e-12 * largest || held[k], "{row} {r} {k}: {off}");
+                }
+            }
+        }
+    }
 }
