@@ -13,12 +13,16 @@ use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{EstimateSettings, LogPrior, laplace};
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::Finding;
+use crate::fem::Within;
 use crate::material::law::Material;
 use std::collections::BTreeMap;
 
 /// How far a single room between cortex and skull is off for a head, mm: it differs from place to place by more, and a
 /// head leans on much of its skull at once.
 const ROOM_MM: f64 = 0.3;
+
+/// How good equilibria and sensitivities are on the way to what two scans show (docs/evidence/choices.md).
+const AS_SEEN: Within = Within::Energy(1e-3);
 
 /// Finds the most probable parameters and how sure they are.
 ///
@@ -35,7 +39,12 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         .collect();
     let tissues: Vec<Option<String>> = unknowns.iter().map(Unknown::tissue).collect();
     let unknown = unknowns.clone();
+    let exact = Within::Residual(problem.template.solver.relative_residual);
+    let seen_in_scans = matches!(problem.errors, Errors::Correlated(_));
     let mut body = Body::new(problem.mesh, problem.template, unknowns, problem.poisson_ratio, problem.observation)?;
+    if seen_in_scans {
+        body = body.within(AS_SEEN, AS_SEEN);
+    }
     let start = body.start(&start);
     let outline = problem.coarser.filter(|_| problem.outline_mm > 0.0).map(|mesh| Outline {
         mesh,
@@ -54,7 +63,11 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         }
     };
     let posterior = laplace(&fitted.descent.log_parameters, &fitted.fisher, &prior);
-    let Solved { outcome: state, sensitivities } = body.solve(&fitted.descent.log_parameters)?;
+    let Solved { outcome: mut state, sensitivities } = body.solve(&fitted.descent.log_parameters)?;
+    if seen_in_scans {
+        body = body.within(exact, AS_SEEN);
+        state = body.equilibrium(&fitted.descent.log_parameters)?;
+    }
     // A model that is too stiff is made up for by a modulus that is too low: its error is not one of the displacement.
     let (displacement_sd_mm, displacement_95_mm) = spread(&state.displacement_mm, &sensitivities, &posterior);
     let mut mesh_log_sd = Vec::new();
