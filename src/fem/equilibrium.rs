@@ -124,7 +124,7 @@ impl Model {
             }
         }
 
-        let way = (goal, load_scale, progress);
+        let way = Way { goal, load_scale, progress };
         let from_rest = self.solve_from_rest(&mut laws, way, &mut forces, solver.as_mut(), &mut record);
         let (u, forces) = match (from_rest, doubtful) {
             (Ok(u), Some((.., lower))) if self.energy(&u, &laws) - work(&u) < lower => (u, forces),
@@ -141,11 +141,12 @@ impl Model {
     fn solve_from_rest(
         &self,
         laws: &mut Laws,
-        (goal, load_scale, progress): (Within, f64, &dyn Fn(&Progress)),
+        way: Way,
         forces: &mut [[f64; 3]],
         solver: &mut dyn LinearSolver,
         record: &mut ConvergenceRecord,
     ) -> Result<Vec<[f64; 3]>, FemError> {
+        let Way { goal, load_scale, progress } = way;
         if let Some(u) = self.through_soft_walls(laws, load_scale, forces, solver, record, progress) {
             let stage = Stage { laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], goal, progress };
             let mut hardened = u;
@@ -457,6 +458,15 @@ impl Model {
 /// The largest Poisson's ratio among materials.
 pub(super) fn largest_ratio(materials: &Materials) -> f64 {
     materials.values().map(Material::poisson_ratio).fold(0.0, f64::max)
+}
+
+/// What stays the same on the way from rest.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    /// What is good enough at the end.
+    goal: Within,
+    load_scale: f64,
+    progress: &'a dyn Fn(&Progress),
 }
 
 /// What stays the same during one load step.
