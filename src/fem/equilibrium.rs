@@ -147,7 +147,7 @@ impl Model {
         record: &mut ConvergenceRecord,
     ) -> Result<Vec<[f64; 3]>, FemError> {
         let Way { goal, load_scale, progress } = way;
-        if let Some(u) = self.through_soft_walls(laws, load_scale, forces, solver, record, progress) {
+        if let Some(u) = self.through_soft_walls(laws, way, forces, solver, record) {
             let stage = Stage { laws, factor: 1.0, load_scale, first_forcing: FIRST_FORCING[1], goal, progress };
             let mut hardened = u;
             if self.newton(&stage, &mut hardened, forces, solver, record).is_ok() {
@@ -199,15 +199,15 @@ impl Model {
     fn through_soft_walls(
         &self,
         laws: &mut Laws,
-        load_scale: f64,
+        way: Way,
         forces: &mut [[f64; 3]],
         solver: &mut dyn LinearSolver,
         record: &mut ConvergenceRecord,
-        progress: &dyn Fn(&Progress),
     ) -> Option<Vec<[f64; 3]>> {
         if !self.supports.has_walls() {
             return None;
         }
+        let Way { load_scale, progress, .. } = way;
         let mut u = vec![[0.0; 3]; self.nodes_m.len()];
         self.move_prescribed(&mut u, 1.0);
         let mut last: Option<(f64, Vec<[f64; 3]>)> = None;
@@ -465,6 +465,7 @@ pub(super) fn largest_ratio(materials: &Materials) -> f64 {
 struct Way<'a> {
     /// What is good enough at the end.
     goal: Within,
+    /// Size of the load on the free nodes, N.
     load_scale: f64,
     progress: &'a dyn Fn(&Progress),
 }

@@ -406,6 +406,18 @@ mod tests {
     }
 
     #[test]
+    fn the_state_that_is_told_is_in_equilibrium_as_the_scenario_asks_whatever_was_enough_on_the_way() {
+        let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.0; 3]);
+        let (mesh, scenario) = (block(5), settings().scenario());
+        let asked = scenario.solver.relative_residual;
+        assert!(found.state.convergence.relative_residual <= asked);
+        let unknowns = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect();
+        let body = Body::new(&mesh, &scenario, unknowns, 0.45, Observation::Nodes(Vec::new())).unwrap();
+        let on_the_way = body.within(AS_SEEN, AS_SEEN).equilibrium(&found.numbers).unwrap();
+        assert!(on_the_way.convergence.relative_residual > asked);
+    }
+
+    #[test]
     fn without_a_shift_there_is_a_bound_and_no_stiffness() {
         let wave = |x: [f64; 3]| [0.01 * (0.2 * x[1]).sin(), 0.01 * (0.15 * x[2]).cos(), 0.01 * (0.25 * x[0]).sin()];
         let whole = seen_by_a_model_of_a_push_from_above(None, wave);

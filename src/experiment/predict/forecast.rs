@@ -133,17 +133,15 @@ pub fn forecast(
         u.truncate(nodes);
     }
     let mut pairs = Vec::new();
-    let mut exact = None;
-    for (point, told) in points.iter().zip(&draws_mm).take(checks) {
-        let exact = match &mut exact {
-            Some(exact) => exact,
-            none => none.insert(body()?),
-        };
-        exact.start_from(&response.at(point));
-        let mut solved = exact.equilibrium(point).map_err(refused)?.displacement_mm;
-        solved.truncate(nodes);
-        step();
-        pairs.push((told.clone(), solved));
+    if checks > 0 {
+        let mut exact = body()?;
+        for (point, told) in points.iter().zip(&draws_mm).take(checks) {
+            exact.start_from(&response.at(point));
+            let mut solved = exact.equilibrium(point).map_err(refused)?.displacement_mm;
+            solved.truncate(nodes);
+            step();
+            pairs.push((told.clone(), solved));
+        }
     }
     let check = (!pairs.is_empty()).then(|| checked(&posed.supports, &pairs));
     let response = response.thinned(&(0..nodes).collect::<Vec<_>>());
