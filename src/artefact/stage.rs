@@ -185,6 +185,11 @@ impl Stage {
             return Ok(StageOutcome { skipped: true, reasons, manifest });
         }
         let produced = compute().map_err(StageError::Compute)?;
+        Ok(self.written(reasons, produced)?)
+    }
+
+    /// Writes what was computed in place of what an earlier run left.
+    fn written(&self, reasons: Vec<Reason>, produced: Produced) -> Result<StageOutcome, WriteError> {
         // The old manifest must not vouch for a mixture of old and new files, nor may a file stay that is made no more.
         let old = self.previous();
         std::fs::remove_file(self.manifest_path()).ok();

@@ -1,7 +1,10 @@
 //! Work in tasks of rows, and sums whose rounding does not depend on the number of threads: the tasks follow from the
 //! number of rows alone and are added in order.
+//!
+//! Each has one loop for every caller: woven into rayon's own code it would be compiled anew for every one of them.
 
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Most rows of a task.
 pub(super) const CHUNK: usize = 1024;
@@ -13,7 +16,11 @@ fn rows_of_task(n: usize) -> usize {
 }
 
 /// Sum of `term(range)` over the tasks of 0..n.
-pub(super) fn chunked(n: usize, term: impl Fn(std::ops::Range<usize>) -> f64 + Sync) -> f64 {
+pub(super) fn chunked(n: usize, term: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
+    sum_of_tasks(n, &term)
+}
+
+fn sum_of_tasks(n: usize, term: &(dyn Fn(Range<usize>) -> f64 + Sync)) -> f64 {
     let rows = rows_of_task(n);
     let range = |task: usize| task * rows..n.min((task + 1) * rows);
     if n <= 4 * CHUNK || rayon::current_num_threads() == 1 {
@@ -38,7 +45,7 @@ pub(super) fn by_tasks<A: Send, const N: usize>(
     f: impl Fn(usize, &mut [A]) -> [f64; N] + Sync,
 ) -> [f64; N] {
     // A vector of nothing takes no memory.
-    pairs(rows_of_task, rows, &mut vec![(); rows.len()], |first, rows, _| f(first, rows))
+    pairs(rows_of_task, rows, &mut vec![(); rows.len()], &|first, rows, _| f(first, rows))
 }
 
 /// [`by_rows`] over two slices of equal length.
@@ -47,14 +54,14 @@ pub(super) fn by_row_pairs<A: Send, B: Send, const N: usize>(
     b: &mut [B],
     f: impl Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync,
 ) -> [f64; N] {
-    pairs(rows_of_task(a.len()), a, b, f)
+    pairs(rows_of_task(a.len()), a, b, &f)
 }
 
 fn pairs<A: Send, B: Send, const N: usize>(
     rows: usize,
     a: &mut [A],
     b: &mut [B],
-    f: impl Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync,
+    f: &(dyn Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync),
 ) -> [f64; N] {
     let add = |sum: [f64; N], part: [f64; N]| std::array::from_fn(|i| sum[i] + part[i]);
     if a.len() <= rows || rayon::current_num_threads() == 1 {

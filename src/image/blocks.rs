@@ -1,10 +1,10 @@
 //! What changes slowly, kept on a coarse grid: means over blocks of voxels, and the way back.
 
 use super::grid::Grid;
+use super::pieces::each_piece;
 use super::volume::Volume;
 use crate::geometry::Frame;
 use nalgebra::{Matrix4, Vector3};
-use rayon::prelude::*;
 
 /// A voxel for each block of `factor` voxels along each axis.
 ///
@@ -57,7 +57,8 @@ pub fn on_finer_grid<F: Frame>(coarse: &Volume<f32, F>, grid: &Grid<F>) -> Volum
     let row_of = |j: usize, k: usize| &coarse.data[coarse.grid.index(0, j, k)..][..coarse.grid.dims[0]];
     let mix = |low: f32, high: f32, share: f32| low * (1.0 - share) + high * share;
     let mut out = Volume::filled(*grid, 0.0);
-    out.data.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
+    each_piece(&mut out.data, nx, &|first, values| {
+        let row = first / nx;
         let ((j0, j1, v), (k0, k1, w)) = (along_y[row % ny], along_z[row / ny]);
         let rows = [row_of(j0, k0), row_of(j1, k0), row_of(j0, k1), row_of(j1, k1)];
         let across = |i: usize| mix(mix(rows[0][i], rows[1][i], v), mix(rows[2][i], rows[3][i], v), w);

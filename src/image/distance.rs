@@ -4,16 +4,19 @@
 //! distance is separable, and along a line it is the lower envelope of parabolas. Spacing may differ per axis; the
 //! grid's axes are taken as perpendicular (they are, unless an affine shears).
 
+use super::pieces::each_piece;
 use super::volume::{Mask, Volume};
 use crate::geometry::Frame;
-use rayon::prelude::*;
+
+/// Values per task where every value is by itself.
+const AT_ONCE: usize = 1 << 16;
 
 /// Distance in mm from each voxel centre to the nearest voxel centre inside the mask: 0 inside, infinite everywhere
 /// when the mask is empty.
 #[must_use]
 pub fn distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     let mut volume = squared_distance_mm2(mask, true, f32::INFINITY);
-    volume.data.par_chunks_mut(1 << 16).for_each(|chunk| chunk.iter_mut().for_each(|d| *d = d.sqrt()));
+    each_piece(&mut volume.data, AT_ONCE, &|_, piece| piece.iter_mut().for_each(|d| *d = d.sqrt()));
     volume
 }
 
@@ -25,8 +28,8 @@ pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     let spacing_mm = mask.grid.spacing_mm();
     let half = (0.5 * spacing_mm.iter().copied().fold(f64::INFINITY, f64::min)) as f32;
     let mut signed = squared_distance_mm2(mask, true, f32::INFINITY);
-    signed.data.par_chunks_mut(1 << 16).for_each(|chunk| {
-        for d in chunk.iter_mut() {
+    each_piece(&mut signed.data, AT_ONCE, &|_, piece| {
+        for d in piece {
             *d = if *d > 0.0 { d.sqrt() - half } else { *d };
         }
     });
@@ -35,8 +38,8 @@ pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     let around = around.grown(&mask.grid, 1e-3 * f64::from(half));
     let mut part = signed.cropped(&around);
     let inward = squared_distance_mm2(&mask.cropped(&around), false, f32::INFINITY);
-    part.data.par_chunks_mut(1 << 16).zip(inward.data.par_chunks(1 << 16)).for_each(|(out, inn)| {
-        for (o, i) in out.iter_mut().zip(inn) {
+    each_piece(&mut part.data, AT_ONCE, &|first, out| {
+        for (o, i) in out.iter_mut().zip(&inward.data[first..]) {
             *o = if *i > 0.0 { half - i.sqrt() } else { *o };
         }
     });
@@ -53,7 +56,8 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
     if data.is_empty() {
         return Volume::from_data(mask.grid, data);
     }
-    data.par_chunks_mut(nx * ny).zip(mask.data.par_chunks(nx * ny)).for_each(|(plane, inside)| {
+    each_piece(&mut data, nx * ny, &|first, plane| {
+        let inside = &mask.data[first..][..nx * ny];
         for (row, inside) in plane.chunks_exact_mut(nx).zip(inside.chunks_exact(nx)) {
             row_distance(row, inside, seed, h[0], limit);
         }
@@ -81,7 +85,8 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
     if nz > 1 {
         // Lines along k made contiguous, one plane of j per task, then turned back.
         let mut lines = vec![0f32; data.len()];
-        lines.par_chunks_mut(nx * nz).enumerate().for_each(|(j, lines)| {
+        each_piece(&mut lines, nx * nz, &|first, lines| {
+            let j = first / (nx * nz);
             let mut envelope = Envelope::new(nz);
             for first in (0..nx).step_by(LANES) {
                 let lanes = LANES.min(nx - first);
@@ -96,7 +101,8 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
                 }
             }
         });
-        data.par_chunks_mut(nx * ny).enumerate().for_each(|(k, plane)| {
+        each_piece(&mut data, nx * ny, &|first, plane| {
+            let k = first / (nx * ny);
             for (j, row) in plane.chunks_exact_mut(nx).enumerate() {
                 for (i, d) in row.iter_mut().enumerate() {
                     *d = lines[(j * nx + i) * nz + k];

@@ -1,8 +1,8 @@
 //! Separable Gaussian smoothing.
 
+use super::pieces::each_piece;
 use super::volume::Volume;
 use crate::geometry::Frame;
-use rayon::prelude::*;
 
 /// Taps reach this many standard deviations; beyond lies 5e-4 of the weight, which the normalisation gives back.
 const REACH: f64 = 3.5;
@@ -51,7 +51,8 @@ fn along_rows(data: &[f32], n: usize, kernel: &[f32]) -> Vec<f32> {
     let mut out = vec![0.0; data.len()];
     // Many rows at a time: a padded row is small, a task must not be.
     let rows = 256;
-    out.par_chunks_mut(n * rows).zip(data.par_chunks(n * rows)).for_each(|(out, data)| {
+    each_piece(&mut out, n * rows, &|first, out| {
+        let data = &data[first..];
         let mut padded = vec![0f32; n + 2 * radius];
         for (out, row) in out.chunks_exact_mut(n).zip(data.chunks_exact(n)) {
             padded[..radius].fill(row[0]);
@@ -86,7 +87,8 @@ fn weighted_sum<'a>(out: &mut [f32], kernel: &[f32], piece: impl Fn(isize) -> &'
 
 fn along_columns(data: &[f32], nx: usize, ny: usize, kernel: &[f32]) -> Vec<f32> {
     let mut out = vec![0.0; data.len()];
-    out.par_chunks_mut(nx * ny).zip(data.par_chunks(nx * ny)).for_each(|(out, plane)| {
+    each_piece(&mut out, nx * ny, &|first, out| {
+        let plane = &data[first..][..nx * ny];
         for (j, out) in out.chunks_exact_mut(nx).enumerate() {
             weighted_sum(out, kernel, |t| {
                 let j = (j as isize + t).clamp(0, ny as isize - 1) as usize;
@@ -101,7 +103,8 @@ fn across_planes(data: &[f32], plane: usize, nz: usize, kernel: &[f32]) -> Vec<f
     let mut out = vec![0.0; data.len()];
     // Pieces of a plane short enough that the accumulator stays in the first-level cache.
     let piece = 2048;
-    out.par_chunks_mut(plane).enumerate().for_each(|(k, out)| {
+    each_piece(&mut out, plane, &|first, out| {
+        let k = first / plane;
         for (p, out) in out.chunks_mut(piece).enumerate() {
             let n = out.len();
             weighted_sum(out, kernel, |t| {

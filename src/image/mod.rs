@@ -9,6 +9,7 @@ pub mod gaussian;
 mod grid;
 pub mod morphology;
 pub mod nifti;
+pub(crate) mod pieces;
 pub mod resample;
 pub mod seg_nrrd;
 mod spline;

@@ -1,6 +1,7 @@
 //! Values of a volume on another grid, seen through a transform.
 
 use super::grid::Grid;
+use super::pieces::{each_pair, each_piece};
 use super::spline::{coefficients, value_at};
 use super::volume::{Mask, Volume};
 use crate::geometry::{AffineTransform, Frame, Position};
@@ -129,8 +130,10 @@ pub fn resample_nearest<V: Copy + Send + Sync, S: Frame, T: Frame>(
     let voxel_from_voxel = voxel_from_voxel(&source.grid, target, source_from_target);
     let mut out = Volume::filled(*target, outside);
     let [nx, ny, _] = target.dims;
-    out.data.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, plane)| {
-        for (n, value) in plane.iter_mut().enumerate() {
+    let plane = (nx * ny).max(1);
+    each_piece(&mut out.data, plane, &|start, values| {
+        let k = start / plane;
+        for (n, value) in values.iter_mut().enumerate() {
             let v = on_centre(affine_point(&voxel_from_voxel, [n % nx, n / nx, k].map(|x| x as f64))).map(f64::round);
             // as-casts saturate, and NaN cannot occur behind a finite affine.
             if let Some(found) = source.get(v[0] as isize, v[1] as isize, v[2] as isize) {
@@ -210,18 +213,17 @@ fn fill<S: Frame, T: Frame>(
     let mut inside = Mask::filled(*target, false);
     let last = source.grid.dims.map(|n| n as f64 - 1.0);
     let plane = (nx * ny).max(1);
-    volume.data.par_chunks_mut(plane).zip(inside.data.par_chunks_mut(plane)).enumerate().for_each(
-        |(k, (values, inside))| {
-            for (n, (value, inside)) in values.iter_mut().zip(inside).enumerate() {
-                let v = at([n % nx, n / nx, k]);
-                // Written so that NaN is outside.
-                if (0..3).all(|a| v[a] >= 0.0 && v[a] <= last[a]) {
-                    *inside = true;
-                    *value = value_at(source, v);
-                }
+    each_pair((&mut volume.data, &mut inside.data), plane, &|start, values, inside| {
+        let k = start / plane;
+        for (n, (value, inside)) in values.iter_mut().zip(inside).enumerate() {
+            let v = at([n % nx, n / nx, k]);
+            // Written so that NaN is outside.
+            if (0..3).all(|a| v[a] >= 0.0 && v[a] <= last[a]) {
+                *inside = true;
+                *value = value_at(source, v);
             }
-        },
-    );
+        }
+    });
     Resampled { volume, inside }
 }
 

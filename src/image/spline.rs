@@ -1,8 +1,8 @@
 //! The cubic B-spline through the values of a volume, mirrored at its border: sharp, may overshoot by a few percent at edges.
 
+use super::pieces::each_piece;
 use super::volume::Volume;
 use crate::geometry::Frame;
-use rayon::prelude::*;
 
 /// Weights of the cubic B-spline on the four centres around a point at `t` in 0..1 past the second.
 #[inline]
@@ -56,7 +56,7 @@ pub(super) fn value_at<F: Frame>(coefficients: &Volume<f32, F>, v: [f64; 3]) -> 
 pub(super) fn coefficients<F: Frame>(volume: &Volume<f32, F>) -> Volume<f32, F> {
     let [nx, ny, nz] = volume.grid.dims;
     let mut out = volume.clone();
-    out.data.par_chunks_mut((nx * ny).max(1)).for_each(|plane| {
+    each_piece(&mut out.data, nx * ny, &|_, plane| {
         for row in plane.chunks_exact_mut(nx) {
             prefilter(row, 1);
         }
@@ -65,13 +65,15 @@ pub(super) fn coefficients<F: Frame>(volume: &Volume<f32, F>) -> Volume<f32, F> 
     if nz > 1 {
         // Lines along k: gathered by j into contiguous (k, i) slabs, each filtered by one task.
         let mut slabs = vec![0f32; out.data.len()];
-        slabs.par_chunks_mut(nx * nz).enumerate().for_each(|(j, slab)| {
+        each_piece(&mut slabs, nx * nz, &|first, slab| {
+            let j = first / (nx * nz);
             for (k, row) in slab.chunks_exact_mut(nx).enumerate() {
                 row.copy_from_slice(&out.data[(k * ny + j) * nx..][..nx]);
             }
             prefilter(slab, nx);
         });
-        out.data.par_chunks_mut(nx * ny).enumerate().for_each(|(k, plane)| {
+        each_piece(&mut out.data, nx * ny, &|first, plane| {
+            let k = first / (nx * ny);
             for (j, row) in plane.chunks_exact_mut(nx).enumerate() {
                 row.copy_from_slice(&slabs[(j * nz + k) * nx..][..nx]);
             }

@@ -1,8 +1,8 @@
 //! A scalar, label or mask on a grid.
 
 use super::grid::Grid;
+use super::pieces::each_piece;
 use crate::geometry::{Frame, Position};
-use rayon::prelude::*;
 
 /// Voxel values on a [`Grid`], i fastest in memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +20,6 @@ pub type Mask<F> = Volume<bool, F>;
 
 /// Voxels per task.
 const VOXELS_AT_ONCE: usize = 1 << 14;
-
-/// Fills pieces of `data`, `at_once` values each, on all threads; `values` gets a piece and the place in memory of its first value.
-/// One loop for every caller: woven into rayon's own code it would be compiled anew for every one of them.
-fn fill<T: Send>(data: &mut [T], at_once: usize, values: &(dyn Fn(usize, &mut [T]) + Sync)) {
-    data.par_chunks_mut(at_once).enumerate().for_each(|(n, piece)| values(n * at_once, piece));
-}
 
 impl<T: Copy, F: Frame> Volume<T, F> {
     /// A volume of one value.
@@ -68,7 +62,7 @@ impl<T: Copy, F: Frame> Volume<T, F> {
         T: Sync,
     {
         let mut data = vec![U::default(); self.data.len()];
-        fill(&mut data, VOXELS_AT_ONCE, &|first, values| {
+        each_piece(&mut data, VOXELS_AT_ONCE, &|first, values| {
             values.iter_mut().zip(&self.data[first..]).for_each(|(value, x)| *value = f(*x));
         });
         Volume { grid: self.grid, data }
@@ -80,7 +74,7 @@ impl<T: Copy, F: Frame> Volume<T, F> {
         T: Default + Send,
     {
         let mut data = vec![T::default(); grid.len()];
-        fill(&mut data, VOXELS_AT_ONCE, &|first, values| {
+        each_piece(&mut data, VOXELS_AT_ONCE, &|first, values| {
             values.iter_mut().enumerate().for_each(|(n, value)| *value = f(first + n));
         });
         Self { grid, data }
@@ -94,7 +88,7 @@ impl<T: Copy, F: Frame> Volume<T, F> {
         let [nx, ny, _] = grid.dims.map(|n| n.max(1));
         let mut data = vec![T::default(); grid.len()];
         // By rows: a voxel's place in memory need not be taken apart.
-        fill(&mut data, nx, &|first, values| {
+        each_piece(&mut data, nx, &|first, values| {
             let (j, k) = (first / nx % ny, first / nx / ny);
             values.iter_mut().enumerate().for_each(|(i, value)| *value = f([i, j, k]));
         });

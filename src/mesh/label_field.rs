@@ -60,19 +60,13 @@ impl LabelField {
         let count = labels.len();
         let mut values = vec![0f32; dense.len() * count];
         let mut largest = vec![0u8; dense.len()];
-        values.par_chunks_mut(count * 4096).zip(largest.par_chunks_mut(4096)).enumerate().for_each(
-            |(chunk, (values, largest))| {
-                for (n, (value, best)) in values.chunks_mut(count).zip(largest).enumerate() {
-                    let voxel = chunk * 4096 + n;
-                    value[0] = 1.0;
-                    for k in 1..count {
-                        value[k] = smooth[k - 1][voxel];
-                        value[0] -= value[k];
-                    }
-                    *best = argmax(value);
-                }
-            },
-        );
+        each_voxel(&mut values, &mut largest, &|voxel, value| {
+            value[0] = 1.0;
+            for k in 1..count {
+                value[k] = smooth[k - 1][voxel];
+                value[0] -= value[k];
+            }
+        });
         let mut shift = Matrix4::identity();
         for a in 0..3 {
             shift[(a, 3)] = lo[a] as f64 - PAD as f64;
@@ -92,17 +86,12 @@ impl LabelField {
         let slope = SPLIT_SLOPE_PER_VOXEL / self.spacing_mm.iter().product::<f64>().cbrt();
         let mut values = vec![0f32; self.largest.len() * count];
         let mut largest = vec![0u8; self.largest.len()];
-        let chunks = values.par_chunks_mut(count * 4096).zip(largest.par_chunks_mut(4096));
-        chunks.enumerate().for_each(|(chunk, (values, largest))| {
-            for (n, (value, best)) in values.chunks_mut(count).zip(largest).enumerate() {
-                let voxel = chunk * 4096 + n;
-                value[..old_count].copy_from_slice(&self.values[voxel * old_count..(voxel + 1) * old_count]);
-                let x = slope * self.frame_from_box.transform_point(&self.voxel_mm(voxel).into()).x;
-                for (n, &k) in halves.iter().enumerate() {
-                    value[old_count + n] = value[k] + x.min(0.0) as f32;
-                    value[k] -= x.max(0.0) as f32;
-                }
-                *best = argmax(value);
+        each_voxel(&mut values, &mut largest, &|voxel, value| {
+            value[..old_count].copy_from_slice(&self.values[voxel * old_count..(voxel + 1) * old_count]);
+            let x = slope * self.frame_from_box.transform_point(&self.voxel_mm(voxel).into()).x;
+            for (n, &k) in halves.iter().enumerate() {
+                value[old_count + n] = value[k] + x.min(0.0) as f32;
+                value[k] -= x.max(0.0) as f32;
             }
         });
         let mask = |fields: &mut dyn Iterator<Item = usize>| fields.fold(0u64, |mask, k| mask | 1 << k);
@@ -188,15 +177,8 @@ impl LabelField {
     /// The same fields with a constant added to each: interfaces move towards fields with less.
     pub(crate) fn shifted(&self, by: &[f64]) -> Self {
         let mut shifted = self.clone();
-        let count = self.labels.len();
-        let each = shifted.values.par_chunks_mut(count * 4096).zip(shifted.largest.par_chunks_mut(4096));
-        each.for_each(|(values, largest)| {
-            for (value, best) in values.chunks_mut(count).zip(largest) {
-                for k in 0..count {
-                    value[k] += by[k] as f32;
-                }
-                *best = argmax(value);
-            }
+        each_voxel(&mut shifted.values, &mut shifted.largest, &|_, value| {
+            value.iter_mut().zip(by).for_each(|(value, by)| *value += *by as f32);
         });
         shifted
     }
@@ -273,6 +255,19 @@ fn trilinear_weights(w: [f64; 3]) -> [f64; 8] {
         low[2] * w[2],
         low[3] * w[2],
     ]
+}
+
+/// Renews the fields of every voxel, which lie side by side, and which of them is largest.
+fn each_voxel(values: &mut [f32], largest: &mut [u8], renew: &(dyn Fn(usize, &mut [f32]) + Sync)) {
+    const AT_ONCE: usize = 4096;
+    let count = values.len() / largest.len().max(1);
+    let pieces = values.par_chunks_mut((count * AT_ONCE).max(1)).zip(largest.par_chunks_mut(AT_ONCE)).enumerate();
+    pieces.for_each(|(piece, (values, largest))| {
+        for (n, (value, best)) in values.chunks_mut(count).zip(largest).enumerate() {
+            renew(piece * AT_ONCE + n, value);
+            *best = argmax(value);
+        }
+    });
 }
 
 fn argmax(values: &[f32]) -> u8 {

@@ -2,9 +2,9 @@
 //! Masks on their grids.
 
 use crate::geometry::Native;
+use crate::image::pieces::each_piece;
 use crate::image::{Grid, Mask, Volume};
 use nalgebra::{Matrix4, Point3};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// The image with every axis reduced by the whole factor that brings its spacing nearest to `spacing_mm`; axes that
@@ -46,7 +46,8 @@ fn reduced_along(image: &Volume<f32, Native>, axis: usize, factor: usize) -> Vol
     let mut dims = image.grid.dims;
     dims[axis] = n_out;
     let mut data = vec![0f32; dims.iter().product()];
-    data.par_chunks_mut(dims[0] * dims[1]).enumerate().for_each(|(k, slice)| {
+    each_piece(&mut data, dims[0] * dims[1], &|first, slice| {
+        let k = first / (dims[0] * dims[1]);
         let mut padded = Vec::new();
         for (j, row) in slice.chunks_mut(dims[0]).enumerate() {
             if axis == 0 {

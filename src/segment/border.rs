@@ -9,9 +9,9 @@ use super::label::{GREY_MATTER, WHITE_MATTER};
 use super::mixture::Mixture;
 use super::priors::AtlasPriors;
 use crate::geometry::{Frame, Mni, RigidTransform};
+use crate::image::pieces::each_piece;
 use crate::image::{LabelMap, Volume};
 use nalgebra::{Matrix4, Point3};
-use rayon::prelude::*;
 
 /// A voxel turns only where it lies beyond the border by this many standard deviations: less may be noise, and the label carried
 /// back knows the neighbours.
@@ -39,7 +39,8 @@ pub(super) fn with_the_scans_border<F: Frame>(
     let [nx, ny, _] = grid.dims;
     let stride = [1, nx, nx * ny];
     let mut out = labels.clone();
-    out.data.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, plane)| {
+    each_piece(&mut out.data, nx * ny, &|first, plane| {
+        let k = first / (nx * ny);
         for (o, label) in plane.iter_mut().enumerate() {
             let other = match *label {
                 GREY_MATTER => WHITE_MATTER,

@@ -1,9 +1,9 @@
 //! Labels and masks from one grid to another without stairs.
 
 use crate::geometry::{Frame, RigidTransform};
+use crate::image::pieces::each_piece;
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use nalgebra::{Matrix4, Point3};
-use rayon::prelude::*;
 
 /// Highest label that is carried over.
 const LABELS: usize = 8;
@@ -59,8 +59,10 @@ fn carried<V: Copy + Default + PartialEq + Send + Sync, S: Frame, T: Frame>(
     // Further than a voxel from everything that is labelled there is nothing, as `out` holds it.
     let Some(labelled) = source.map(|value| value != V::default()).bounding_box() else { return };
     let (first, end) = (labelled.first.map(|v| v as f64 - 1.0), labelled.end.map(|v| v as f64));
-    out.data.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, plane)| {
-        for (n, value) in plane.iter_mut().enumerate() {
+    let plane = (nx * ny).max(1);
+    each_piece(&mut out.data, plane, &|start, values| {
+        let k = start / plane;
+        for (n, value) in values.iter_mut().enumerate() {
             let p = m.transform_point(&Point3::new((n % nx) as f64, (n / nx) as f64, k as f64));
             let c = [p.x, p.y, p.z];
             // Half a voxel beyond the outermost centres still belongs to the outermost voxels.

@@ -1,5 +1,6 @@
 //! The smooth continuation of values through a region where nothing is known.
 
+use crate::image::pieces::each_piece;
 use rayon::prelude::*;
 
 /// What is known at a voxel.
@@ -154,10 +155,11 @@ impl Lattice {
             return;
         }
         colour.voxels.par_iter().zip(&colour.neighbours).map(renew).collect_into_vec(renewed);
-        values.par_chunks_mut(FEW).enumerate().for_each(|(chunk, values)| {
+        each_piece(values, FEW, &|first, values| {
+            let chunk = first / FEW;
             let those = colour.begins[chunk]..colour.begins[chunk + 1];
             for (&n, value) in colour.voxels[those.clone()].iter().zip(&renewed[those]) {
-                values[n as usize - chunk * FEW] = *value;
+                values[n as usize - first] = *value;
             }
         });
     }
@@ -172,7 +174,8 @@ fn halved<const N: usize>(
 ) -> (Vec<Place>, Vec<[f32; N]>) {
     let mut sums = vec![([0f32; N], 0u32); coarse.iter().product()];
     let plane = dims[0] * dims[1];
-    sums.par_chunks_mut(coarse[0] * coarse[1]).enumerate().for_each(|(k, sums)| {
+    each_piece(&mut sums, coarse[0] * coarse[1], &|first, sums| {
+        let k = first / (coarse[0] * coarse[1]);
         for n in 2 * k * plane..place.len().min((2 * k + 2) * plane) {
             if place[n] == Place::Known {
                 let (sum, count) = &mut sums[n % dims[0] / 2 + coarse[0] * (n / dims[0] % dims[1] / 2)];
@@ -195,7 +198,8 @@ fn fill<const N: usize>(
     values: &mut [[f32; N]],
 ) {
     let [nx, ny, _] = dims;
-    values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, plane)| {
+    each_piece(values, nx * ny, &|first, plane| {
+        let k = first / (nx * ny);
         for (n, value) in plane.iter_mut().enumerate().filter(|(n, _)| place[k * nx * ny + n] == Place::Free) {
             let mut low = [0; 3];
             let mut part = [0f32; 3];

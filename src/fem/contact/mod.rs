@@ -215,6 +215,11 @@ impl Supports {
         }
     }
 
+    /// `f` of every node before a wall, in order; one loop for every caller (see `reduce`).
+    fn in_order<T: Send>(&self, f: &(dyn Fn(&Standing) -> T + Sync)) -> Vec<T> {
+        self.standing.par_iter().with_min_len(256).map(f).collect()
+    }
+
     /// `f` of every node before a wall, so many times softer than it is, with its gap, in order.
     fn each<T: Send>(
         &self,
@@ -223,8 +228,7 @@ impl Supports {
         softer: f64,
         f: impl Fn(&Standing, &Potential, Gap) -> T + Sync,
     ) -> Vec<T> {
-        let one = |s: &Standing| f(s, &self.walls[s.wall as usize].potential.softer(softer), self.gap(s, u, nodes_m));
-        self.standing.par_iter().with_min_len(256).map(one).collect()
+        self.in_order(&|s| f(s, &self.walls[s.wall as usize].potential.softer(softer), self.gap(s, u, nodes_m)))
     }
 
     /// Brings nodes that are through their wall's soft layer back to its middle, along the wall's normal. A state that was foretold
@@ -240,7 +244,7 @@ impl Supports {
             let square = way.norm_squared();
             (square > 1e-6).then(|| way * (-gap / square))
         };
-        let back: Vec<Option<Vector3<f64>>> = self.standing.par_iter().with_min_len(256).map(one).collect();
+        let back: Vec<Option<Vector3<f64>>> = self.in_order(&one);
         for (s, back) in self.standing.iter().zip(back) {
             let back = back.unwrap_or_default();
             (0..3).for_each(|i| u[s.node as usize][i] += back[i]);

@@ -134,7 +134,8 @@ impl NodalGradient {
         laws[usize::from(self.groups[group].material)].as_ref()
     }
 
-    fn of_groups<T: Send>(&self, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    /// `f` of every group, in order; one loop for every caller (see `reduce`).
+    fn of_groups<T: Send>(&self, f: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
         (0..self.groups.len()).into_par_iter().with_min_len(256).map(f).collect()
     }
 
@@ -159,7 +160,7 @@ impl NodalGradient {
 
     /// Mean nodal stress of every element (row-major, Pa): what it adds to the element's own.
     pub(in super::super) fn stresses(&self, u: &[[f64; 3]], laws: &[Box<dyn Hyperelastic>]) -> Vec<M3> {
-        let of_group = self.of_groups(|g| -> [f64; 9] {
+        let of_group = self.of_groups(&|g| -> [f64; 9] {
             let stress = self.law(g, laws).first_piola_kirchhoff_pa(&self.displacement_gradient(g, u));
             std::array::from_fn(|i| stress[(i / 3, i % 3)])
         });
@@ -175,7 +176,7 @@ impl NodalGradient {
         held: Option<Arc<Vec<[bool; 3]>>>,
         project: bool,
     ) -> NodalTangent {
-        let moduli = self.of_groups(|g| -> [f64; 81] {
+        let moduli = self.of_groups(&|g| -> [f64; 81] {
             let mut tangent = self.law(g, laws).tangent_pa(&self.displacement_gradient(g, u));
             if project {
                 tangent = projected(&tangent);
@@ -187,7 +188,7 @@ impl NodalGradient {
 
     /// Nodal energy density (Pa) of every element: the mean of its corners'.
     pub(in super::super) fn energy_density(&self, u: &[[f64; 3]], laws: &[Box<dyn Hyperelastic>]) -> Vec<f64> {
-        let of_group = self.of_groups(|g| [self.law(g, laws).energy_density_pa(&self.displacement_gradient(g, u))]);
+        let of_group = self.of_groups(&|g| [self.law(g, laws).energy_density_pa(&self.displacement_gradient(g, u))]);
         self.corner_mean(&of_group).into_iter().map(|[v]| v).collect()
     }
 }

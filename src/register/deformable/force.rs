@@ -7,6 +7,7 @@
 use super::velocity::VectorField;
 use crate::geometry::Native;
 use crate::image::Grid;
+use crate::image::pieces::each_piece;
 use rayon::prelude::*;
 
 /// Half width of the window in voxels.
@@ -19,7 +20,8 @@ fn window_sums(data: Vec<f32>, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
     let plane = nx * ny;
     let mut rows = vec![0f32; data.len()];
-    rows.par_chunks_mut(plane).zip(data.par_chunks(plane)).for_each(|(out, data)| {
+    each_piece(&mut rows, plane, &|first, out| {
+        let data = &data[first..];
         let mut padded = vec![0f32; nx + 2 * REACH];
         for (out, row) in out.chunks_mut(nx).zip(data.chunks(nx)) {
             padded[REACH..REACH + nx].copy_from_slice(row);
@@ -29,7 +31,8 @@ fn window_sums(data: Vec<f32>, dims: [usize; 3]) -> Vec<f32> {
         }
     });
     let mut columns = data;
-    columns.par_chunks_mut(plane).zip(rows.par_chunks(plane)).for_each(|(out, rows)| {
+    each_piece(&mut columns, plane, &|first, out| {
+        let rows = &rows[first..];
         for (j, out) in out.chunks_mut(nx).enumerate() {
             out.fill(0.0);
             for t in j.saturating_sub(REACH)..=(j + REACH).min(ny - 1) {
@@ -38,7 +41,8 @@ fn window_sums(data: Vec<f32>, dims: [usize; 3]) -> Vec<f32> {
         }
     });
     let mut out = rows;
-    out.par_chunks_mut(plane).enumerate().for_each(|(k, out)| {
+    each_piece(&mut out, plane, &|first, out| {
+        let k = first / plane;
         out.fill(0.0);
         for t in k.saturating_sub(REACH)..=(k + REACH).min(nz - 1) {
             out.iter_mut().zip(&columns[t * plane..]).for_each(|(o, x)| *o += x);
