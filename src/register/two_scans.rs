@@ -12,7 +12,7 @@ use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
 
 /// Finds the rigid motion that takes one scan of a head onto another one, whatever the coils: [`register_rigid`] over the whole
-/// head, then its finest step once more without the scans' gains. Quality and warnings are those of the scans as they come.
+/// head, then [`register_two_scans_near`] there. Quality and warnings are those of the scans as they come.
 ///
 /// # Errors
 /// As [`register_rigid`].
@@ -22,11 +22,24 @@ pub fn register_two_scans<M: Frame, F: Frame>(
     settings: &RigidSettings,
 ) -> Result<RigidFit<M, F>, RegisterError> {
     let found = register_rigid(moving, fixed, RigidMasks::default(), settings)?;
-    let start: RigidTransform<Native, Native> = found.fixed_from_moving.relabelled();
+    let fixed_from_moving = register_two_scans_near(moving, fixed, &found.fixed_from_moving, settings)?;
+    Ok(RigidFit { fixed_from_moving, ..found })
+}
+
+/// The rigid motion that takes one scan of a head onto another one near one that is known, without the scans' gains.
+///
+/// # Errors
+/// As [`register_rigid`].
+pub fn register_two_scans_near<M: Frame, F: Frame>(
+    moving: &Volume<f32, M>,
+    fixed: &Volume<f32, F>,
+    near: &RigidTransform<M, F>,
+    settings: &RigidSettings,
+) -> Result<RigidTransform<M, F>, RegisterError> {
+    let start: RigidTransform<Native, Native> = near.relabelled();
     let (moving, fixed): (Volume<f32, Native>, Volume<f32, Native>) =
         (moving.clone().relabelled(), fixed.clone().relabelled());
     let (moving, fixed) = rayon::join(|| without_gain(&moving), || without_gain(&fixed));
     let moving = on_the_gain_of(&fixed, &moving, &start).unwrap_or(moving);
-    let pose = refine_rigid(&moving, &fixed, &start, settings)?;
-    Ok(RigidFit { fixed_from_moving: pose.relabelled(), ..found })
+    Ok(refine_rigid(&moving, &fixed, &start, settings)?.relabelled())
 }

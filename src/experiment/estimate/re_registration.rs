@@ -12,7 +12,7 @@ use crate::image::resample::{Interpolation, resample};
 use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
-use crate::register::{RegisterError, RigidSettings, register_two_scans};
+use crate::register::{RegisterError, RigidSettings, register_two_scans_near};
 use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of};
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -114,9 +114,10 @@ impl ReRegistration<'_> {
         let back = on_grid(mesh.tets(), &moved, &back, like.grid());
         let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
         let moved = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
-        // Rigid registration follows a part of the shift, and the patient's scans went through it too.
-        let rigid = register_two_scans(&moved, self.pre, self.rigid)?;
-        let moved_from_pre = rigid.fixed_from_moving.inverse().to_affine();
+        // Rigid registration follows a part of the shift, and the patient's scans went through it too; its search for where to begin
+        // would find what is known here.
+        let rigid = register_two_scans_near(&moved, self.pre, &RigidTransform::identity(), self.rigid)?;
+        let moved_from_pre = rigid.inverse().to_affine();
         let post = resample(&moved, &self.pre.grid, &moved_from_pre, Interpolation::CubicBSpline, 0.0).volume;
         // Their intensities were brought onto one scale before the shift was known, too: where tissue has given way to fluid their
         // ratio is no gain.
@@ -128,7 +129,7 @@ impl ReRegistration<'_> {
             post_known: self.post_known,
             cavity: self.cavity,
         };
-        Ok((fit_sag(&scans, self.settings)?.subject_from_atlas, rigid.fixed_from_moving))
+        Ok((fit_sag(&scans, self.settings)?.subject_from_atlas, rigid))
     }
 }
 

@@ -59,8 +59,7 @@ impl SeenShift {
             post_known,
             seen: anatomy.sag,
             cavity: anatomy.cavity,
-            // The state is known: it is no mirror image.
-            rigid: RigidSettings { try_mirror: false, ..settings.register.clone() },
+            rigid: settings.register.clone(),
             settings: settings.anat.sag.clone(),
         })
     }
