@@ -57,11 +57,14 @@ pub(super) fn by_row_pairs<A: Send, B: Send, const N: usize>(
     pairs(rows_of_task(a.len()), a, b, &f)
 }
 
+/// What is done with a task's rows of two slices, given their first row.
+type PairOfRows<'a, A, B, const N: usize> = dyn Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync + 'a;
+
 fn pairs<A: Send, B: Send, const N: usize>(
     rows: usize,
     a: &mut [A],
     b: &mut [B],
-    f: &(dyn Fn(usize, &mut [A], &mut [B]) -> [f64; N] + Sync),
+    f: &PairOfRows<'_, A, B, N>,
 ) -> [f64; N] {
     let add = |sum: [f64; N], part: [f64; N]| std::array::from_fn(|i| sum[i] + part[i]);
     if a.len() <= rows || rayon::current_num_threads() == 1 {

@@ -10,12 +10,11 @@ pub(crate) fn each_piece<T: Send>(data: &mut [T], at_once: usize, work: &(dyn Fn
     data.par_chunks_mut(at_once).enumerate().for_each(|(n, piece)| work(n * at_once, piece));
 }
 
+/// What is done with pieces of two slices, given the place of their first values.
+type OnPair<'a, A, B> = dyn Fn(usize, &mut [A], &mut [B]) + Sync + 'a;
+
 /// The same on pieces of two slices of one length.
-pub(crate) fn each_pair<A: Send, B: Send>(
-    (a, b): (&mut [A], &mut [B]),
-    at_once: usize,
-    work: &(dyn Fn(usize, &mut [A], &mut [B]) + Sync),
-) {
+pub(crate) fn each_pair<A: Send, B: Send>((a, b): (&mut [A], &mut [B]), at_once: usize, work: &OnPair<'_, A, B>) {
     let at_once = at_once.max(1);
     let pieces = a.par_chunks_mut(at_once).zip(b.par_chunks_mut(at_once)).enumerate();
     pieces.for_each(|(n, (a, b))| work(n * at_once, a, b));
