@@ -12,7 +12,7 @@ use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
 
 /// Finds the rigid motion that takes one scan of a head onto another one, whatever the coils: [`register_rigid`] over the whole
-/// head, then [`register_two_scans_near`] there. Quality and warnings are those of the scans as they come.
+/// head, then [`register_two_scans_near`] from there. Quality and warnings are those of the scans as they come.
 ///
 /// # Errors
 /// As [`register_rigid`].
@@ -26,7 +26,8 @@ pub fn register_two_scans<M: Frame, F: Frame>(
     Ok(RigidFit { fixed_from_moving, ..found })
 }
 
-/// The rigid motion that takes one scan of a head onto another one near one that is known, without the scans' gains.
+/// The rigid motion that takes one scan of a head onto another one, near one that is known: found at the finest step of the settings
+/// alone, without the scans' gains.
 ///
 /// # Errors
 /// As [`register_rigid`].
