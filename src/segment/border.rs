@@ -20,7 +20,7 @@ const BEYOND: f64 = 0.5;
 const NUCLEUS: f32 = 0.25;
 
 /// Grey or white matter by the scan's intensity wherever a voxel of one has a face in common with a voxel of the other. The
-/// deep nuclei, told by place alone, stay; so does everything where the scan's voxels are those of the working grid.
+/// deep nuclei, told by place alone, stay, and the cerebellum's folia; so does everything where the scan's voxels are those of the working grid.
 pub(super) fn with_the_scans_border<F: Frame>(
     labels: LabelMap<F>,
     t1: &Volume<f32, F>,
@@ -61,7 +61,8 @@ pub(super) fn with_the_scans_border<F: Frame>(
                 continue;
             }
             let at = at.map(|x| x as usize);
-            if priors.deep_grey.at(at[0], at[1], at[2]) > NUCLEUS {
+            let place = |map: &Volume<f32, Mni>| map.at(at[0], at[1], at[2]);
+            if place(&priors.deep_grey) > NUCLEUS || place(&priors.cerebellum) > 0.5 {
                 continue;
             }
             let value = f64::from(t1.data[n]) * (-model.bias.at(at)).exp();
@@ -106,8 +107,9 @@ mod tests {
             brain_mm: nothing.clone(),
             tissue: [nothing.clone(), nothing.clone(), nothing.clone()],
             ventricle_mm: nothing.clone(),
-            cistern_mm: nothing,
+            cistern_mm: nothing.clone(),
             deep_grey: Volume::from_fn(*grid, deep),
+            cerebellum: nothing.clone(),
         }
     }
 

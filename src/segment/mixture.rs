@@ -338,7 +338,8 @@ mod tests {
             tissue: shares.each_ref().map(|s| gaussian_along_axes(s, [3.0, 0.0, 0.0])),
             ventricle_mm: far.clone(),
             deep_grey: far.clone(),
-            cistern_mm: far,
+            cistern_mm: far.clone(),
+            cerebellum: far,
         };
         let settings = MixtureSettings {
             iterations: 30,

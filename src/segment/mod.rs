@@ -7,6 +7,7 @@ mod bias;
 mod border;
 mod brain;
 mod carried;
+mod cerebellum;
 mod coil;
 mod import;
 mod labelled;

@@ -199,7 +199,8 @@ mod tests {
             tissue: [nothing.clone(), nothing.clone(), nothing.clone()],
             ventricle_mm: nothing.clone(),
             cistern_mm: nothing.clone(),
-            deep_grey: nothing,
+            deep_grey: nothing.clone(),
+            cerebellum: nothing,
         };
         (inside, priors)
     }

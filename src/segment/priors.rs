@@ -1,6 +1,7 @@
 //! What the template expects at each voxel of a patient's image.
 
 use super::atlas;
+use super::cerebellum::cerebellum;
 use super::label;
 use crate::geometry::{Mni, Position};
 use crate::image::distance::signed_distance_mm;
@@ -29,6 +30,8 @@ pub struct AtlasPriors {
     pub cistern_mm: Volume<f32, Mni>,
     /// Probability of thalamus, putamen and pallidum, 0 to 1.
     pub deep_grey: Volume<f32, Mni>,
+    /// Probability of the cerebellum, 0 to 1.
+    pub cerebellum: Volume<f32, Mni>,
 }
 
 /// Maps of the template on its own grid, side by side: one reading of eight corners then brings them all. Whole numbers of
@@ -38,7 +41,7 @@ const MAPS: usize = 8;
 const TISSUES: usize = 3;
 /// the next is the distance to the brain's surface.
 const BRAIN_MM: usize = TISSUES;
-/// Units of probability and of mm; the last map is there for the sake of whole vectors.
+/// Units of probability and of mm.
 const UNITS: [f32; MAPS] = {
     let (share, mm) = (1.0 / 32_000.0, 1.0 / 512.0);
     [share, share, share, mm, mm, mm, share, share]
@@ -57,13 +60,14 @@ fn template_maps() -> &'static Volume<[i16; MAPS], Mni> {
         let brain_mm = signed_distance_mm(&brain);
         let [ventricle_mm, cistern_mm] =
             [label::VENTRICLE, label::CSF].map(|l| signed_distance_mm(&atlas.labels.map(|v| v == l)));
-        let deep_grey = gaussian(&atlas::deep_grey().map(|inside| f32::from(u8::from(inside))), 1.0);
+        let [deep_grey, cerebellum] = [atlas::deep_grey(), cerebellum()]
+            .map(|region| gaussian(&region.map(|inside| f32::from(u8::from(inside))), 1.0));
         Volume::from_fn(atlas.grid(), |n| {
             let csf = if atlas.t1.data[n] > 0 { (1.0 - tissue(n)).max(0.0) } else { 0.0 };
             let [grey, white] = [&atlas.grey, &atlas.white].map(|map| f32::from(map.data[n]) / 255.0);
             let [brain, ventricle, cistern] =
                 [&brain_mm, &ventricle_mm, &cistern_mm].map(|mm| mm.data[n].clamp(-FAR_MM, FAR_MM));
-            let values = [csf, grey, white, brain, ventricle, cistern, deep_grey.data[n], 0.0];
+            let values = [csf, grey, white, brain, ventricle, cistern, deep_grey.data[n], cerebellum.data[n]];
             std::array::from_fn(|map| (values[map] / UNITS[map]).round() as i16)
         })
     })
@@ -107,8 +111,8 @@ impl AtlasPriors {
                 *values = gaussian(values, misfit_mm);
             }
         }
-        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey, _] = maps;
-        Self { brain_mm, tissue: [csf, grey, white], ventricle_mm, cistern_mm, deep_grey }
+        let [csf, grey, white, brain_mm, ventricle_mm, cistern_mm, deep_grey, cerebellum] = maps;
+        Self { brain_mm, tissue: [csf, grey, white], ventricle_mm, cistern_mm, deep_grey, cerebellum }
     }
 
     /// [`Self::through`] on the part of the grid where brain may be: nothing is asked of the template beyond it.
@@ -127,7 +131,8 @@ impl AtlasPriors {
     #[must_use]
     pub fn rigid(grid: &Grid<Mni>) -> Self {
         let priors = Self::through(grid, |p| p, 3.0);
-        // That is more than tells a nucleus from the capsule beside it: place alone says nothing.
-        Self { deep_grey: Volume::filled(*grid, 0.0), ..priors }
+        // That is more than tells a nucleus from the capsule beside it, or a folium from a gyrus: place alone says nothing.
+        let nowhere = Volume::filled(*grid, 0.0);
+        Self { deep_grey: nowhere.clone(), cerebellum: nowhere, ..priors }
     }
 }

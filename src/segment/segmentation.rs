@@ -2,6 +2,7 @@
 
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
+use super::cerebellum::with_whole_folia;
 use super::coil::{evened, strong_gain};
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
@@ -353,6 +354,7 @@ pub(super) fn labelled<F: Frame>(
         }
     }
     with_white_walls(&mut labels_mni, &ventricle, &priors.deep_grey);
+    with_whole_folia(&mut labels_mni, priors);
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let volumes = TissueVolumes {
         brain_cc: found_cc,

@@ -56,6 +56,8 @@ pub(super) fn ventricles(
 ) -> Mask<Mni> {
     const VENTRICLE: u8 = 1;
     const CISTERN: u8 = 2;
+    /// A temporal horn is nowhere deep, in the template and in most heads: there it is enough that no cistern is near.
+    const CLEAR_MM: f32 = 2.0;
     let (reach, clearance) = (settings.reach_mm as f32, settings.cistern_clearance_mm as f32);
     let deep = erode(csf, 1.0);
     let csf = &at_each(&priors.ventricle_mm, |n| csf.data[n] || plexus.data[n]);
@@ -63,7 +65,9 @@ pub(super) fn ventricles(
         let from_ventricle = priors.ventricle_mm.data[n];
         if !csf.data[n] {
             0
-        } else if from_ventricle < -0.5 && (deep.data[n] || from_ventricle < -1.5) {
+        } else if from_ventricle < -0.5
+            && (deep.data[n] || from_ventricle < -1.5 || priors.cistern_mm.data[n] > CLEAR_MM)
+        {
             VENTRICLE
         } else if from_ventricle > clearance && priors.cistern_mm.data[n] < 0.0 || from_ventricle > 2.0 * reach {
             CISTERN
