@@ -85,6 +85,10 @@ impl Progress for Ear {
         self.tell(Told::Log(WARNING, format!("{file}: {what}")));
     }
 
+    fn taken_for(&mut self, what: &str) {
+        self.tell(Told::Log(INFO, what.to_owned()));
+    }
+
     fn noted(&mut self, what: &str) {
         self.tell(Told::Log(INFO, what.to_owned()));
     }

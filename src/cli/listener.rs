@@ -3,6 +3,9 @@
 use crate::workflow::{Progress, StageEnded};
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// Log lines about what a file was taken for: told at every level but the quietest.
+pub const TAKEN_FOR: &str = "hgm::taken_for";
+
 /// Bars and log lines on stderr.
 pub struct Listener {
     shown: bool,
@@ -49,6 +52,10 @@ impl Progress for Listener {
 
     fn odd(&mut self, file: &str, what: &str) {
         tracing::warn!("{file}: {what}");
+    }
+
+    fn taken_for(&mut self, what: &str) {
+        tracing::info!(target: TAKEN_FOR, "{what}");
     }
 
     fn noted(&mut self, what: &str) {

@@ -72,6 +72,9 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Registration { .. } => {
             "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
         }
+        WorkflowError::Rigid { .. } | WorkflowError::Head { .. } => {
+            "`hgm prep` takes a pose (--pose), a label map (--dseg) and masks of your own"
+        }
         WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
         WorkflowError::Labels(_) => "see --labels",
         WorkflowError::Pair(_) => {

@@ -3,7 +3,7 @@
 use super::call::Caller;
 use super::failure::Failure;
 use super::flags::word;
-use super::listener::Listener;
+use super::listener::{Listener, TAKEN_FOR};
 use super::output::print_line;
 use crate::artefact::no_more_writes;
 use crate::image::nifti::Orientation;
@@ -86,8 +86,11 @@ impl Session {
             (false, 1) => "info",
             (false, _) => "debug",
         };
+        // What a file was taken for is said unless nothing is to be.
+        let taken_for = if options.quiet { "error" } else { "info" };
+        let filter = format!("hgm={level},{TAKEN_FOR}={taken_for}");
         let subscriber = tracing_subscriber::fmt()
-            .with_env_filter(tracing_subscriber::EnvFilter::new(format!("hgm={level}")))
+            .with_env_filter(tracing_subscriber::EnvFilter::new(filter))
             .with_writer(std::io::stderr)
             .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
             .without_time()

@@ -22,7 +22,7 @@ const GAP: usize = 6;
 const INK: Rgb = [201, 209, 216];
 
 /// Grey slices of one scan, left to right.
-type Row = Vec<(Tile, Vec<u8>)>;
+pub type Row = Vec<(Tile, Vec<u8>)>;
 
 /// Slices of a scan that has a pose, as the template lies; the same places for every scan.
 pub fn posed<F: Frame>(scan: &Volume<f32, F>, mni_from_scan: &RigidTransform<F, Mni>) -> Row {

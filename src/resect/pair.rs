@@ -12,7 +12,7 @@ use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
 use crate::segment::native::labels_on;
 use crate::segment::{
-    HeadError, PosedScan, Scale, SegmentOverrides, SegmentSettings, Segmentation, carried_priors,
+    HeadError, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, carried_priors,
     fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors,
 };
 use schemars::JsonSchema;
@@ -204,6 +204,7 @@ pub fn take_pair_apart(
     };
     let post_t1 = if scale.turned_at.is_some() { post_t1.map(|x| scale.of(x)) } else { post_t1 };
     let computed = by_hand.is_none();
+    let unchanged = given.cavity.as_ref().and_then(|cavity| unchanged_percent(cavity, &before, &post_t1, post_known));
     let mut finding = if let Some(finding) = by_hand {
         finding
     } else {
@@ -257,7 +258,7 @@ pub fn take_pair_apart(
     let post_priors = carried_priors(|p| template_from_patient.apply(sag.atlas_from_subject.apply(p)));
     let [fluid, grey, white] = before.tissue_means;
     let as_in_t1 = scale.turned_at.is_none() && fluid < grey && grey < white;
-    let after = if given.labels.is_some() && !as_in_t1 {
+    let mut after = if given.labels.is_some() && !as_in_t1 {
         // Without T1's contrast nothing is known of the tissue after the operation but where it went.
         let moved = labels_through(&before.labels_mni, &sag);
         segment_by_labels(post, &labels_on(&moved, &post.t1.grid, &post.mni_from_t1)).0
@@ -265,6 +266,7 @@ pub fn take_pair_apart(
         segment_with_priors(post, &post_priors, &SegmentOverrides::default(), &settings.segment)
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
+    after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);
@@ -304,6 +306,28 @@ pub fn take_head_apart(
     Ok((before, fit, Scale { turned_at: None }))
 }
 
+/// How much of a cavity drawn by hand shows after the operation what it showed before, percent; `None` where that is little
+/// enough for a cavity.
+fn unchanged_percent(
+    cavity: &Mask<Mni>,
+    before: &Segmentation<Pre>,
+    post: &Volume<f32, Mni>,
+    known: &Mask<Mni>,
+) -> Option<f64> {
+    /// A cavity full of blood is as bright as tissue, but has not its folds.
+    const MOST_PERCENT: f64 = 50.0;
+    let [_, grey, white] = before.tissue_means;
+    let alike = 0.5 * (white - grey).abs();
+    let tissue = |n: usize| cavity.data[n] && known.data[n] && label::is_tissue(before.labels_mni.data[n]);
+    let (mut same, mut all) = (0usize, 0usize);
+    for n in (0..cavity.data.len()).filter(|&n| tissue(n)) {
+        all += 1;
+        same += usize::from(f64::from(post.data[n] - before.t1_mni.data[n]).abs() < alike);
+    }
+    let percent = 100.0 * same as f64 / all.max(1) as f64;
+    (percent > MOST_PERCENT).then_some(percent)
+}
+
 /// What lies further from the cavity than this has no part in it, mm: more than any brain sags, and more than the windows
 /// of all filters.
 const NEAR_MM: f64 = 25.0;
@@ -332,4 +356,43 @@ fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>)
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {
     labels.map(label::is_tissue)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+    use crate::segment::TissueVolumes;
+
+    #[test]
+    fn a_cavity_drawn_over_tissue_that_is_still_there_is_told() {
+        let grid = Grid::<Mni>::axis_aligned([24; 3], [1.0; 3], [0.0; 3]);
+        let folds = Volume::from_fn(grid, |n| if (n / 3) % 2 == 0 { 100.0 } else { 160.0 });
+        let labels = folds.map(|x| if x > 130.0 { label::WHITE_MATTER } else { label::GREY_MATTER });
+        let brain = labels.map(|_| true);
+        let before = Segmentation::<Pre> {
+            brain: brain.relabelled(),
+            labels: labels.relabelled(),
+            t1_mni: folds.clone(),
+            known_mni: brain.clone(),
+            brain_mni: brain.clone(),
+            labels_mni: labels,
+            tissue_means: [30.0, 100.0, 160.0],
+            csf_grey_border: 65.0,
+            volumes: TissueVolumes {
+                brain_cc: 1.0,
+                csf_cc: 0.0,
+                grey_matter_cc: 0.5,
+                white_matter_cc: 0.5,
+                ventricle_cc: 0.0,
+            },
+            warnings: Vec::new(),
+        };
+        let cavity = Mask::from_fn(grid, |n| grid.voxel(n).iter().all(|v| (6..18).contains(v)));
+        let shown = |inside: f32| Volume::from_fn(grid, |n| if cavity.data[n] { inside } else { folds.data[n] });
+        let percent = |post: &Volume<f32, Mni>| unchanged_percent(&cavity, &before, post, &brain);
+        assert!(percent(&folds).is_some_and(|p| p > 99.0));
+        // Fluid, and blood between the two tissues.
+        assert_eq!((percent(&shown(30.0)), percent(&shown(131.0))), (None, None));
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::anatomy::{LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, label, recognise};
 use crate::geometry::Frame;
+use crate::image::distance::distance_mm;
 use crate::image::{LabelMap, Volume};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -144,10 +145,30 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
     if ventricle > 1.0 && ventricle_open > 0.35 {
         return Some("its ventricles lie at the surface of the brain".to_owned());
     }
+    if ventricle > 1.0 && cc(label::CSF) > OUTER_CSF_CC && deeper(labels, label::CSF, label::VENTRICLE) {
+        return Some("its fluid outside the ventricles lies deeper than its ventricles do".to_owned());
+    }
     if white_open > grey_open {
         return Some("its white matter lies at the surface more than its grey matter does".to_owned());
     }
     None
+}
+
+/// Fluid of this much is not the fourth ventricle alone, cc: sulci and cisterns are drawn.
+const OUTER_CSF_CC: f64 = 30.0;
+
+/// Whether one label lies deeper in the head than another, by the medians of their distances to the outside.
+fn deeper<F: Frame>(labels: &LabelMap<F>, one: u8, other: u8) -> bool {
+    let outside = labels.map(|l| l == label::BACKGROUND);
+    let Some(around) = outside.map(|x| !x).bounding_box() else { return false };
+    let around = around.grown(&labels.grid, 2.0);
+    let (labels, depth) = (labels.cropped(&around), distance_mm(&outside.cropped(&around)));
+    let median = |l: u8| {
+        let mut own: Vec<f32> = (0..depth.data.len()).filter(|&n| labels.data[n] == l).map(|n| depth.data[n]).collect();
+        let middle = own.len() / 2;
+        if own.is_empty() { 0.0 } else { *own.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    };
+    median(one) > median(other)
 }
 
 /// The share of a label's faces to other labels that look at the background or at `also`.

@@ -1,7 +1,7 @@
 //! A scan of any contrast taken apart by a label map that somebody else made.
 
 use super::native::labels_on;
-use super::{PosedScan, Segmentation, TissueVolumes, atlas};
+use super::{PosedScan, SegmentWarning, Segmentation, TissueVolumes, atlas};
 use crate::anatomy::label;
 use crate::geometry::{Frame, Mni, RigidTransform};
 use crate::image::components::fill_holes;
@@ -81,8 +81,12 @@ pub fn segment_by_labels<F: Frame>(scan: &PosedScan<'_, F>, given: &LabelMap<F>)
             ventricle_cc: volume(label::VENTRICLE),
         },
         brain_mni: brain,
+        warnings: if labels_mni.data.contains(&label::VENTRICLE) {
+            Vec::new()
+        } else {
+            vec![SegmentWarning::NoVentricle]
+        },
         labels_mni,
-        warnings: Vec::new(),
     };
     (segmentation, scale)
 }

@@ -1,5 +1,6 @@
 //! T1 volume to label map: grey, white, ventricle, other CSF; brain mask.
 
+mod agreement;
 mod appearance;
 pub mod atlas;
 mod atlas_labels;
@@ -22,6 +23,7 @@ mod sulci;
 mod ventricle;
 
 pub use crate::anatomy::label;
+pub use agreement::{Disagreement, disagreement};
 pub use bias::LogBias;
 pub use brain::BrainSettings;
 pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};

@@ -170,6 +170,15 @@ pub enum SegmentWarning {
         /// Share of that layer there, in percent.
         percent: f64,
     },
+    /// A cavity drawn by hand holds tissue.
+    #[error(
+        "{percent:.0} % of the tissue under the cavity mask looks as it did before the operation: is the mask of this scan, and on \
+         the right side?"
+    )]
+    UnchangedCavity {
+        /// Share of that tissue, in percent.
+        percent: f64,
+    },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
     NoVentricle,

@@ -10,6 +10,7 @@ use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions, encode_u8};
 use crate::image::{Grid, LabelMap, Mask, Volume};
 use crate::register::transform_text::rigid_from_text;
+use crate::segment::disagreement;
 use crate::segment::native::mask_on;
 use std::path::{Path, PathBuf};
 
@@ -100,8 +101,8 @@ impl Scans {
             return Err(InputError::SameFile { pre: pre.clone(), post: post.clone() }.into());
         }
         let (before, after) = rayon::join(
-            || nifti::decode(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), options),
-            || nifti::decode(&post_bytes, &format!("post-operative scan {}", shown(post)), options),
+            || nifti::decode_scan(&pre_bytes, &format!("pre-operative scan {}", shown(pre)), options),
+            || nifti::decode_scan(&post_bytes, &format!("post-operative scan {}", shown(post)), options),
         );
         let (before, after) = (before?, after?);
         if before.volume == after.volume {
@@ -192,8 +193,17 @@ pub(super) fn given_labels(
     if percent < LEAST_PERCENT {
         return Err(LabelMapError::Elsewhere { name: shown(path), percent }.into());
     }
+    on_scan(pre, &labels, path)?;
     let bytes = encode_u8(&labels);
     Ok((labels, bytes))
+}
+
+/// Refuses a label map that is not the scan's.
+pub(super) fn on_scan(scan: &Volume<f32, Pre>, labels: &LabelMap<Pre>, path: &Path) -> Result<(), WorkflowError> {
+    match disagreement(scan, labels) {
+        Some(source) => Err(LabelMapError::OffScan { name: shown(path), source }.into()),
+        None => Ok(()),
+    }
 }
 
 /// A mask in the frame of the scan whose grid it has.

@@ -48,7 +48,7 @@ fn imported(
         .map_err(|source| LabelMapError::Import { name: name.to_owned(), source })?;
     let volumes: Vec<String> =
         found.volumes_cc.iter().map(|(tissue, cc)| format!("{} {cc:.0} cc", tissue.name())).collect();
-    progress.noted(&format!(
+    progress.taken_for(&format!(
         "{name}: read with the table {} ({}): {} structures, {}",
         found.table,
         found.files,
@@ -85,6 +85,11 @@ pub fn labels_of_tool(
     imported(&codes(&read_input(path)?, &name, options, progress)?, &name, whose, progress)
 }
 
+/// So many numbers are not all in FreeSurfer's table by chance.
+const MANY: usize = 6;
+/// The last of hgm's own numbers.
+const LAST_OWN: u32 = crate::anatomy::label::OEDEMA as u32;
+
 /// A label map to be meshed: that of a known tool in hgm's numbers, numbers of no tool as they are.
 ///
 /// # Errors
@@ -112,6 +117,12 @@ pub fn any_labels(
         let missing = t.needed.iter().filter(|set| !holds(set)).count();
         t.name != "hgm" && missing <= usize::from(t.needed.len() >= 6)
     };
+    // Half a map of FreeSurfer's: each of many numbers is one of its few, and what it is never without is missing.
+    let freesurfer = |code: u32| named("freesurfer").iter().any(|t| t.structure(code).is_some());
+    let own = counts.iter().filter(|c| c.code != 0).all(|c| freesurfer(c.code));
+    if own && counts.len() > MANY && counts.iter().any(|c| c.code > LAST_OWN) {
+        return imported(&codes, name, Some("freesurfer"), progress);
+    }
     let of_a_tool = built_in().iter().any(is_of);
     if of_a_tool || matches!(recognise(&counts, None), Ok(found) if found.table.name != "hgm") {
         return imported(&codes, name, None, progress);

@@ -137,9 +137,29 @@ fn make(
             Err(error) => refused.push(error.to_string()),
         }
     }
+    refused.extend(lost_labels(labels, &mesh, settings, record.edge_mm));
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let islands = record.islands.len();
     Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, sets, refused }))
+}
+
+/// Labels of the map of which the mesh has nothing.
+fn lost_labels(map: &LabelMap<Native>, mesh: &TetMesh, settings: &MeshSettings, edge_mm: f64) -> Vec<String> {
+    /// Less than this may go without a word.
+    const LEAST_CC: f64 = 0.5;
+    let mut voxels = [0usize; 256];
+    map.data.iter().for_each(|&l| voxels[usize::from(l)] += 1);
+    let lost = (1..=255u8).filter(|l| !settings.without.contains(l) && !mesh.labels().contains(l));
+    let lost = lost.map(|l| (l, voxels[usize::from(l)] as f64 * map.grid.voxel_volume_mm3() / 1000.0));
+    lost.filter(|&(_, cc)| cc >= LEAST_CC)
+        .map(|(l, cc)| {
+            let name = label::name(l).map_or_else(|| format!("label {l}"), str::to_owned);
+            format!(
+                "the mesh has nothing of {name}: all its {cc:.1} cc lie apart from the rest or in pieces too small for \
+                 tetrahedra of {edge_mm:.1} mm; look at the label map"
+            )
+        })
+        .collect()
 }
 
 fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {

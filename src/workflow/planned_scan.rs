@@ -87,7 +87,7 @@ impl PlannedScan {
     pub fn read(inputs: &PlanInputs, work: &Work<'_>) -> Result<Self, WorkflowError> {
         let options = &work.settings.image;
         let bytes = read_input(&inputs.pre)?;
-        let scan = nifti::decode(&bytes, &format!("pre-operative scan {}", shown(&inputs.pre)), options)?;
+        let scan = nifti::decode_scan(&bytes, &format!("pre-operative scan {}", shown(&inputs.pre)), options)?;
         let mut warnings: Vec<Warning> = all_of("pre", &scan.warnings).collect();
         let pre: Volume<f32, Pre> = scan.volume.relabelled();
         let grid: Grid<Native> = pre.grid.relabelled();

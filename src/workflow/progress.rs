@@ -19,7 +19,9 @@ pub trait Progress {
     fn stage(&mut self, ended: &StageEnded<'_>) {}
     /// Something odd about a file that was given.
     fn odd(&mut self, file: &str, what: &str) {}
-    /// What a file that was given was taken for.
+    /// What a file that was given was taken for: whoever gave it must hear it.
+    fn taken_for(&mut self, what: &str) {}
+    /// What goes on, for whoever follows the job.
     fn noted(&mut self, what: &str) {}
     /// What only somebody looking for a fault wants to know.
     fn detail(&mut self, of: &str, what: &str) {}
@@ -78,6 +80,10 @@ impl Progress for Shared {
 
     fn odd(&mut self, file: &str, what: &str) {
         self.tell(|p| p.odd(file, what));
+    }
+
+    fn taken_for(&mut self, what: &str) {
+        self.tell(|p| p.taken_for(what));
     }
 
     fn noted(&mut self, what: &str) {

@@ -144,7 +144,7 @@ fn image(
 ) -> Result<(Volume<f32, Native>, Vec<u8>), WorkflowError> {
     let bytes = read_input(path)?;
     let name = path.display().to_string();
-    let NiftiImage { volume, warnings: odd, .. } = nifti::decode(&bytes, &name, &settings.image)?;
+    let NiftiImage { volume, warnings: odd, .. } = nifti::decode_scan(&bytes, &name, &settings.image)?;
     warnings.extend(all_of(&name, &odd));
     Ok((volume, bytes))
 }

@@ -8,6 +8,7 @@ use super::user_file::read_input;
 use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
+use crate::report::refusal::{Row, as_scanned, picture, posed};
 use crate::segment::{PosedScan, SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -56,7 +57,7 @@ pub fn segment_file(
         check_writable(path)?;
     }
     let name = files.t1.display().to_string();
-    let read = nifti::decode(&read_input(&files.t1)?, &name, &settings.image)?;
+    let read = nifti::decode_scan(&read_input(&files.t1)?, &name, &settings.image)?;
     let t1 = read.volume;
     let mut warnings: Vec<Warning> = read.warnings.into_iter().map(Warning::from).collect();
     let own = files.brain_mask.as_deref();
@@ -64,13 +65,20 @@ pub fn segment_file(
 
     progress.begin("segment", 2);
     progress.doing("to MNI");
-    let fit = pose_of_head(&t1).map_err(|source| WorkflowError::Rigid { images: name.clone(), source })?;
+    let unposed = |source| {
+        show(as_scanned(&t1), files, ("as it was given", "to MNI"), progress);
+        WorkflowError::Rigid { images: name.clone(), source }
+    };
+    let fit = pose_of_head(&t1).map_err(unposed)?;
     progress.step();
     progress.doing("labels");
     let overrides = SegmentOverrides { brain: own.as_ref(), ..SegmentOverrides::default() };
     let scan = PosedScan::new(&t1, &fit.fixed_from_moving);
-    let (found, _) = segment_head(&scan, &overrides, &settings.deformable, &settings.segment)
-        .map_err(|source| WorkflowError::Head { scan: name, source })?;
+    let unlabelled = |source| {
+        show(posed(&t1, &fit.fixed_from_moving), files, ("in the pose that was found", "labels"), progress);
+        WorkflowError::Head { scan: name, source }
+    };
+    let (found, _) = segment_head(&scan, &overrides, &settings.deformable, &settings.segment).map_err(unlabelled)?;
     progress.end();
 
     let (labels, brain) = if files.in_mni {
@@ -86,4 +94,15 @@ pub fn segment_file(
     warnings.extend(found.warnings.into_iter().map(Warning::from));
     let labels = files.output.clone();
     Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, warnings })
+}
+
+/// A picture of the scan beside the labels that could not be made; what goes wrong with it is not worth a second message.
+fn show(row: Row, files: &SegmentFiles, (how, step): (&str, &str), progress: &mut dyn Progress) {
+    let Some((png, _)) = picture(&[row]) else { return };
+    let labels = files.output.to_string_lossy();
+    let path = PathBuf::from(format!("{}_refused.png", labels.strip_suffix(".nii.gz").unwrap_or(&labels)));
+    if write_whole(&path, &png).is_ok() {
+        let what = format!("look here first: the scan {how}, when the step `{step}` ended");
+        progress.odd(&path.display().to_string(), &what);
+    }
 }

@@ -1,6 +1,7 @@
 //! A synthetic patient as files: on the template's head or on a scan's.
 
 use super::error::WorkflowError;
+use super::inputs::on_scan;
 use super::labels::labels_of_tool;
 use super::progress::Progress;
 use super::settings::Settings;
@@ -49,9 +50,13 @@ pub fn synthetic_patient(
     if let Some(path) = &files.head {
         let bytes = read_input(path)?;
         stage = stage.input("head", &bytes);
-        let scan = nifti::decode(&bytes, &shown(path), &settings.image)?;
+        let scan = nifti::decode_scan(&bytes, &shown(path), &settings.image)?.volume.relabelled();
         let labels = match &files.dseg {
-            Some(dseg) => Some(labels_of_tool(dseg, files.labels.as_deref(), &settings.image, progress)?.relabelled()),
+            Some(dseg) => {
+                let labels = labels_of_tool(dseg, files.labels.as_deref(), &settings.image, progress)?.relabelled();
+                on_scan(&scan, &labels, dseg)?;
+                Some(labels)
+            }
             None => None,
         };
         if let Some(labels) = &labels {
@@ -65,7 +70,7 @@ pub fn synthetic_patient(
             }
             None => None,
         };
-        given = Some((scan.volume.relabelled(), labels, mask));
+        given = Some((scan, labels, mask));
     }
     let outcome = stage.run(force, || {
         let patient = match &given {

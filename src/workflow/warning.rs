@@ -26,6 +26,11 @@ pub enum Warning {
     Set(#[from] TagWarning),
     #[error(transparent)]
     Simulation(#[from] FemWarning),
+    #[error(
+        "the pose given lies {apart_mm:.0} mm and {turned_deg:.0} degrees from the one found; it is used as it is: look at how the \
+         brain lies before trusting the boundary sets and the direction of gravity"
+    )]
+    PoseFarFromFound { apart_mm: f64, turned_deg: f64 },
     #[error("both files hold the same bytes: was one image given twice?")]
     SameBytes,
     #[error("{plan}: {percent:.0} % of it lie outside the scan and count for nothing")]

@@ -193,6 +193,8 @@ fn twenty_wrong_or_mixed_up_maps_are_refused() {
             without(freesurfer, |p| matches!(p, Place::White(false) | Place::Cortex(false))),
             "freesurfer",
         ),
+        ("the left half alone, and nobody says whose", without(freesurfer, right), ""),
+        ("fluid and ventricles exchanged in hgm's", exchanged(own, 1, 4), "hgm"),
         ("a mask", map(|p| i16::from(own(p) > 0)), "hgm"),
         (
             "the brain of a mouse",
@@ -207,6 +209,30 @@ fn twenty_wrong_or_mixed_up_maps_are_refused() {
         assert_eq!(code, Some(3), "{what}: {said}");
         assert!(said.contains("map.nii.gz"), "{what}: {said}");
     }
+}
+
+#[test]
+fn a_label_of_which_no_tetrahedron_is_left_is_told_by_name() {
+    let head = map(own);
+    let beside =
+        Volume::from_fn(head.grid, |n| if head.grid.voxel(n).iter().all(|&v| v < 3) { 6 } else { head.data[n] });
+    let (code, said) = meshed(&beside, &["--labels", "hgm"]);
+    assert!(code == Some(4) && said.contains("nothing of tumour"), "{code:?}: {said}");
+    let specks = |n: usize| head.data[n] == 0 && head.grid.voxel(n).iter().all(|v| v % 2 == 0);
+    let speckled = Volume::from_fn(head.grid, |n| if specks(n) { 6 } else { head.data[n] });
+    let (code, said) = meshed(&speckled, &["--labels", "hgm"]);
+    assert!(code == Some(4) && said.contains("nothing of tumour"), "{code:?}: {said}");
+}
+
+fn right(p: Place) -> bool {
+    matches!(
+        p,
+        Place::White(false)
+            | Place::Cortex(false)
+            | Place::Ventricle(false)
+            | Place::Thalamus(false)
+            | Place::Cerebellum(false)
+    )
 }
 
 fn exchange_white(n: i16) -> i16 {

@@ -83,6 +83,9 @@ pub fn resect_mask(
     in_head: impl Fn(Point3<f64>) -> Position<Mni> + Sync,
     mask: &Mask<Mni>,
 ) -> Result<Resection, SynthError> {
+    /// From a biopsy to more than a lobe.
+    const LEAST_CC: f64 = 0.5;
+    const MOST_CC: f64 = 150.0;
     let grid = labels.grid;
     let taken = Mask::from_fn(grid, |n| {
         let brain = matches!(
@@ -91,7 +94,14 @@ pub fn resect_mask(
         );
         brain && mask.nearest(in_head(centre(&grid, n))) == Some(true)
     });
-    if taken.count() == 0 { Err(SynthError::NothingToTake) } else { Ok(walled(labels, &taken)) }
+    let found_cc = taken.volume_cc();
+    if found_cc == 0.0 {
+        return Err(SynthError::NothingToTake);
+    }
+    if !(LEAST_CC..=MOST_CC).contains(&found_cc) {
+        return Err(SynthError::MaskSize { found_cc, least_cc: LEAST_CC, most_cc: MOST_CC });
+    }
+    Ok(walled(labels, &taken))
 }
 
 fn walled(labels: &LabelMap<Patient>, smooth: &Mask<Patient>) -> Resection {

@@ -172,6 +172,18 @@ pub enum SynthError {
     /// What is to be taken out holds no brain.
     #[error("the mask of what is to be taken out holds no brain of this head; draw it on the scan of the head")]
     NothingToTake,
+    /// What is to be taken out is no resection's size.
+    #[error(
+        "the mask of what is to be taken out is {found_cc:.1} cc; it must lie between {least_cc} and {most_cc} cc: draw a resection"
+    )]
+    MaskSize {
+        /// Its volume in the brain.
+        found_cc: f64,
+        /// The least allowed.
+        least_cc: f64,
+        /// The most allowed.
+        most_cc: f64,
+    },
     /// A head whose tissues are not those of a T1.
     #[error(
         "the head is no T1-weighted scan: fluid {fluid:.0}, grey matter {grey:.0} and white matter {white:.0} must grow brighter \

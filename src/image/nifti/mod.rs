@@ -7,6 +7,7 @@
 mod displacement;
 mod encode;
 mod error;
+mod floor;
 mod gzip;
 mod header;
 mod mgh;
@@ -64,6 +65,16 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
     if image.volume.data.iter().all(|&x| x == first) {
         return Err(refused(name, NiftiProblem::Constant { value: first }));
     }
+    Ok(image)
+}
+
+/// [`decode`] for what a scanner shows: where intensities begin well below zero they are counted from there.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_scan(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
+    let mut image = decode(bytes, name, options)?;
+    floor::counted_from_their_floor(&mut image);
     Ok(image)
 }
 

@@ -14,6 +14,8 @@ pub enum NiftiWarning {
     Bits { bitpix: i32, datatype: i32, of_datatype: usize },
     #[error("{voxels} voxels are NaN or infinite and were set to 0")]
     NotFinite { voxels: usize },
+    #[error("intensities begin at {floor:.4}, below zero: they are counted from there")]
+    BelowZero { floor: f64 },
     #[error("pixdim[{field}] is negative; its absolute value is taken")]
     NegativeSpacing { field: usize },
     #[error("xyzt_units says {unit}; the numbers are taken as millimetres")]

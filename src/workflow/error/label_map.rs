@@ -1,7 +1,7 @@
 //! A label map of another tool that cannot be used.
 
 use crate::anatomy::TsvError;
-use crate::segment::ImportError;
+use crate::segment::{Disagreement, ImportError};
 use thiserror::Error;
 
 /// Why a label map of another tool cannot be used.
@@ -27,4 +27,6 @@ pub enum LabelMapError {
          map, or it was moved; give the map made from this scan"
     )]
     Elsewhere { name: String, percent: f64 },
+    #[error("{name}: {source}")]
+    OffScan { name: String, source: Disagreement },
 }

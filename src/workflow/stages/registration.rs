@@ -5,7 +5,7 @@ use super::reading::WithReading;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::RegistrationOutcome;
 use crate::experiment::resection::GravityFrame;
-use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
+use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Volume};
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
@@ -97,17 +97,31 @@ pub(super) fn pose_of(
     pre: &Volume<f32, Pre>,
     (given, labels): (Option<&RigidTransform<Pre, Mni>>, Option<&LabelMap<Pre>>),
 ) -> Result<FoundPose, WorkflowError> {
-    if let Some(pose) = given {
-        return Ok((*pose, by_hand(pose, &pre.grid), Vec::new()));
-    }
     let found = match labels {
         // A label map says where the brain is, whatever the scan's contrast.
         Some(labels) => pose_of_labels(labels),
         None => pose_of_head(pre),
     };
+    if let Some(pose) = given {
+        // Where none is found there is nothing to hold it against: that is what it is given for.
+        let far = found.ok().and_then(|found| far_from(pose, &found.fixed_from_moving));
+        return Ok((*pose, by_hand(pose, &pre.grid), far.map(|far| far.of(OF_POSE)).into_iter().collect()));
+    }
     let what = "the pre-operative scan (moving) onto the MNI template (fixed)";
     let found = found.map_err(|source| WorkflowError::Registration { what, source })?;
     Ok((found.fixed_from_moving, outcome(&found, &pre.grid), all_of(OF_POSE, &found.warnings).collect()))
+}
+
+/// What to say of a pose by hand that is not near the one found: nobody draws one as well, but nobody misses by so much.
+fn far_from(by_hand: &RigidTransform<Pre, Mni>, found: &RigidTransform<Pre, Mni>) -> Option<Warning> {
+    const FAR_DEG: f64 = 8.0;
+    const FAR_MM: f64 = 12.0;
+    /// The middle of the template's brain, mm.
+    const MIDDLE: [f64; 3] = [0.0, -18.0, 8.0];
+    let middle = found.inverse().apply(Position::new(MIDDLE[0], MIDDLE[1], MIDDLE[2]));
+    let apart_mm = by_hand.apply(middle).distance_mm(&found.apply(middle));
+    let turned_deg = by_hand.rotation.angle_to(&found.rotation).to_degrees();
+    (apart_mm > FAR_MM || turned_deg > FAR_DEG).then_some(Warning::PoseFarFromFound { apart_mm, turned_deg })
 }
 
 /// Post to pre, and pre to MNI.
@@ -165,5 +179,29 @@ fn by_hand<M: Frame, F: Frame>(transform: &RigidTransform<M, F>, moving: &Grid<M
         similarity: "given by hand".to_owned(),
         similarity_before: None,
         similarity_after: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_pose_by_hand_is_held_against_the_one_found() {
+        let found = RigidTransform::about(Point3::origin(), Vector3::new(0.1, 0.0, 0.2), Vector3::new(5.0, -20.0, 9.0));
+        let moved = |turn: f64, shift: f64| {
+            let by: RigidTransform<Mni, Mni> = RigidTransform::about(
+                Point3::new(0.0, -18.0, 8.0),
+                Vector3::new(turn, 0.0, 0.0),
+                Vector3::new(0.0, shift, 0.0),
+            );
+            far_from(&found.then(&by), &found)
+        };
+        assert_eq!(moved(0.0, 0.0), None);
+        assert_eq!(moved(0.1, 8.0), None);
+        let Some(Warning::PoseFarFromFound { apart_mm, turned_deg }) = moved(0.2, 15.0) else { panic!() };
+        assert!((apart_mm - 15.0).abs() < 1e-9 && (turned_deg - 0.2f64.to_degrees()).abs() < 1e-9);
+        assert!(moved(0.2, 0.0).is_some() && moved(0.0, -15.0).is_some());
     }
 }
