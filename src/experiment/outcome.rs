@@ -8,6 +8,7 @@ pub use super::law_outcome::LawOutcome;
 use super::compare::Comparison;
 use super::estimate::EstimateOutcome;
 use super::verdict::Verdict;
+use crate::segment::ScanQualities;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -87,6 +88,9 @@ pub struct ExperimentOutcome {
     /// Volumes of a resection.
     #[serde(default)]
     pub volumes: Option<ResectionVolumes>,
+    /// How good the scans are; absent from cases of before it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scans: Option<ScanQualities>,
     /// The boundary sets of the mesh.
     #[serde(default)]
     pub sets: Vec<SetOutcome>,

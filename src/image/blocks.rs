@@ -12,9 +12,19 @@ use nalgebra::{Matrix4, Vector3};
 /// For a factor of 0.
 #[must_use]
 pub fn coarser<F: Frame>(grid: &Grid<F>, factor: usize) -> Grid<F> {
-    let middle = (factor as f64 - 1.0) / 2.0;
-    let fine_from_coarse = Matrix4::new_translation(&Vector3::repeat(middle)) * Matrix4::new_scaling(factor as f64);
-    let dims = grid.dims.map(|n| n.div_ceil(factor));
+    coarser_along(grid, [factor; 3])
+}
+
+/// [`coarser`] with a factor for each of the axes i, j, k.
+///
+/// # Panics
+/// For a factor of 0.
+#[must_use]
+pub fn coarser_along<F: Frame>(grid: &Grid<F>, factor: [usize; 3]) -> Grid<F> {
+    let factors = Vector3::from(factor.map(|f| f as f64));
+    let middle = factors.map(|f| (f - 1.0) / 2.0);
+    let fine_from_coarse = Matrix4::new_translation(&middle) * Matrix4::new_nonuniform_scaling(&factors);
+    let dims = [0, 1, 2].map(|a| grid.dims[a].div_ceil(factor[a]));
     Grid::new(dims, grid.mm_from_voxel * fine_from_coarse).expect("a scaled grid is a grid")
 }
 
@@ -26,16 +36,26 @@ pub fn block_means<F: Frame>(
     factor: usize,
     value: impl Fn(usize) -> f32 + Sync + Send,
 ) -> Volume<f32, F> {
-    Volume::from_voxels(coarser(grid, factor), |block| {
-        let first = block.map(|v| v * factor);
-        let end = [0, 1, 2].map(|a| (first[a] + factor).min(grid.dims[a]));
+    block_means_along(grid, [factor; 3], value)
+}
+
+/// [`block_means`] with a factor for each of the axes i, j, k.
+#[must_use]
+pub fn block_means_along<F: Frame>(
+    grid: &Grid<F>,
+    factor: [usize; 3],
+    value: impl Fn(usize) -> f32 + Sync + Send,
+) -> Volume<f32, F> {
+    Volume::from_voxels(coarser_along(grid, factor), |block| {
+        let first = [0, 1, 2].map(|a| block[a] * factor[a]);
+        let end = [0, 1, 2].map(|a| (first[a] + factor[a]).min(grid.dims[a]));
         let mut sum = 0.0;
         for k in first[2]..end[2] {
             for j in first[1]..end[1] {
                 sum += (first[0]..end[0]).map(|i| value(grid.index(i, j, k))).sum::<f32>();
             }
         }
-        sum / factor.pow(3) as f32
+        sum / factor.iter().product::<usize>() as f32
     })
 }
 

@@ -3,6 +3,7 @@
 pub use super::cohort_population::{CohortPopulation, Pupil};
 
 use super::cohort_tasks::{TaskRanks, compare_tasks};
+use super::look_first::{LookFirst, scan_measures};
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::{Answer, ExperimentOutcome};
 use crate::experiment::rmse::median_and_mad;
@@ -92,6 +93,8 @@ pub struct Cohort {
     /// What a reader must know before comparing the subjects.
     #[schemars(with = "Vec<String>")]
     pub warnings: Vec<CohortWarning>,
+    /// Scans to look at first: the subjects by risk.
+    pub look_first: LookFirst,
     /// What the subjects say of people, where they were estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub population: Option<CohortPopulation>,
@@ -161,6 +164,7 @@ impl Cohort {
             median_samples,
             tasks,
             warnings,
+            look_first: LookFirst::new(members),
             population: None,
         }
     }
@@ -172,7 +176,9 @@ impl Cohort {
             self.columns.iter().map(|name| cell(from.get(name))).collect()
         };
         let head = ["participant_id", "status", "best_sample", "verdict", "warnings"].map(str::to_owned);
-        let mut lines = vec![[&head[..], &self.columns].concat()];
+        let last = ["look_first", "look_because"].map(str::to_owned);
+        let measured: Vec<String> = scan_measures().map(|(scan, measure)| measure.column_of(scan)).collect();
+        let mut lines = vec![[&head[..], &self.columns, &last, &measured].concat()];
         for row in &self.subjects {
             let text = |text: Option<&str>| text.unwrap_or("n/a").to_owned();
             let first = [
@@ -182,7 +188,12 @@ impl Cohort {
                 text(row.verdict),
                 row.warnings.to_string(),
             ];
-            lines.push([&first[..], &numbers(&row.figures)].concat());
+            let risk = self.look_first.of(&row.participant_id);
+            let place = risk.map(|(place, subject)| [place.to_string(), subject.because()]);
+            let place = place.unwrap_or_else(|| ["n/a", "n/a"].map(str::to_owned));
+            let measures: Vec<String> =
+                measured.iter().map(|column| cell(risk.and_then(|(_, subject)| subject.figures.get(column)))).collect();
+            lines.push([&first[..], &numbers(&row.figures), &place, &measures].concat());
         }
         lines.iter().map(|line| line.join("\t") + "\n").collect()
     }

@@ -18,5 +18,8 @@ pub use cavity_pair::CavityPair;
 pub use intensity::on_the_scale_of;
 pub use likeness::{Likeness, likeness};
 pub use midline::midline_shift_mm;
-pub use pair::{GivenMasks, HeadApart, OperatedBrain, PairError, PairSettings, take_head_apart, take_pair_apart};
+pub use pair::{
+    GivenMasks, HeadApart, OperatedBrain, PairError, PairSettings, take_head_apart, take_pair_apart,
+    template_correlation,
+};
 pub use sag::{SagScans, fit_sag, moved_scan};

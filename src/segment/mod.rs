@@ -18,6 +18,7 @@ mod noise;
 mod overhang;
 mod posed_scan;
 mod priors;
+mod scan_quality;
 mod segmentation;
 mod sulci;
 mod ventricle;
@@ -32,6 +33,7 @@ pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_lab
 pub use overhang::VaultPart;
 pub use posed_scan::PosedScan;
 pub use priors::AtlasPriors;
+pub use scan_quality::{Air, ScanQualities, ScanQuality, scan_quality};
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
     segment_with_priors,

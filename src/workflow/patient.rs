@@ -117,6 +117,7 @@ fn outcome_of_images(registration: &RegistrationFacts, anat: &AnatFacts, manifes
     ExperimentOutcome {
         kind: ExperimentKind::Resection,
         volumes: Some(anat.volumes),
+        scans: Some(anat.scans.clone()),
         registrations: registration.fits.clone(),
         warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
         ..ExperimentOutcome::default()

@@ -80,6 +80,7 @@ pub(super) fn predict_scan(
         kind: ExperimentKind::Prediction,
         reference: "nothing: the operation is still to come".to_owned(),
         volumes: Some(planned.volumes),
+        scans: Some(planned.scans),
         registrations: vec![posed.fit],
         sets: meshed.sets,
         mesh: Some(meshed.mesh),

@@ -9,7 +9,9 @@ use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::report::refusal::{Row, as_scanned, picture, posed};
-use crate::segment::{PosedScan, SegmentOverrides, TissueVolumes, pose_of_head, segment_head};
+use crate::segment::{
+    PosedScan, ScanQuality, SegmentOverrides, TissueVolumes, pose_of_head, scan_quality, segment_head,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -37,6 +39,8 @@ pub struct Segmented {
     pub volumes: TissueVolumes,
     /// Mean brightness of CSF, grey and white matter.
     pub tissue_means: [f64; 3],
+    /// How good the scan is.
+    pub quality: ScanQuality,
     /// What a reader must know.
     pub warnings: Vec<Warning>,
 }
@@ -78,7 +82,10 @@ pub fn segment_file(
         show(posed(&t1, &fit.fixed_from_moving), files, ("in the pose that was found", "labels"), progress);
         WorkflowError::Head { scan: name, source }
     };
-    let (found, _) = segment_head(&scan, &overrides, &settings.deformable, &settings.segment).map_err(unlabelled)?;
+    let (found, template) =
+        segment_head(&scan, &overrides, &settings.deformable, &settings.segment).map_err(unlabelled)?;
+    let correlation = Some(template.quality.correlation[1]);
+    let quality = scan_quality(&scan, &found.labels, &template.atlas_from_subject, correlation);
     progress.end();
 
     let (labels, brain) = if files.in_mni {
@@ -93,7 +100,7 @@ pub fn segment_file(
     warnings.extend(fit.warnings.into_iter().map(Warning::from));
     warnings.extend(found.warnings.into_iter().map(Warning::from));
     let labels = files.output.clone();
-    Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, warnings })
+    Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, quality, warnings })
 }
 
 /// A picture of the scan beside the labels that could not be made; what goes wrong with it is not worth a second message.

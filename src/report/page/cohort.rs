@@ -6,6 +6,7 @@ use super::super::html::{fixed, number};
 use super::super::median_samples::as_outcome;
 use super::super::strip_chart::{StripChart, StripPoint};
 use super::results::{figures, set_name};
+use super::scans::RiskCells;
 use super::{Frame, Section, notice, tasks};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
@@ -23,6 +24,7 @@ impl Cohort {
         };
         let bodies = [
             ("subjects", "Subjects", Some(self.subjects_section())),
+            ("look-first", "Scans to look at first", self.look_first_section()),
             ("errors", "What deformation explains", self.errors_section()),
             ("samples", "Samples over the subjects", self.samples_section()),
             ("tasks", "Tasks of the generative model", tasks::of_cohort(&self.tasks)),
@@ -172,6 +174,46 @@ impl Cohort {
                 }
             }, &html! {}))
         }
+    }
+
+    /// The subjects by risk, and what their scans were measured at.
+    fn look_first_section(&self) -> Option<Markup> {
+        let found = &self.look_first;
+        let row = |id: &str| self.subjects.iter().find(|row| row.participant_id == id);
+        let lines = || found.subjects.iter().filter_map(|subject| Some((subject, row(&subject.participant_id)?)));
+        let head = ["subject", "place", "why", "ended", "warnings"].map(str::to_owned);
+        let body = html! {
+            @for (place, (subject, row)) in lines().enumerate() {
+                tr data-subject=(row.participant_id) data-verdict=(said(row)) data-apart=(apart(row)) {
+                    th scope="row" { (linked(row)) }
+                    td data-value=(place + 1) { (place + 1) }
+                    td class="words" { (subject.because()) }
+                    td class="words" { (row.status.name()) }
+                    td data-value=(row.warnings) { (row.warnings) }
+                }
+            }
+        };
+        let cells = RiskCells { found };
+        let measures = html! {
+            @for (subject, row) in lines() {
+                tr data-subject=(row.participant_id) data-verdict=(said(row)) data-apart=(apart(row)) {
+                    th scope="row" { (linked(row)) }
+                    (cells.values(subject))
+                }
+            }
+        };
+        let heads: Vec<String> = std::iter::once("subject".to_owned()).chain(cells.heads()).collect();
+        (!found.subjects.is_empty()).then(|| {
+            html! {
+                p { (found.rule) } "\n"
+                (sortable("Scans to look at first", &head, &body, &html! {}))
+                @if found.measures.is_empty() {
+                    p { "No scan was measured: the cases are of before hgm did that. Run the participant level again." } "\n"
+                } @else {
+                    (sortable("Measures of every scan", &heads, &measures, &cells.foot()))
+                }
+            }
+        })
     }
 
     /// A strip for every figure in which subjects differ.

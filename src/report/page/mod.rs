@@ -12,6 +12,7 @@ pub mod plans;
 mod posterior;
 mod prediction;
 mod results;
+mod scans;
 mod tasks;
 
 pub use evaluation::in_a_sentence as evaluation_in_a_sentence;
@@ -263,6 +264,7 @@ impl CasePage {
         add("summary", "Summary", compared.map(results::summary));
         add("shift", "Brain shift", shift.map(|shift| brain_shift::section(shift, figure, landmarks)));
         add("seen", "What was seen", self.refused.as_ref().map(|seen| pictures(std::slice::from_ref(seen))));
+        add("scans", "Quality of the scans", outcome.and_then(|o| scans::of_case(o.scans.as_ref()?)));
         add("registration", "Registration", self.registration_section());
         add("masks", "Masks", self.masks_section());
         add("mesh", "Mesh", self.mesh_section());

@@ -2,6 +2,8 @@ use super::*;
 use crate::experiment::outcome::{
     LawOutcome, NoiseFloor, RegistrationOutcome, ResectionVolumes, SampleOutcome, SetOutcome,
 };
+use crate::report::cohort::{Cohort, Member, Status};
+use crate::segment::{Air, ScanQualities, ScanQuality};
 use std::collections::BTreeMap;
 
 fn map<T>(pairs: Vec<(&str, T)>) -> BTreeMap<String, T> {
@@ -233,4 +235,71 @@ fn an_empty_case_still_gives_a_page_that_says_what_is_absent() {
     let html = page.to_html();
     assert!(html.contains("Not shown: samples: sim/outcome.json is not there."));
     assert!(!html.contains("id=\"samples\""));
+}
+
+fn scan(contrast_to_noise: f64, air: Air) -> ScanQuality {
+    let told = (air == Air::Seen).then_some(0.5);
+    ScanQuality {
+        contrast_to_noise: Some(contrast_to_noise),
+        white_signal_to_noise: Some(15.0),
+        entropy_focus: told,
+        air_artefact_percent: told,
+        air,
+        coverage_percent: 100.0,
+        gain_times: Some(1.25),
+        voxel_mm: [1.0, 1.0, 1.2],
+        anisotropy: 1.2,
+        template_correlation: None,
+    }
+}
+
+#[test]
+fn the_quality_of_both_scans_is_told_and_what_cannot_be_told_says_why() {
+    let prepared = |scans| ExperimentOutcome { scans, ..ExperimentOutcome::default() };
+    let both = ScanQualities { pre: Some(scan(3.25, Air::Seen)), post: Some(scan(2.75, Air::Blank)) };
+    let html = page(prepared(Some(both.clone()))).to_html();
+    let section = html.split("id=\"scans\"").nth(1).unwrap().split("</section>").next().unwrap();
+    for said in
+        ["<td>3.25</td><td>2.75</td>", "<td>0.500</td><td>cannot be told", "higher is better", "<td>1.25 times</td>"]
+    {
+        assert!(section.contains(said), "{said}: {section}");
+    }
+    // A prediction has one scan, a case of an earlier version none.
+    let one = page(prepared(Some(ScanQualities { post: None, ..both }))).to_html();
+    assert!(one.contains("before surgery</th><th scope=\"col\">how to read it"));
+    assert!(!page(prepared(None)).to_html().contains("id=\"scans\""));
+}
+
+#[test]
+fn a_cohort_shows_which_scans_to_look_at_first_and_why() {
+    let member = |name: &str, post: f64| Member {
+        participant_id: name.to_owned(),
+        status: Status::Done,
+        message: None,
+        outcome: Some(ExperimentOutcome {
+            scans: Some(ScanQualities { pre: Some(scan(3.0, Air::Blank)), post: Some(scan(post, Air::Blank)) }),
+            ..ExperimentOutcome::default()
+        }),
+        settings_sha256: None,
+    };
+    let cohort = Cohort::new(&[("sub-1", 3.0), ("sub-2", 1.5), ("sub-3", 3.1)].map(|(name, post)| member(name, post)));
+    let html = cohort.to_html();
+    let section = html.split("id=\"look-first\"").nth(1).unwrap().split("</section>").next().unwrap();
+    let first = section.split("<tbody>").nth(1).unwrap().split("</tr>").next().unwrap();
+    assert!(
+        first.contains("sub-2.html") && first.contains("contrast to noise after surgery is low (1.50, "),
+        "{first}"
+    );
+    assert!(section.contains("<strong>1.50</strong>") && section.contains("robust deviations"), "{section}");
+    let table = cohort.to_tsv();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split('\t').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|own| *own == name).unwrap();
+    let noisy = rows.iter().find(|row| row[0] == "sub-2").unwrap();
+    assert_eq!((noisy[column("look_first")], noisy[column("post_contrast_to_noise")]), ("1", "1.5"));
+    assert_eq!(noisy[column("pre_entropy_focus")], "n/a");
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    // Cases of before scans were measured are still in the list, and say so.
+    let mut old = member("sub-4", 3.0);
+    old.outcome.as_mut().unwrap().scans = None;
+    assert!(Cohort::new(&[old]).to_html().contains("No scan was measured"));
 }

@@ -16,7 +16,7 @@ use crate::layout::{
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{PosedScan, atlas, label};
+use crate::segment::{PosedScan, ScanQualities, atlas, label, scan_quality};
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 17;
+const VERSION: u32 = 18;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -38,6 +38,9 @@ pub struct AnatFacts {
     pub side: Side,
     /// Largest voxel edge of either scan, mm.
     pub coarsest_voxel_mm: f64,
+    /// How good the scans are.
+    #[serde(default)]
+    pub scans: ScanQualities,
 }
 
 /// The masks a case's later stages start from, as its files hold them.
@@ -144,12 +147,18 @@ pub(crate) fn anat(
             post: after,
             finding: found,
             template_from_patient,
+            template_correlation,
             sag,
             post_ventricle,
             post_brain,
             ..
         } = take_pair_apart(&pre, &post, &given, &work.settings.anat, step)?;
 
+        let quality = ScanQualities {
+            pre: Some(scan_quality(&pre, &before.labels, &template_from_patient, template_correlation)),
+            // Nothing was fitted to the scan after the operation but the brain of the one before.
+            post: Some(scan_quality(&post, &after.labels, &template_from_patient, None)),
+        };
         work.tell(|p| p.doing("writing"));
         let mut produced = Produced::default();
         let mut write = |name: &str, bytes: Vec<u8>| produced.files.push((name.to_owned(), bytes));
@@ -193,6 +202,7 @@ pub(crate) fn anat(
             },
             side: found.side,
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),
+            scans: quality,
         });
         Ok(produced)
     })

@@ -24,6 +24,7 @@ pub struct HeadFacts {
     pub warnings: Vec<SegmentWarning>,
     pub scale: Scale,
     pub fit: FieldFrame,
+    pub template_correlation: Option<f64>,
 }
 
 /// A prediction of the scan at hand, made with the settings at hand.
@@ -42,7 +43,8 @@ impl Earlier {
     /// The head as the prediction has taken it apart.
     pub fn head(&self, pre: &Volume<f32, Pre>) -> Result<HeadApart, WorkflowError> {
         let grid = atlas::template().grid();
-        let HeadFacts { tissue_means, csf_grey_border, volumes, warnings, scale, fit } = &self.head;
+        let HeadFacts { tissue_means, csf_grey_border, volumes, warnings, scale, fit, template_correlation } =
+            &self.head;
         let labels_mni = self.on_mni(self.labels(PRE_LABELS)?, PRE_LABELS)?;
         let brain_mni = self.on_mni(self.labels(PRE_BRAIN)?, PRE_BRAIN)?.map(|l| l > 0);
         let even = nifti::decode_intensities(&self.case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &ReadOptions::default())?;
@@ -68,7 +70,7 @@ impl Earlier {
             warnings: warnings.clone(),
         };
         let template_from_patient = template_from_patient.ok_or_else(|| self.damaged(TEMPLATE_FIT))?;
-        Ok(HeadApart { pre, template_from_patient, scale: *scale })
+        Ok(HeadApart { pre, template_from_patient, scale: *scale, template_correlation: *template_correlation })
     }
 
     /// The mesh as the prediction has made it; nothing where it was made of other labels than these.

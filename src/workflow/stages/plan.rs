@@ -17,9 +17,9 @@ use crate::layout::{
     RESECTED, TEMPLATE_DISPLACEMENT, TEMPLATE_FIT,
 };
 use crate::register::deformable::DisplacementField;
-use crate::resect::{GivenMasks, take_head_apart};
+use crate::resect::{GivenMasks, take_head_apart, template_correlation};
 use crate::segment::native::mask_on;
-use crate::segment::{PosedScan, atlas};
+use crate::segment::{PosedScan, ScanQualities, atlas, scan_quality};
 use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
@@ -30,7 +30,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -44,6 +44,9 @@ pub struct PlanFacts {
     pub head: HeadFacts,
     /// What is to be taken.
     pub plan: Planned,
+    /// How good the scan is.
+    #[serde(default)]
+    pub scans: ScanQualities,
 }
 
 /// What later stages start from, as the case's files hold it.
@@ -95,6 +98,8 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         let pre = PosedScan::new(&scan.pre, &mni_from_pre);
         let (before, template, scale) =
             once(&scan.shared.head, || Ok::<_, WorkflowError>(take_head_apart(&pre, &given, &work.settings.anat)?))?;
+        let correlation = template_correlation(&given, template);
+        let quality = scan_quality(&pre, &before.labels, &template.atlas_from_subject, correlation);
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
@@ -135,8 +140,10 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
                 warnings: before.warnings.clone(),
                 scale: *scale,
                 fit,
+                template_correlation: correlation,
             },
             plan: found,
+            scans: ScanQualities { pre: Some(quality), post: None },
         });
         Ok(produced)
     })

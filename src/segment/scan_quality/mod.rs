@@ -1,0 +1,123 @@
+//! How good a scan is for what is done with it: noise, ghosts, field of view, shading, voxels.
+//!
+//! Measures of MRIQC's kind (Esteban et al., "MRIQC: advancing the automatic prediction of image quality in MRI from unseen
+//! sites", PLoS ONE 12(9), 2017), read from the scan as it is, on its own grid, with the labels that the segmentation has found.
+//! None of them changes when all intensities are scaled.
+
+mod air;
+mod contrast;
+mod coverage;
+mod focus;
+mod gain;
+
+use super::posed_scan::PosedScan;
+use crate::geometry::{Frame, Mni};
+use crate::image::{Grid, LabelMap};
+use crate::register::deformable::DisplacementField;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the air around the head can tell of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Air {
+    /// Air with its noise is in the field of view.
+    Seen,
+    /// Most of it is of one value: the scan was stripped, masked or defaced, or its noise was cut off. What lay there cannot be told.
+    Blank,
+    /// Hardly any air above the skull's base lies in the field of view.
+    Outside,
+}
+
+/// The measures of one scan. One that cannot be told is absent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanQuality {
+    /// Distance of the means of white and grey matter over the root of the sum of the variances of white matter, grey matter and
+    /// air, after the coil's gain is taken out (contrast to noise, Magnotta and Friedman 2006); higher is better.
+    #[serde(default)]
+    pub contrast_to_noise: Option<f64>,
+    /// Mean over standard deviation of white matter away from its border, after the coil's gain is taken out; higher is better.
+    #[serde(default)]
+    pub white_signal_to_noise: Option<f64>,
+    /// Entropy of the intensities over the largest that there can be, 0 to 1 (entropy focus criterion, Atkinson et al. 1997):
+    /// ghosts and blur of motion raise it. Absent where the air is not seen.
+    #[serde(default)]
+    pub entropy_focus: Option<f64>,
+    /// Share of the air above the skull's base that is brighter than noise and hangs together, percent (Mortamet et al. 2009, QI1):
+    /// ghosts of motion, wrapping, spikes. Absent where the air is not seen.
+    #[serde(default)]
+    pub air_artefact_percent: Option<f64>,
+    /// What the air can tell.
+    pub air: Air,
+    /// Share of the template's brain, carried onto the patient, that the field of view covers, percent; lost slices count as outside.
+    pub coverage_percent: f64,
+    /// How many times as bright the brightest part of white matter is as the darkest (98th to 2nd percentile of the coil's gain
+    /// over some centimetres); 1 is even.
+    #[serde(default)]
+    pub gain_times: Option<f64>,
+    /// Edges of a voxel along its axes i, j, k, mm.
+    pub voxel_mm: [f64; 3],
+    /// Longest over shortest edge of a voxel; 1 is a cube.
+    pub anisotropy: f64,
+    /// Mean local correlation of the fitted template with the scan over the brain, -1 to 1, where the template was fitted to it.
+    #[serde(default)]
+    pub template_correlation: Option<f64>,
+}
+
+/// The measures of a case's scans; a prediction has none after the operation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanQualities {
+    /// The scan before the operation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pre: Option<ScanQuality>,
+    /// The scan after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub post: Option<ScanQuality>,
+}
+
+/// Measures a scan with its labels (on its own grid); `template_from_patient` maps the MNI frame reached rigidly to the template.
+pub fn scan_quality<F: Frame>(
+    scan: &PosedScan<'_, F>,
+    labels: &LabelMap<F>,
+    template_from_patient: &DisplacementField<Mni>,
+    template_correlation: Option<f64>,
+) -> ScanQuality {
+    let (t1, blocks) = (scan.t1, factors(&scan.t1.grid));
+    let gain = gain::white_gain(t1, labels, blocks);
+    let white = gain.as_ref().map_or(0.0, |gain| gain.mean);
+    let seen = air::seen(scan, labels, blocks, white);
+    let tissue = gain.as_ref().map(|gain| contrast::tissues(t1, labels, gain));
+    let air_deviation = seen.noise.as_ref().map_or(0.0, |noise| noise.deviation);
+    let told = seen.air == Air::Seen;
+    let voxel_mm = t1.grid.spacing_mm();
+    let [shortest, longest] =
+        [voxel_mm.iter().fold(f64::INFINITY, |a, b| a.min(*b)), voxel_mm.iter().fold(0.0, |a, b| b.max(a))];
+    ScanQuality {
+        contrast_to_noise: tissue.as_ref().and_then(|t| t.contrast_to_noise(air_deviation)),
+        white_signal_to_noise: tissue.as_ref().and_then(contrast::Tissues::white_signal_to_noise),
+        entropy_focus: told.then(|| focus::entropy_focus(t1)).flatten(),
+        air_artefact_percent: seen.noise.map(|noise| noise.artefact_percent),
+        air: seen.air,
+        coverage_percent: coverage::percent(scan, template_from_patient),
+        gain_times: gain.map(|gain| gain.times),
+        voxel_mm,
+        anisotropy: longest / shortest,
+        template_correlation,
+    }
+}
+
+/// Voxels to a block along each axis: blocks of about 4 mm.
+fn factors<F: Frame>(grid: &Grid<F>) -> [usize; 3] {
+    const BLOCK_MM: f64 = 4.0;
+    grid.spacing_mm().map(|mm| (BLOCK_MM / mm).round().max(1.0) as usize)
+}
+
+/// The place in memory of the block that holds a voxel.
+fn block_of<F: Frame>(blocks: &Grid<F>, factor: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
+    blocks.index(i / factor[0], j / factor[1], k / factor[2])
+}
+
+#[cfg(test)]
+mod tests;
