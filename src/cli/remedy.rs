@@ -1,6 +1,7 @@
 //! What to do about an error, in words of the command line: the library's messages name no options.
 
 use crate::anatomy::LabelError;
+use crate::experiment::predict::TaughtError;
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
@@ -86,6 +87,8 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             | PredictError::NoVoxel { .. }
             | PredictError::BesideScan { .. },
         ) => "see --resection and --resection-ellipsoid",
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => "see --tissues and --population",
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => "see --population and --drained",
         WorkflowError::Predict(PredictError::OnePlan { .. }) => "name another folder (-o)",
         WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
         WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",

@@ -1,7 +1,7 @@
 //! The job before an operation: one scan and a plan to the expected brain shift.
 
 use super::case::Case;
-use super::error::{CaseError, WorkflowError};
+use super::error::{CaseError, PredictError, WorkflowError};
 use super::facts::MeshFacts;
 use super::outcome::{finish, keep_settings};
 use super::plan::{Goal, plan};
@@ -38,9 +38,11 @@ pub fn predict(
 
 /// Refuses what no prediction can be made with.
 pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
-    work.settings.check()?;
+    let settings = work.settings;
+    settings.check()?;
+    settings.predict.check_taught(&settings.resection, &settings.prior).map_err(PredictError::Taught)?;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
-    work.place.programs.engines().check(work.settings.mesh.engine).map_err(refused)?;
+    work.place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
     Ok(())
 }
 

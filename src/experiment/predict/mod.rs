@@ -23,6 +23,7 @@ mod score;
 mod settings;
 mod shares;
 mod spread;
+mod taught;
 mod uncertain;
 
 pub use check::{Check, checked};
@@ -44,4 +45,5 @@ pub use score::{Compared, Coverage, PlaceScore, Scores, crps, energy_score, scor
 pub use settings::PredictSettings;
 pub use shares::{Shares, variance_shares};
 pub use spread::{Spread, spread};
+pub use taught::TaughtError;
 pub use uncertain::{Cause, Uncertain, Uncertainty};

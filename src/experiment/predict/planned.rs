@@ -115,10 +115,7 @@ pub fn assumptions(
     (own, prior): (&ResectionSettings, &PriorSettings),
     supports: &[SupportWeight],
 ) -> Vec<String> {
-    let stiffness = match prior.patients() {
-        None => "what published studies of brain tissue found".to_owned(),
-        Some(patients) => format!("what the scans of {patients} patients of a cohort have shown"),
-    };
+    let stiffness = prior.source_of(&settings.tissue_list());
     let mut said = vec![
         "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {

@@ -1,6 +1,6 @@
 //! Why no prediction can be made.
 
-use crate::experiment::predict::PlannedError;
+use crate::experiment::predict::{PlannedError, TaughtError};
 use crate::mesh::OpenSurface;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -11,6 +11,8 @@ use thiserror::Error;
 pub enum PredictError {
     #[error(transparent)]
     Plan(#[from] PlannedError),
+    #[error(transparent)]
+    Taught(#[from] TaughtError),
     #[error("nothing is said of what is to be taken: give a mask in the scan's grid, or an ellipsoid")]
     NoPlan,
     #[error("`{given}` is no ellipsoid: give six numbers x,y,z,rx,ry,rz (mm, scanner, RAS+), the half axes above 0")]
