@@ -47,6 +47,15 @@ fn a_damaged_file_is_refused_with_its_place() {
     assert!(refuse(b"x,y\n1,2\n", "a.csv").contains("a.csv: the first row: no column is called `z`"));
     assert!(refuse(b"x,y,z\n1,2,up\n", "a.csv").contains("row 2: `up`"));
     assert!(refuse(b"x,y,z\n1,2,inf\n", "a.csv").contains("point 0"));
+    for text in ["1,-12,-20,-5\n", "1,2,3,4,a\n"] {
+        let said = refuse(text.as_bytes(), "a.csv");
+        assert!(said.contains("4 columns of numbers and no header") && said.contains("x, y and z"), "{said}");
+    }
+    for (text, marks) in [("name;x;y;z\nSTN;-12,0;-20,5;-5\n", "semicolons"), ("1,5;2;3,5\n", "semicolons"), ("x\ty\tz\n1\t2\t3\n", "tabs")] {
+        let said = refuse(text.as_bytes(), "a.csv");
+        assert!(said.contains(marks) && said.contains("by commas"), "{said}");
+    }
+    assert_eq!(Drawing::decode(b"\"a;1;2;3\",1,2,3\n", "a.csv").unwrap().names, ["a;1;2;3"]);
     assert!(refuse(b"", "a.xyz").contains(".mrk.json"));
     assert!(refuse(b"{}", "a.mrk.json").contains("markups"));
     assert!(refuse(b"mrtrix tracks\ndatatype: Float32LE\nfile: . 50\nEND\n", "a.tck").contains("a.tck"));
