@@ -23,6 +23,7 @@ mod score;
 mod settings;
 mod shares;
 mod spread;
+mod supported;
 mod taught;
 mod uncertain;
 

@@ -21,7 +21,7 @@ pub struct Prediction {
     pub heads: Vec<HeadPrediction>,
     /// What was not known, and its prior.
     pub unknowns: Vec<UnknownOutcome>,
-    /// How the brain may be supported, and how probable that was taken to be.
+    /// How the brain may be supported, and how probable that was taken to be before any way was left out.
     pub supports: Vec<SupportWeight>,
     /// How far draws read from the response surface are off those solved whole.
     pub checks: Vec<Check>,
@@ -55,6 +55,9 @@ pub struct HeadPrediction {
     pub shares: Shares,
     /// Equilibria that were solved for it, checks apart.
     pub states_solved: usize,
+    /// How the brain is supported in its draws, and how much that counts: a way without an equilibrium is left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub supports: Vec<SupportWeight>,
     /// Points that were asked for.
     pub targets: Vec<TargetPrediction>,
 }

@@ -1,6 +1,6 @@
 //! A patient's unknowns with their priors, and what is assumed beside them.
 
-use super::outcome::{SupportWeight, UnknownOutcome};
+use super::outcome::{Prediction, UnknownOutcome};
 use super::settings::PredictSettings;
 use super::uncertain::{Cause, Uncertain, Uncertainty};
 use crate::experiment::estimate::{LogPrior, Scale, Turn, Unknown, Z_95};
@@ -109,11 +109,11 @@ fn rounded(x: f64) -> f64 {
     (x * 1e4).round() / 1e4 + 0.0
 }
 
-/// What was assumed, a sentence each.
+/// What was assumed, a sentence each; of `found` how the brain was supported is told.
 pub fn assumptions(
     settings: &PredictSettings,
     (own, prior): (&ResectionSettings, &PriorSettings),
-    supports: &[SupportWeight],
+    found: &Prediction,
 ) -> Vec<String> {
     let stiffness = prior.source_of(&settings.tissue_list());
     let mut said = vec![
@@ -133,11 +133,7 @@ pub fn assumptions(
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
-    let words = supports.iter().map(|s| {
-        let what = if s.supports == "sliding" { "slides on the skull" } else { "is held at its base and at the falx" };
-        format!("it {what} (weight {:.0} %)", 100.0 * s.weight)
-    });
-    said.push(format!("How the skull holds the brain: {}.", words.collect::<Vec<_>>().join(", or ")));
+    said.extend(found.supports_in_words());
     said
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
-use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, TargetPlace};
+use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, SupportWeight, TargetPlace};
 use maud::{Markup, html};
 
 /// The section's body.
@@ -129,17 +129,23 @@ fn unknowns(prediction: &Prediction) -> Markup {
             (false, words([u.name.replace('_', " "), number(u.median, 3), format!("{low} to {high}")]))
         })
         .collect();
-    for s in &prediction.supports {
-        rows.push((
-            false,
-            words([
-                format!("supports {}", s.supports),
-                format!("{} %", fixed(100.0 * s.weight, 0)),
-                "\u{2013}".to_owned(),
-            ]),
-        ));
-    }
+    rows.extend(supports(prediction));
     table("What was drawn from", &head, &rows)
+}
+
+/// How the brain was supported in the draws: of every head where they are not alike.
+fn supports(prediction: &Prediction) -> Vec<Row> {
+    let row = |s: &SupportWeight, with: &str| -> Row {
+        let weight = format!("{} %", fixed(100.0 * s.weight, 0));
+        (false, words([format!("supports {}{with}", s.supports), weight, "\u{2013}".to_owned()]))
+    };
+    if let Some(shared) = prediction.shared_supports() {
+        return shared.iter().map(|s| row(s, "")).collect();
+    }
+    let of = |h: &HeadPrediction| -> Vec<Row> {
+        prediction.supports_of(h).iter().map(|s| row(s, &format!(", head {}", h.head))).collect()
+    };
+    prediction.heads.iter().flat_map(of).collect()
 }
 
 fn checks(checks: &[Check]) -> Markup {

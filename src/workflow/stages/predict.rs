@@ -14,6 +14,7 @@ use crate::experiment::predict::{
     Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95,
     forecast, spread, variance_shares,
 };
+use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
 use crate::image::morphology::dilate;
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
@@ -32,7 +33,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -62,23 +63,16 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         let patient = Patient::read(work, input)?;
         let mut produced = Produced::default();
         let weights = settings.predict.weights(&settings.resection);
-        let supports: Vec<SupportWeight> = weights
-            .iter()
-            .map(|(s, weight)| SupportWeight { supports: s.name().to_owned(), weight: *weight })
-            .collect();
+        let weighed = |(s, weight): &(Supports, f64)| SupportWeight { supports: s.name().to_owned(), weight: *weight };
         let mut prediction = Prediction {
             plan: input.plan.clone(),
             threshold_mm: settings.predict.threshold_mm,
             draws: settings.predict.draws,
-            assumptions: assumptions(&settings.predict, (&settings.resection, &settings.prior), &supports),
-            supports,
+            supports: weights.iter().map(weighed).collect(),
             ..Prediction::default()
         };
         let heads = &settings.predict.heads;
         let bodies: Vec<Vec<Posed>> = heads.iter().map(|head| patient.posed(work, head)).collect::<Result<_, _>>()?;
-        // The body with the most unknowns has them all.
-        let most = bodies[0].iter().max_by_key(|posed| posed.uncertainty.list.len());
-        prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
         let forecasts = forecasts(work, &bodies, patient.input.mesh.0.nodes_mm().len());
         for (number, ((head, bodies), forecasts)) in heads.iter().zip(&bodies).zip(forecasts).enumerate() {
             let found = Lying::of(work, &patient, head, (bodies, forecasts), &mut produced)?;
@@ -91,6 +85,12 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
                 carried(work, &field, &mut produced)?;
             }
         }
+        // The drawn body with the most unknowns has them all.
+        let drawn = |posed: &&Posed| prediction.heads.iter().any(|head| head.is_of(&posed.supports));
+        let most = bodies[0].iter().filter(drawn).max_by_key(|posed| posed.uncertainty.list.len());
+        prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
+        prediction.assumptions =
+            assumptions(&settings.predict, (&settings.resection, &settings.prior), &prediction);
         let json = serde_json::to_string_pretty(&prediction).expect("figures are plain data") + "\n";
         produced.files.push((PREDICTION_JSON.to_owned(), json.into_bytes()));
         produced.facts = facts(&prediction);
@@ -268,6 +268,7 @@ struct Lying {
     checks: Vec<Check>,
     shares: crate::experiment::predict::Shares,
     states: usize,
+    supports: Vec<SupportWeight>,
 }
 
 impl Lying {
@@ -304,6 +305,11 @@ impl Lying {
             thinned.iter().map(|(weight, response, unknowns)| (*weight, response, *unknowns)).collect();
         let shares = variance_shares(&models);
         let states = found.iter().map(|(_, f)| f.states).sum();
+        let used = |(posed, _): &(&Posed, Forecast)| SupportWeight {
+            supports: posed.supports.clone(),
+            weight: posed.weight / all,
+        };
+        let supports = found.iter().map(used).collect();
         let (mut draws, mut named, mut told) = (Vec::new(), Vec::new(), Vec::new());
         for (posed, forecast) in found {
             let weight = posed.weight / all / forecast.draws_mm.len() as f64;
@@ -312,7 +318,7 @@ impl Lying {
             told.extend(forecast.check);
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
-        Ok(Self { draws, named, spread, checks: told, shares, states })
+        Ok(Self { draws, named, spread, checks: told, shares, states, supports })
     }
 
     /// The draws as they are kept.
@@ -352,6 +358,7 @@ impl Lying {
             over_threshold_cc: rounded(over.sum()),
             shares: self.shares,
             states_solved: self.states,
+            supports: self.supports.clone(),
             targets: (0..patient.targets.len()).map(|n| self.target(patient, n)).collect(),
         }
     }
