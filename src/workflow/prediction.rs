@@ -14,7 +14,7 @@ use super::user_file::{read_input, shown};
 use super::work::{Made, Place, Work};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::Prediction;
+use crate::experiment::predict::{Prediction, twice};
 use crate::layout::REST_MESH;
 use crate::mesh::format::vtu;
 
@@ -67,6 +67,10 @@ pub(super) fn predict_scan(
     keep_settings(work)?;
     let mut made = Made::default();
     let posed = stages::pose(work, &mut made, scan)?;
+    let heads = twice(&settings.predict.heads, &stages::mni_from_pre(&work.case)?);
+    if let Some((first, second)) = heads {
+        return Err(PredictError::OneHead { first, second }.into());
+    }
     let planned = stages::plan(work, &mut made, scan)?;
     let head = PlannedHead::read(&work.case)?;
     let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;

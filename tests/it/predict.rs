@@ -26,7 +26,7 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
     let points = at("points.csv", b"x,y,z\n1,2,3\n");
     let brains = at("brains.toml", crate::population::of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45]).as_bytes());
     let one_tissue = ["--resection", &mask, "--population", &brains, "--tissues", "1", "--drained", "0.3"];
-    let cases: [(&[&str], &[&str]); 16] = [
+    let cases: [(&[&str], &[&str]); 18] = [
         (
             &["--resection", &mask, "--population", &brains, "--tissues", "2"],
             &["teaches `brain`", "`grey_matter` and `white_matter`", "`tissues = 1`", "--tissues"],
@@ -47,7 +47,9 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         (&["--resection-ellipsoid", "1,2,3,4,5,0"], &["half axes above 0"]),
         (&["--resection-ellipsoid", "9000,0,0,5,5,5"], &["is empty", "--resection"]),
         (&["--resection", &mask, "--head", "0,0,0"], &["`0,0,0`", "supine, prone", "not all 0"]),
-        (&["--resection", &mask, "--head", "left", "--head", "left"], &["`heads`", "none twice"]),
+        (&["--resection", &mask, "--head", "left", "--head", "left"], &["`heads` is [left, left]", "none twice"]),
+        (&["--resection", &mask, "--head", "0,-1,0", "--head", "0,-2,0"], &["`heads`", "none twice"]),
+        (&["--resection", &mask, "--drained", "0"], &["`drained` is 0.0:", "above 0, at most 1"]),
         (&["--resection", &mask, "--drained", "1.5"], &["`drained`", "above 0, at most 1"]),
     ];
     for (n, (more, words)) in cases.into_iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::check::Check;
 use super::cut::Planned;
+use super::heads::HeadComparison;
 use super::shares::Shares;
 use super::uncertain::Cause;
 use schemars::JsonSchema;
@@ -19,6 +20,9 @@ pub struct Prediction {
     pub draws: usize,
     /// Each way of lying; the first is the state `predicted`.
     pub heads: Vec<HeadPrediction>,
+    /// With which head least moves, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<HeadComparison>,
     /// What was not known, and its prior.
     pub unknowns: Vec<UnknownOutcome>,
     /// How the brain may be supported, and how probable that was taken to be before any way was left out.

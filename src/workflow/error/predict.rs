@@ -1,6 +1,6 @@
 //! Why no prediction can be made.
 
-use crate::experiment::predict::{PlannedError, TaughtError};
+use crate::experiment::predict::{Head, PlannedError, TaughtError};
 use crate::mesh::OpenSurface;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -45,6 +45,8 @@ pub enum PredictError {
     BesideScan { plan: String, percent: f64 },
     #[error("{}: the case of one plan, and a folder for several is asked for", folder.display())]
     OnePlan { folder: PathBuf },
+    #[error("the heads {first} and {second} lie in one way: leave one of them out")]
+    OneHead { first: Head, second: Head },
     #[error("{plan} is given twice")]
     Twice { plan: String },
     #[error("{file}: holds no point; give the targets as .csv (x,y,z in mm, RAS+), .fcsv or .mrk.json")]

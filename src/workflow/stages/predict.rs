@@ -10,8 +10,8 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, Forecast, ForecastError, Found, Head, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
-    Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95,
+    Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
+    Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95,
     forecast, spread, variance_shares,
 };
 use crate::experiment::resection::Supports;
@@ -73,6 +73,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         };
         let heads = &settings.predict.heads;
         let bodies: Vec<Vec<Posed>> = heads.iter().map(|head| patient.posed(work, head)).collect::<Result<_, _>>()?;
+        let mut drawn_heads = Vec::new();
         let forecasts = forecasts(work, &bodies, patient.input.mesh.0.nodes_mm().len());
         for (number, ((head, bodies), forecasts)) in heads.iter().zip(&bodies).zip(forecasts).enumerate() {
             let found = Lying::of(work, &patient, head, (bodies, forecasts), &mut produced)?;
@@ -80,11 +81,13 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             prediction.checks.extend(found.checks.iter().cloned());
             prediction.heads.push(found.in_numbers(&patient, head, &state));
             let field = patient.field(&found.spread);
-            patient.files(&state, &found, &field, &mut produced)?;
+            let draws = patient.files(&state, &found, &field, &mut produced)?;
+            drawn_heads.push(HeadDraws { head: head.to_string(), supports: found.supports, draws });
             if number == 0 {
                 carried(work, &field, &mut produced)?;
             }
         }
+        prediction.least = compared_heads(&drawn_heads);
         // The drawn body with the most unknowns has them all.
         let drawn = |posed: &&Posed| prediction.heads.iter().any(|head| head.is_of(&posed.supports));
         let most = bodies[0].iter().filter(drawn).max_by_key(|posed| posed.uncertainty.list.len());
@@ -212,14 +215,14 @@ impl<'a> Patient<'a> {
         shift_field(&state, None, &self.mni_from_pre.inverse(), &self.around, &self.settings.fields)
     }
 
-    /// Fields of one state in the scan's frame, and the state on the mesh.
+    /// Fields of one state in the scan's frame, and the state on the mesh; returns the draws as they are kept.
     fn files(
         &self,
         state: &str,
         found: &Lying,
         field: &ShiftField,
         produced: &mut Produced,
-    ) -> Result<(), WorkflowError> {
+    ) -> Result<Vec<DrawnState>, WorkflowError> {
         let (mesh, spread) = (self.input.mesh.0, &found.spread);
         let pre_from_mni = self.mni_from_pre.inverse();
         let nodes: Vec<[f64; 3]> =
@@ -255,7 +258,7 @@ impl<'a> Patient<'a> {
         if field.changed > 0 {
             produced.warn([Warning::Folds { state: state.to_owned(), voxels: field.changed }]);
         }
-        Ok(())
+        Ok(modes.draws)
     }
 }
 
