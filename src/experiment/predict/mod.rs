@@ -47,6 +47,6 @@ pub use response::{Beside, Coordinates, Response, SolvedState};
 pub use score::{Compared, Coverage, PlaceScore, Scores, crps, energy_score, score_place, scores};
 pub use settings::PredictSettings;
 pub use shares::{Shares, variance_shares};
-pub use spread::{Spread, spread};
+pub use spread::{Spread, farthest, spread};
 pub use taught::TaughtError;
 pub use uncertain::{Cause, Uncertain, Uncertainty};

@@ -51,8 +51,11 @@ pub struct HeadPrediction {
     pub median_mm: f64,
     /// Median over the nodes of its standard deviation (root of the trace of the covariance), mm.
     pub sd_median_mm: f64,
-    /// Largest displacement that 95 % of the draws do not exceed, mm.
+    /// Largest of the nodes' own 95 % reaches, mm: 95 % of the draws move that one node less.
     pub reach95_largest_mm: f64,
+    /// In 95 % of the draws no node moves farther, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub farthest_95_mm: Option<f64>,
     /// Tissue that is expected to move by more than the threshold, cc: probabilities summed over the tissue.
     pub over_threshold_cc: f64,
     /// Which unknown contributes how much to the variance.

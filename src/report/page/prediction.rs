@@ -27,13 +27,15 @@ pub fn in_a_sentence(prediction: &Prediction) -> String {
     let Some(head) = prediction.heads.first() else { return "Nothing was predicted.".to_owned() };
     let [x, y, z] = head.largest_at_mm.map(|v| fixed(v, 0));
     let least = prediction.least.as_ref().map_or_else(String::new, |least| format!(" {}", least.sentence));
+    let no_farther = head.farthest_95_mm.map_or_else(String::new, |mm| {
+        format!("; in 95 of 100 cases no place moves by more than {} mm", number(mm, 2))
+    });
     format!(
-        "With the head {}, taking {} cc lets the brain move by about {} mm at most, at ({x}, {y}, {z}) mm of the scan; in 95 of 100 cases no \
-         place moves by more than {} mm. About {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
+        "With the head {}, taking {} cc lets the brain move by about {} mm at most, at ({x}, {y}, {z}) mm of the scan{no_farther}. About {} \
+         cc of tissue move by more than {} mm. What matters most: {}.{least}",
         head.head,
         number(prediction.plan.resected_cc, 2),
         number(head.largest_mm, 2),
-        number(head.reach95_largest_mm, 2),
         number(head.over_threshold_cc, 2),
         number(prediction.threshold_mm, 2),
         most(&head.shares),
@@ -171,7 +173,8 @@ mod tests {
         let head = |name: &str, cc: f64| HeadPrediction {
             head: name.to_owned(),
             largest_mm: 6.2,
-            reach95_largest_mm: 14.0,
+            reach95_largest_mm: 12.0,
+            farthest_95_mm: Some(14.0),
             over_threshold_cc: cc,
             shares: Shares { load: 0.5, stiffness: 0.2, ..Shares::default() },
             targets: vec![

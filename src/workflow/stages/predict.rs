@@ -12,7 +12,7 @@ use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
     Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
     Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95,
-    forecast, spread, variance_shares,
+    farthest, forecast, spread, variance_shares,
 };
 use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
@@ -358,6 +358,7 @@ impl Lying {
             median_mm: rounded(median(&sizes)),
             sd_median_mm: rounded(median(&self.spread.sd_mm)),
             reach95_largest_mm: rounded(self.spread.reach95_mm.iter().copied().fold(0.0, f64::max)),
+            farthest_95_mm: Some(rounded(farthest(&self.draws, 0.95))),
             over_threshold_cc: rounded(over.sum()),
             shares: self.shares,
             states_solved: self.states,
