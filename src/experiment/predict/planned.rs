@@ -96,11 +96,12 @@ impl PredictSettings {
 }
 
 impl UnknownOutcome {
-    /// The prior of an unknown in its own unit.
+    /// The prior of an unknown in its own unit, as draws have it: no more than all of the fluid drains.
     pub fn of(uncertain: &Uncertain) -> Self {
         let prior = &uncertain.prior;
         let sd = prior.sd.unwrap_or(0.0);
-        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd));
+        let most = if uncertain.levels_mm.is_empty() { f64::INFINITY } else { 1.0 };
+        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd).min(most));
         Self { name: prior.name.clone(), cause: uncertain.cause, median: at(0.0), interval_95: [at(-Z_95), at(Z_95)] }
     }
 }
@@ -164,6 +165,19 @@ mod tests {
         assert_eq!(causes(&settings, Supports::Sliding), [&held[..], &[Room]].concat());
         let drained = PredictSettings { drained: Some(0.3), ..settings };
         assert_eq!(causes(&drained, Supports::Fixed), held);
+    }
+
+    #[test]
+    fn no_more_than_all_of_the_fluid_is_told_to_drain() {
+        for (drained, highest) in [(1.0, 1.0), (0.3, 0.6571)] {
+            let settings = PredictSettings { drained: Some(drained), ..PredictSettings::default() };
+            let own = settings.resection(&ResectionSettings::default(), [0.0, -9.81, 0.0], Supports::Fixed);
+            let found = settings.uncertainty(&own, &PriorSettings::default(), &labels()).unwrap();
+            let told: Vec<UnknownOutcome> = found.list.iter().map(UnknownOutcome::of).collect();
+            let part = told.iter().find(|u| u.name.contains("drained")).unwrap();
+            assert!((part.interval_95[1] - highest).abs() < 1e-3 && part.median == drained, "{part:?}");
+            assert!(told[0].interval_95[1] > 100.0, "a modulus has no such bound");
+        }
     }
 
     #[test]
