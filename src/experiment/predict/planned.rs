@@ -121,8 +121,10 @@ pub fn assumptions(
         "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
             Some(part) => format!(
-                "About {:.0} % of the fluid drains from the top; tissue above its level has its own weight.",
-                100.0 * part
+                "About {:.0} % of the fluid drains from the top, give or take a factor of {:.1} and never more than all; tissue above its \
+                 level has its own weight.",
+                100.0 * part,
+                settings.drained_log_sd.exp()
             ),
             None => format!(
                 "How much fluid drains is not known: the tissue weighs about {:.0} kg/m3 more than what still carries it, give or take a \
@@ -135,11 +137,19 @@ pub fn assumptions(
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
     said.extend(found.supports_in_words());
+    if found.slides() && own.skull.gap_mm > 0.0 {
+        said.push(format!(
+            "Where it slides, the skull stands about {} mm off it, give or take a factor of {:.1}; it pushes back and never pulls.",
+            own.skull.gap_mm,
+            own.skull.gap_log_sd.exp()
+        ));
+    }
     said
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::outcome::SupportWeight;
     use super::*;
     use crate::geometry::Mni;
     use crate::image::Grid;
@@ -178,6 +188,23 @@ mod tests {
             assert!((part.interval_95[1] - highest).abs() < 1e-3 && part.median == drained, "{part:?}");
             assert!(told[0].interval_95[1] > 100.0, "a modulus has no such bound");
         }
+    }
+
+    #[test]
+    fn every_cause_that_is_drawn_has_its_sentence() {
+        let settings = PredictSettings::default();
+        let told = |supports: Supports, settings: &PredictSettings| {
+            let way = SupportWeight { supports: supports.name().to_owned(), weight: 1.0 };
+            let found = Prediction { supports: vec![way], ..Prediction::default() };
+            assumptions(settings, (&ResectionSettings::default(), &PriorSettings::default()), &found).join(" ")
+        };
+        let sliding = told(Supports::Sliding, &settings);
+        for words in ["stiff this brain is", "fluid drains", "within about 10 degrees", "skull stands about", "factor of 1.6"] {
+            assert!(sliding.contains(words), "{words}: {sliding}");
+        }
+        assert!(!told(Supports::Fixed, &settings).contains("skull stands"));
+        let drained = PredictSettings { drained: Some(0.3), ..settings };
+        assert!(told(Supports::Fixed, &drained).contains("30 % of the fluid drains from the top, give or take a factor of 1.5"));
     }
 
     #[test]
