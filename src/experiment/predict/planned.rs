@@ -133,6 +133,9 @@ pub fn assumptions(
                 settings.density_log_sd.exp()
             ),
         },
+        "How much fluid drains, and so how heavy the brain is, is not taken to depend on how much tissue is taken: a small plan has the \
+         same load as a large one."
+            .to_owned(),
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
@@ -199,7 +202,7 @@ mod tests {
             assumptions(settings, (&ResectionSettings::default(), &PriorSettings::default()), &found).join(" ")
         };
         let sliding = told(Supports::Sliding, &settings);
-        for words in ["stiff this brain is", "fluid drains", "within about 10 degrees", "skull stands about", "factor of 1.6"] {
+        for words in ["stiff this brain is", "fluid drains", "depend on how much tissue is taken", "within about 10 degrees", "skull stands about", "factor of 1.6"] {
             assert!(sliding.contains(words), "{words}: {sliding}");
         }
         assert!(!told(Supports::Fixed, &settings).contains("skull stands"));

@@ -31,8 +31,8 @@ pub fn in_a_sentence(prediction: &Prediction) -> String {
         format!("; in 95 of 100 cases no place moves by more than {} mm", number(mm, 2))
     });
     format!(
-        "With the head {}, taking {} cc lets the brain move by about {} mm at most, at ({x}, {y}, {z}) mm of the scan{no_farther}. About {} \
-         cc of tissue move by more than {} mm. What matters most: {}.{least}",
+        "With the head {}, once {} cc are taken and fluid drains, the brain is expected to move by about {} mm at most, at ({x}, {y}, {z}) mm \
+         of the scan{no_farther}. About {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
         head.head,
         number(prediction.plan.resected_cc, 2),
         number(head.largest_mm, 2),
