@@ -11,7 +11,7 @@ use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
-    AskedError, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
+    AskedError, Case, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
     PredictError, SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
 };
 
@@ -197,6 +197,9 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::OtherScan { .. } => {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
         }
+        CaseError::Stale { folder, .. } if is_plan(folder) => {
+            format!("run `hgm predict` on {} again with the settings that are meant (`hgm why` tells what differs)", folder.display())
+        }
         CaseError::Stale { folder, .. } => format!(
             "run `hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate` on {} again with the settings that are meant (`hgm why` \
              tells what differs)",
@@ -206,6 +209,10 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::NothingResected { .. } => "leave --before-resection out".to_owned(),
         CaseError::NoField { .. } | CaseError::NoStage { .. } | CaseError::Unreadable { .. } => return None,
     })
+}
+
+fn is_plan(folder: &std::path::Path) -> bool {
+    Case::open(folder).is_ok_and(|case| case.subject() == Some(Subject::Plan))
 }
 
 fn of_dataset(error: &DatasetError) -> Option<String> {

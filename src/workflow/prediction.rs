@@ -7,10 +7,11 @@ use super::outcome::{finish, keep_settings};
 use super::plan::{Goal, plan};
 use super::planned_scan::{PlanInputs, PlannedScan};
 use super::progress::Progress;
+use super::put_back::Before;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::stages::{self, PlannedHead, PredictInput};
-use super::user_file::{read_input, shown};
+use super::targets::Targets;
 use super::work::{Made, Place, Work};
 use crate::artefact::Manifest;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
@@ -46,24 +47,30 @@ pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
     Ok(())
 }
 
-/// A file of targets by its name, with its bytes.
-pub(super) type TargetsFile = (String, Vec<u8>);
-
-/// The file of targets, where one was given.
-pub(super) fn targets_of(inputs: &PlanInputs) -> Result<Option<TargetsFile>, WorkflowError> {
-    let Some(path) = &inputs.targets else { return Ok(None) };
-    Ok(Some((shown(path), read_input(path)?)))
+/// The points that are asked for, where a file was given.
+pub(super) fn targets_of(inputs: &PlanInputs) -> Result<Option<Targets>, WorkflowError> {
+    inputs.targets.as_deref().map(Targets::read).transpose()
 }
 
-/// Every stage of one plan, then outcome and page.
+/// One plan in its folder; where it is refused the folder is of the settings that it had.
 pub(super) fn predict_scan(
     work: &Work<'_>,
     scan: &PlannedScan,
-    targets: Option<&TargetsFile>,
+    targets: Option<&Targets>,
 ) -> Result<(Case, Prediction), WorkflowError> {
-    let settings = work.settings;
     work.hold(true)?;
     check_scan(work, &scan.sum)?;
+    let before = Before::of(&work.case);
+    every_stage(work, scan, targets).inspect_err(|error| before.put_back(error))
+}
+
+/// Every stage of one plan, then outcome and page.
+fn every_stage(
+    work: &Work<'_>,
+    scan: &PlannedScan,
+    targets: Option<&Targets>,
+) -> Result<(Case, Prediction), WorkflowError> {
+    let settings = work.settings;
     keep_settings(work)?;
     let mut made = Made::default();
     let posed = stages::pose(work, &mut made, scan)?;
@@ -71,13 +78,12 @@ pub(super) fn predict_scan(
     if let Some((first, second)) = heads {
         return Err(PredictError::OneHead { first, second }.into());
     }
-    let planned = stages::plan(work, &mut made, scan)?;
+    let planned = stages::plan(work, &mut made, scan, targets)?;
     let head = PlannedHead::read(&work.case)?;
     let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;
     work.case.drop_stale();
     let bytes = work.case.read(REST_MESH)?;
     let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;
-    let targets = targets.map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
     let prediction = stages::predict(work, &mut made, &input)?;
     let steps = plan(settings, Subject::Plan, Goal::Predict)?;

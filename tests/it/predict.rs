@@ -160,8 +160,10 @@ fn refuses_in_the_case(case: &Path, folder: &Path) {
         assert_eq!(ended.status.code(), Some(3), "{more:?}: {said}");
         assert!(words.iter().all(|w| said.contains(w)), "{more:?}: {said}");
     }
-    let prediction = "sim/prediction.json";
-    assert!(contents(case)[prediction] == kept[prediction], "a refused plan leaves the prediction as it was");
+    assert!(contents(case) == kept, "a refused plan leaves the case as it was, its settings too");
+    let fresh = folder.join("fresh");
+    let ended = planned(&fresh, &["--resection", &mask, "--targets", &far, "--head", "left"]);
+    assert!(ended.status.code() == Some(3) && !fresh.exists(), "a refused plan leaves no folder");
     let estimate = output(&["estimate", case.to_str().unwrap()]);
     let said = String::from_utf8_lossy(&estimate.stderr).into_owned();
     assert!(estimate.status.code() == Some(3) && said.contains("before an operation"), "{said}");

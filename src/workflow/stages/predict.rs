@@ -16,7 +16,6 @@ use crate::experiment::predict::{
 };
 use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
-use crate::image::morphology::dilate;
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
 use crate::layout::{
     NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
@@ -24,9 +23,9 @@ use crate::layout::{
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
-use crate::overlay::Drawing;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::stage_name::StageName;
+use crate::workflow::targets::Targets;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Vector3;
@@ -37,8 +36,6 @@ const VERSION: u32 = 10;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
-/// A target may lie this far outside the brain mask, in fluid or in a membrane, mm.
-const BESIDE_MM: f64 = 10.0;
 
 /// What a prediction needs of its case.
 pub(crate) struct PredictInput<'a> {
@@ -46,8 +43,8 @@ pub(crate) struct PredictInput<'a> {
     pub mesh: (&'a TetMesh, &'a [u8], &'a MeshOutcome),
     /// What is to be taken.
     pub plan: &'a Planned,
-    /// The file of targets by its name, with its bytes.
-    pub targets: Option<(&'a str, &'a [u8])>,
+    /// The points that are asked for, all in the head.
+    pub targets: Option<&'a Targets>,
 }
 
 /// Makes (or skips) the prediction.
@@ -58,7 +55,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         "element": settings.estimate.element, "fields": settings.fields,
     });
     let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Pre::NAME);
-    let stage = input.targets.iter().fold(stage, |stage, (_, bytes)| stage.input("targets", bytes));
+    let stage = input.targets.iter().fold(stage, |stage, targets| stage.input("targets", &targets.bytes));
     work.run(made, &NAME, &stage, || {
         let patient = Patient::read(work, input)?;
         let mut produced = Produced::default();
@@ -155,34 +152,23 @@ impl<'a> Patient<'a> {
         };
         let head = PlannedHead::read(case)?;
         let mut patient = Self { input, head, mni_from_pre, around, targets: Vec::new(), settings: work.settings };
-        if let Some((name, bytes)) = input.targets {
-            patient.targets = patient.targets_of(name, bytes)?;
-        }
+        patient.targets = input.targets.map_or_else(Vec::new, |targets| patient.targets_of(targets));
         Ok(patient)
     }
 
-    /// Finds every target in the mesh; one outside the head is refused.
-    fn targets_of(&self, name: &str, bytes: &[u8]) -> Result<Vec<Target>, WorkflowError> {
-        let drawing = Drawing::decode(bytes, name)?;
-        let file = || name.to_owned();
-        if drawing.points_mm.is_empty() {
-            return Err(PredictError::NoTarget { file: file() }.into());
-        }
-        let head = dilate(&self.around.brain, BESIDE_MM);
-        let of = |(n, x): (usize, &[f64; 3])| -> Result<Target, WorkflowError> {
+    /// Finds every target in the mesh.
+    fn targets_of(&self, targets: &Targets) -> Vec<Target> {
+        let of = |x: &[f64; 3]| {
             let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
-            if head.nearest(p) != Some(true) {
-                return Err(PredictError::TargetOutside { file: file(), target: n + 1, at_mm: *x }.into());
-            }
             let found = Locator(self.input.mesh.0).find(self.mni_from_pre.apply(p).mm.into());
             let place = match self.around.resected.nearest(p) {
                 Some(true) => TargetPlace::Removed,
                 _ if found.outside_mm > 0.0 => TargetPlace::Fluid,
                 _ => TargetPlace::Tissue,
             };
-            Ok(Target { at_mm: *x, place, found })
+            Target { at_mm: *x, place, found }
         };
-        drawing.points_mm.iter().enumerate().map(of).collect()
+        targets.points_mm.iter().map(of).collect()
     }
 
     /// The body as each way of supporting it poses it, for one head.
