@@ -13,10 +13,10 @@ use super::stage_name::{StageName, Subject};
 use super::stages::{self, PlannedHead, PredictInput};
 use super::targets::Targets;
 use super::work::{Made, Place, Work};
-use crate::artefact::Manifest;
+use crate::artefact::{Manifest, sha256_hex};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::{Prediction, twice};
-use crate::layout::REST_MESH;
+use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
+use crate::layout::{EVALUATION_JSON, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
 
 /// How the brain of a pre-operative scan will move when the planned tissue is taken, with its spread. Registration of the
@@ -86,6 +86,7 @@ fn every_stage(
     let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;
     let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
     let prediction = stages::predict(work, &mut made, &input)?;
+    drop_other_evaluation(&work.case)?;
     let steps = plan(settings, Subject::Plan, Goal::Predict)?;
     let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
     let outcome = ExperimentOutcome {
@@ -102,6 +103,17 @@ fn every_stage(
     Ok((work.case.clone(), prediction))
 }
 
+/// Takes away what was found of an earlier prediction in this folder.
+fn drop_other_evaluation(case: &Case) -> Result<(), WorkflowError> {
+    let Ok(text) = case.read_text(EVALUATION_JSON) else { return Ok(()) };
+    let sum = sha256_hex(&case.read(PREDICTION_JSON)?);
+    let of_this = serde_json::from_str(&text).is_ok_and(|found: PredictionEvaluation| found.prediction_sha256 == sum);
+    if !of_this {
+        std::fs::remove_file(case.path(EVALUATION_JSON)).ok();
+    }
+    Ok(())
+}
+
 /// Another scan is another patient's, unless it is meant.
 fn check_scan(work: &Work<'_>, sum: &String) -> Result<(), WorkflowError> {
     let recorded = Manifest::of_stage(work.case.folder(), &StageName::Pose.to_string());
@@ -109,4 +121,27 @@ fn check_scan(work: &Work<'_>, sum: &String) -> Result<(), WorkflowError> {
         return Err(CaseError::OtherScan { folder: work.case.folder().to_path_buf(), which: "pre-operative" }.into());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_evaluation_stays_with_its_prediction_and_goes_with_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = Case::at(folder.path());
+        for file in [PREDICTION_JSON, EVALUATION_JSON, ".stages/pose.manifest.json"] {
+            std::fs::create_dir_all(case.path(file).parent().unwrap()).unwrap();
+            std::fs::write(case.path(file), "{}").unwrap();
+        }
+        let sum = sha256_hex(&case.read(PREDICTION_JSON).unwrap());
+        let evaluation = PredictionEvaluation { prediction_sha256: sum, ..PredictionEvaluation::default() };
+        std::fs::write(case.path(EVALUATION_JSON), serde_json::to_string(&evaluation).unwrap()).unwrap();
+        drop_other_evaluation(&case).unwrap();
+        assert!(case.path(EVALUATION_JSON).exists());
+        std::fs::write(case.path(PREDICTION_JSON), "{ }").unwrap();
+        drop_other_evaluation(&case).unwrap();
+        assert!(!case.path(EVALUATION_JSON).exists());
+    }
 }
