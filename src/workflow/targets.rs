@@ -19,6 +19,8 @@ pub(crate) struct Targets {
     pub bytes: Vec<u8>,
     /// Places in the scanner's frame, mm.
     pub points_mm: Vec<[f64; 3]>,
+    /// What each is called there, where that is more than its number.
+    pub names: Vec<Option<String>>,
 }
 
 impl Targets {
@@ -29,7 +31,8 @@ impl Targets {
         if drawing.points_mm.is_empty() {
             return Err(PredictError::NoTarget { file }.into());
         }
-        Ok(Self { file, bytes, points_mm: drawing.points_mm })
+        let names = (0..drawing.points_mm.len()).map(|n| name_of(&drawing, n)).collect();
+        Ok(Self { file, bytes, points_mm: drawing.points_mm, names })
     }
 
     /// Refuses a point outside the head. Labels alone tell, so nothing needs to be meshed or written before.
@@ -43,6 +46,13 @@ impl Targets {
             }),
         }
     }
+}
+
+/// A point's name in one line, without what is no letter to a terminal.
+fn name_of(drawing: &Drawing, number: usize) -> Option<String> {
+    let name = drawing.names.get(number)?.replace(char::is_control, " ");
+    let name = name.trim();
+    (!name.is_empty() && name != (number + 1).to_string()).then(|| name.to_owned())
 }
 
 /// Whether the brain has a voxel near a point.
@@ -68,6 +78,22 @@ fn is_near(brain: &Mask<Pre>, x: [f64; 3]) -> bool {
 mod tests {
     use super::*;
     use crate::image::Grid;
+
+    #[test]
+    fn a_target_has_the_name_of_its_file_in_one_line_and_a_number_is_none() {
+        let of = |text: &str, file: &str| {
+            let drawing = Drawing::decode(text.as_bytes(), file).unwrap();
+            (0..drawing.points_mm.len()).map(|n| name_of(&drawing, n)).collect::<Vec<_>>()
+        };
+        let some = |name: &str| Some(name.to_owned());
+        assert_eq!(of("name,x,y,z\n\"STN, left\",1,2,3\n\u{1b}Vim,1,2,3\n", "t.csv"), [some("STN, left"), some("Vim")]);
+        assert_eq!(of("x,y,z\n1,2,3\n", "t.csv"), [None]);
+        assert_eq!(of("1,-12,-20,-5,0,0,0,1,1,1,0,\"STN, L\",,\n", "t.fcsv"), [some("STN, L")]);
+        let point = |label: &str, more: &str| format!("{{\"label\": \"{label}\", \"position\": [1, 2, 3]{more}}}");
+        let (placed, not) = (point("STN", ""), point("next", ", \"positionStatus\": \"undefined\""));
+        let text = format!("{{\"markups\": [{{\"controlPoints\": [{not}, {placed}]}}]}}");
+        assert_eq!(of(&text, "t.mrk.json"), [some("STN")]);
+    }
 
     #[test]
     fn a_target_lies_in_the_head_or_a_centimetre_beside_the_brain() {

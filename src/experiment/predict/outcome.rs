@@ -99,6 +99,9 @@ impl TargetPlace {
 pub struct TargetPrediction {
     /// Its number in the file, from 1.
     pub target: usize,
+    /// Its name there, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Where it lies.
     pub place: TargetPlace,
     /// Where it is, mm.
@@ -115,6 +118,13 @@ pub struct TargetPrediction {
     pub axes: [[f64; 3]; 3],
     /// Probability of moving more than the threshold.
     pub over_threshold: f64,
+}
+
+impl TargetPrediction {
+    /// What it is called to a reader: its number, and its name where it has one.
+    pub fn called(&self) -> String {
+        self.name.as_ref().map_or_else(|| self.target.to_string(), |name| format!("{} {name}", self.target))
+    }
 }
 
 /// An unknown with its prior.

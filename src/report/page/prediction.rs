@@ -113,7 +113,7 @@ fn targets(prediction: &Prediction, head: &HeadPrediction) -> Markup {
                     format!("{} %", fixed(100.0 * t.over_threshold, 0)),
                 ]
             };
-            (false, words([t.target.to_string(), t.place.name().to_owned()].into_iter().chain(cells)))
+            (false, words([t.called(), t.place.name().to_owned()].into_iter().chain(cells)))
         })
         .collect();
     html! { (table(&format!("Targets, head {}", head.head), &columns, &rows)) }
@@ -178,7 +178,13 @@ mod tests {
             over_threshold_cc: cc,
             shares: Shares { load: 0.5, stiffness: 0.2, ..Shares::default() },
             targets: vec![
-                TargetPrediction { target: 1, shift_mm: 3.25, over_threshold: 0.8, ..TargetPrediction::default() },
+                TargetPrediction {
+                    target: 1,
+                    name: Some("STN <left>".to_owned()),
+                    shift_mm: 3.25,
+                    over_threshold: 0.8,
+                    ..TargetPrediction::default()
+                },
                 TargetPrediction {
                     target: 2,
                     place: TargetPlace::Removed,
@@ -210,6 +216,7 @@ mod tests {
     fn targets_have_their_row_and_of_removed_ones_nothing_is_said() {
         let page = section(&prediction(), None).into_string();
         assert!(page.contains("3.2") && page.contains("80 %") && page.contains("removed") && !page.contains("77"));
+        assert!(page.contains("1 STN &lt;left&gt;"));
         assert!(page.contains("&lt;else&gt;") && page.contains("Research software"));
     }
 }

@@ -126,6 +126,7 @@ fn forecasts(work: &Work<'_>, bodies: &[Vec<Posed>], nodes: usize) -> Vec<Vec<Re
 
 /// A target in both frames.
 struct Target {
+    name: Option<String>,
     at_mm: [f64; 3],
     place: TargetPlace,
     found: Found,
@@ -158,7 +159,7 @@ impl<'a> Patient<'a> {
 
     /// Finds every target in the mesh.
     fn targets_of(&self, targets: &Targets) -> Vec<Target> {
-        let of = |x: &[f64; 3]| {
+        let of = |(x, name): (&[f64; 3], &Option<String>)| {
             let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
             let found = Locator(self.input.mesh.0).find(self.mni_from_pre.apply(p).mm.into());
             let place = match self.around.resected.nearest(p) {
@@ -166,9 +167,9 @@ impl<'a> Patient<'a> {
                 _ if found.outside_mm > 0.0 => TargetPlace::Fluid,
                 _ => TargetPlace::Tissue,
             };
-            Target { at_mm: *x, place, found }
+            Target { name: name.clone(), at_mm: *x, place, found }
         };
-        targets.points_mm.iter().map(of).collect()
+        targets.points_mm.iter().zip(&targets.names).map(of).collect()
     }
 
     /// The body as each way of supporting it poses it, for one head.
@@ -354,9 +355,14 @@ impl Lying {
     }
 
     fn target(&self, patient: &Patient<'_>, number: usize) -> TargetPrediction {
-        let Target { at_mm, place, found } = &patient.targets[number];
-        let mut told =
-            TargetPrediction { target: number + 1, place: *place, at_mm: *at_mm, ..TargetPrediction::default() };
+        let Target { name, at_mm, place, found } = &patient.targets[number];
+        let mut told = TargetPrediction {
+            target: number + 1,
+            name: name.clone(),
+            place: *place,
+            at_mm: *at_mm,
+            ..TargetPrediction::default()
+        };
         if *place == TargetPlace::Removed {
             told.expected_mm = *at_mm;
             return told;
