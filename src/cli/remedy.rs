@@ -90,7 +90,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => "see --tissues and --population",
         WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => "see --population and --drained",
         WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",
-        WorkflowError::Predict(PredictError::OnePlan { .. }) => "name another folder (-o)",
+        WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => "name another folder (-o)",
         WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
         WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
         WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {

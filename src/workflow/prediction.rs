@@ -16,7 +16,7 @@ use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, sha256_hex};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
-use crate::layout::{EVALUATION_JSON, PREDICTION_JSON, REST_MESH};
+use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
 
 /// How the brain of a pre-operative scan will move when the planned tissue is taken, with its spread. Registration of the
@@ -30,6 +30,9 @@ pub fn predict(
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<(Case, Prediction), WorkflowError> {
+    if place.folder.join(PLANS_JSON).exists() || place.folder.join(PLAN_CASE.of("1")).is_dir() {
+        return Err(PredictError::SeveralPlans { folder: place.folder.clone() }.into());
+    }
     let work = Work::new(place, Subject::Plan, settings, progress);
     can_be_done(&work)?;
     let scan = PlannedScan::read(inputs, &work)?;

@@ -60,6 +60,13 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         assert!(words.iter().all(|w| said.contains(w)) && said.trim().lines().count() == 1, "{more:?}: {said}");
         assert!(!case.exists(), "{more:?} left something behind");
     }
+    // A folder of several plans is no case of one.
+    let plans = folder.path().join("plans");
+    std::fs::create_dir_all(plans.join("plan-1")).unwrap();
+    let ended = planned(&plans, &["--resection", &mask]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(3) && said.contains("several plans") && said.contains("-o"), "{said}");
+    assert_eq!(contents(&plans).len(), 0);
     let none = planned(&folder.path().join("none"), &[]);
     assert_eq!(none.status.code(), Some(2));
     let unmapped = planned(&folder.path().join("none"), &["--resection-label", "7"]);

@@ -45,6 +45,8 @@ pub enum PredictError {
     BesideScan { plan: String, percent: f64 },
     #[error("{}: the case of one plan, and a folder for several is asked for", folder.display())]
     OnePlan { folder: PathBuf },
+    #[error("{}: the folder of several plans, and one is given", folder.display())]
+    SeveralPlans { folder: PathBuf },
     #[error("the heads {first} and {second} lie in one way: leave one of them out")]
     OneHead { first: Head, second: Head },
     #[error("{plan} is given twice")]
