@@ -7,6 +7,7 @@ use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
 use crate::live::ReplayError;
 use crate::mesh::engine::EngineError;
+use crate::resect::PairError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
@@ -75,6 +76,10 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         }
         WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
         WorkflowError::Labels(_) => "see --labels",
+        // A scan alone may have been given.
+        WorkflowError::Pair(PairError::Head { .. }) => {
+            "--brain-mask takes a mask of your own, --dseg a label map, --pose a pose"
+        }
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
@@ -83,6 +88,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             | PredictError::NoPlan
             | PredictError::Ellipsoid { .. }
             | PredictError::NoSurface { .. }
+            | PredictError::OtherSurface { .. }
             | PredictError::OpenSurface { .. }
             | PredictError::NoVoxel { .. }
             | PredictError::BesideScan { .. },

@@ -106,7 +106,8 @@ pub(crate) fn plan(
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
-        let found = planned(&scan.plan, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
+        let drawn_mm3 = scan.resection.count() as f64 * scan.resection.grid.voxel_volume_mm3();
+        let found = planned(&scan.plan, drawn_mm3, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
         targets.map_or(Ok(()), |targets| targets.check_inside(&before.brain))?;
         let mut produced = Produced::default();
         produced.warn(&scan.plan_warnings);
