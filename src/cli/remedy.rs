@@ -93,10 +93,16 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             | PredictError::NoVoxel { .. }
             | PredictError::BesideScan { .. },
         ) => "see --resection and --resection-ellipsoid",
-        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => "see --tissues and --population",
-        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => "see --population and --drained",
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
+            "see --tissues and --population"
+        }
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => {
+            "see --population and --drained"
+        }
         WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",
-        WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => "name another folder (-o)",
+        WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => {
+            "name another folder (-o)"
+        }
         WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
         WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
         WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {
@@ -204,7 +210,10 @@ fn of_case(error: &CaseError) -> Option<String> {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
         }
         CaseError::Stale { folder, .. } if is_plan(folder) => {
-            format!("run `hgm predict` on {} again with the settings that are meant (`hgm why` tells what differs)", folder.display())
+            format!(
+                "run `hgm predict` on {} again with the settings that are meant (`hgm why` tells what differs)",
+                folder.display()
+            )
         }
         CaseError::Stale { folder, .. } => format!(
             "run `hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate` on {} again with the settings that are meant (`hgm why` \

@@ -28,7 +28,8 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let is_number = |cell: &String| cell.parse::<f64>().is_ok();
     let numbers = first.iter().filter(|cell| is_number(cell)).count();
     let (header, columns) = if numbers > 3 {
-        let problem = format!("{numbers} columns of numbers and no header: say above them which are x, y and z (mm, RAS)");
+        let problem =
+            format!("{numbers} columns of numbers and no header: say above them which are x, y and z (mm, RAS)");
         return Err(damaged(name, "the first row", problem));
     } else if numbers == 3 {
         let places: Vec<usize> = (0..first.len()).filter(|&c| is_number(&first[c])).collect();
@@ -65,11 +66,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
 /// Spreadsheets of half the world write semicolons, because their commas are decimal marks.
 fn refuse_other_separator(bytes: &[u8], name: &str) -> Result<(), OverlayError> {
     let text = String::from_utf8_lossy(bytes);
-    let first = text.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    let first =
+        text.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
     let Some(first) = first else { return Ok(()) };
     let tells = |cell: &str| {
         let cell = cell.trim().to_lowercase();
-        ["x", "y", "z", "x_mm", "y_mm", "z_mm"].contains(&cell.as_str()) || cell.replace(',', ".").parse::<f64>().is_ok()
+        ["x", "y", "z", "x_mm", "y_mm", "z_mm"].contains(&cell.as_str())
+            || cell.replace(',', ".").parse::<f64>().is_ok()
     };
     let telling = |mark: char| first.split(mark).filter(|cell| tells(cell)).count();
     let other = [(';', "semicolons"), ('\t', "tabs")].into_iter().find(|(mark, _)| telling(*mark) >= 3);

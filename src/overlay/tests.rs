@@ -71,7 +71,11 @@ fn a_damaged_file_is_refused_with_its_place() {
         let said = refuse(text.as_bytes(), "a.csv");
         assert!(said.contains("4 columns of numbers and no header") && said.contains("x, y and z"), "{said}");
     }
-    for (text, marks) in [("name;x;y;z\nSTN;-12,0;-20,5;-5\n", "semicolons"), ("1,5;2;3,5\n", "semicolons"), ("x\ty\tz\n1\t2\t3\n", "tabs")] {
+    for (text, marks) in [
+        ("name;x;y;z\nSTN;-12,0;-20,5;-5\n", "semicolons"),
+        ("1,5;2;3,5\n", "semicolons"),
+        ("x\ty\tz\n1\t2\t3\n", "tabs"),
+    ] {
         let said = refuse(text.as_bytes(), "a.csv");
         assert!(said.contains(marks) && said.contains("by commas"), "{said}");
     }

@@ -39,11 +39,9 @@ impl Targets {
     pub fn check_inside(&self, brain: &Mask<Pre>) -> Result<(), PredictError> {
         match self.points_mm.iter().position(|x| !is_near(brain, *x)) {
             None => Ok(()),
-            Some(n) => Err(PredictError::TargetOutside {
-                file: self.file.clone(),
-                target: n + 1,
-                at_mm: self.points_mm[n],
-            }),
+            Some(n) => {
+                Err(PredictError::TargetOutside { file: self.file.clone(), target: n + 1, at_mm: self.points_mm[n] })
+            }
         }
     }
 }
@@ -69,9 +67,7 @@ fn is_near(brain: &Mask<Pre>, x: [f64; 3]) -> bool {
     };
     let [xs, ys, zs] = [0, 1, 2].map(around);
     let near = |voxel: [usize; 3]| (grid.centre(voxel).mm - p.mm).norm() <= BESIDE_MM;
-    xs.into_iter().any(|i| {
-        ys.clone().any(|j| zs.clone().any(|k| brain.data[grid.index(i, j, k)] && near([i, j, k])))
-    })
+    xs.into_iter().any(|i| ys.clone().any(|j| zs.clone().any(|k| brain.data[grid.index(i, j, k)] && near([i, j, k]))))
 }
 
 #[cfg(test)]

@@ -32,7 +32,9 @@ pub use check::{Check, checked};
 pub use cut::{Planned, PlannedError, ellipsoid_mask, planned};
 pub use draws_table::{DrawsTableError, draws_from_csv, draws_to_csv, mode_name};
 pub use ellipsoid::{Ellipsoid, Scatter, ellipsoid_95};
-pub use evaluation::{EvaluationLimit, HeadEvaluation, LandmarkForecast, PredictionEvaluation, TakenAgainstPlan};
+pub use evaluation::{
+    EvaluationLimit, HeadEvaluation, LandmarkForecast, OtherWayRound, PredictionEvaluation, TakenAgainstPlan,
+};
 pub use forecast::{Forecast, ForecastError, Posed, forecast};
 pub use head::{Head, HeadParseError, same_way, twice};
 pub use heads::{HeadComparison, HeadDraws, compared_heads};

@@ -202,12 +202,22 @@ mod tests {
             assumptions(settings, (&ResectionSettings::default(), &PriorSettings::default()), &found).join(" ")
         };
         let sliding = told(Supports::Sliding, &settings);
-        for words in ["stiff this brain is", "fluid drains", "depend on how much tissue is taken", "within about 10 degrees", "skull stands about", "factor of 1.6"] {
+        for words in [
+            "stiff this brain is",
+            "fluid drains",
+            "depend on how much tissue is taken",
+            "within about 10 degrees",
+            "skull stands about",
+            "factor of 1.6",
+        ] {
             assert!(sliding.contains(words), "{words}: {sliding}");
         }
         assert!(!told(Supports::Fixed, &settings).contains("skull stands"));
         let drained = PredictSettings { drained: Some(0.3), ..settings };
-        assert!(told(Supports::Fixed, &drained).contains("30 % of the fluid drains from the top, give or take a factor of 1.5"));
+        assert!(
+            told(Supports::Fixed, &drained)
+                .contains("30 % of the fluid drains from the top, give or take a factor of 1.5")
+        );
     }
 
     #[test]

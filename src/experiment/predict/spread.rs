@@ -102,7 +102,8 @@ mod tests {
     #[test]
     fn no_place_goes_beyond_the_farthest_though_every_one_of_many_seldom_does() {
         // Each of ten nodes goes far in a tenth of the draws of its own: alone it reaches 9 mm, and in every draw one does.
-        let draw = |n: usize| (0..10).map(|node| [if node == n % 10 { 9.0 + n as f64 } else { 1.0 }, 0.0, 0.0]).collect();
+        let draw =
+            |n: usize| (0..10).map(|node| [if node == n % 10 { 9.0 + n as f64 } else { 1.0 }, 0.0, 0.0]).collect();
         let draws: Vec<(f64, Vec<[f64; 3]>)> = (0..40).map(|n| (1.0, draw(n))).collect();
         let nodes = spread(&draws, 10, 2.0).reach95_mm.into_iter().fold(0.0, f64::max);
         assert_eq!(farthest(&draws, 0.95), 9.0 + 37.0);

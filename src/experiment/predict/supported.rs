@@ -20,7 +20,11 @@ impl Prediction {
         let of = |with: String, used: &[SupportWeight]| {
             let ways = used.iter().map(in_words).collect::<Vec<_>>().join(", or ");
             let left_out = used.len() < self.supports.len();
-            let rest = if left_out { " Held otherwise it finds no equilibrium under these loads; that is left out." } else { "" };
+            let rest = if left_out {
+                " Held otherwise it finds no equilibrium under these loads; that is left out."
+            } else {
+                ""
+            };
             format!("How the skull holds the brain{with}: {ways}.{rest}")
         };
         match self.shared_supports() {
@@ -81,7 +85,10 @@ mod tests {
         let lost = said(&[("supine", held)]);
         assert!(lost.len() == 1 && lost[0].contains("100 %") && lost[0].contains("left out"), "{lost:?}");
         let unlike = said(&[("supine", both), ("left", held)]);
-        assert!(unlike.len() == 2 && unlike[0].contains("50 %") && unlike[1].contains("head left: it is held"), "{unlike:?}");
+        assert!(
+            unlike.len() == 2 && unlike[0].contains("50 %") && unlike[1].contains("head left: it is held"),
+            "{unlike:?}"
+        );
         assert!(predicted(&[("supine", both), ("left", held)]).slides() && !predicted(&[("left", held)]).slides());
         assert!(said(&[("supine", &[])])[0].contains("50 %"), "an earlier version's head says nothing of its own");
     }

@@ -82,7 +82,8 @@ mod tests {
     fn taught(names: &[&str]) -> PriorSettings {
         let learnt = |name: &&str| LearntPrior { name: format!("{MODULUS}{name}"), log_mean: 6.3, log_sd: 0.2 };
         let parameters = names.iter().map(learnt).collect();
-        let population = PopulationPrior { density_kg_per_m3: 100.0, patients: 8, parameters, ..PopulationPrior::none() };
+        let population =
+            PopulationPrior { density_kg_per_m3: 100.0, patients: 8, parameters, ..PopulationPrior::none() };
         PriorSettings { population: Some(population), ..PriorSettings::default() }
     }
 
@@ -100,7 +101,10 @@ mod tests {
             assert!(said.contains(words), "{said}");
         }
         assert!(refused(&one, &["grey_matter", "white_matter"]).unwrap().contains("`tissues = 2`"));
-        assert_eq!((refused(&one, &["brain"]), refused(&two, &["grey_matter"]), refused(&two, &[])), (None, None, None));
+        assert_eq!(
+            (refused(&one, &["brain"]), refused(&two, &["grey_matter"]), refused(&two, &[])),
+            (None, None, None)
+        );
         let of = |names: &[&str]| taught(names).source_of(&two.tissue_list());
         assert!(!of(&[]).contains("cohort") && !of(&["grey_matter", "white_matter"]).contains("studies"));
         assert!(of(&["grey_matter"]).contains("cohort have shown (grey matter) and what published studies"));

@@ -206,8 +206,7 @@ mod tests {
     #[test]
     fn the_headline_says_how_far_how_sure_what_matters_and_whether_a_head_moves_least() {
         let said = in_a_sentence(&prediction());
-        for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."]
-        {
+        for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."] {
             assert!(said.contains(words), "{words}: {said}");
         }
     }

@@ -29,7 +29,9 @@ pub enum PredictError {
         "{file}: a drawing without triangles: give a surface (.stl, .surf.gii, .ply), or a mask in the scan's grid (.nii, .nii.gz)"
     )]
     NoSurface { file: String },
-    #[error("{file}: surfaces of this kind are not read: save it as .stl, .ply or .surf.gii (mm, RAS+), or give a mask (.nii, .nii.gz)")]
+    #[error(
+        "{file}: surfaces of this kind are not read: save it as .stl, .ply or .surf.gii (mm, RAS+), or give a mask (.nii, .nii.gz)"
+    )]
     OtherSurface { file: String },
     #[error(
         "{file}: {source}; close it (3D Slicer: Surface Toolbox, Fill Holes; MeshLab: Close Holes), or give a mask"

@@ -26,8 +26,8 @@ use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
 use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::{StageName, Subject};
-use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::targets::Targets;
+use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 

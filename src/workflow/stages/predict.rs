@@ -10,9 +10,9 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
-    Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95,
-    farthest, forecast, spread, variance_shares,
+    Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED,
+    Planned, Posed, Prediction, Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions,
+    compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast, spread, variance_shares,
 };
 use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
@@ -89,8 +89,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         let drawn = |posed: &&Posed| prediction.heads.iter().any(|head| head.is_of(&posed.supports));
         let most = bodies[0].iter().filter(drawn).max_by_key(|posed| posed.uncertainty.list.len());
         prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
-        prediction.assumptions =
-            assumptions(&settings.predict, (&settings.resection, &settings.prior), &prediction);
+        prediction.assumptions = assumptions(&settings.predict, (&settings.resection, &settings.prior), &prediction);
         let json = serde_json::to_string_pretty(&prediction).expect("figures are plain data") + "\n";
         produced.files.push((PREDICTION_JSON.to_owned(), json.into_bytes()));
         produced.facts = facts(&prediction);
