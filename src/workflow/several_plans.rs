@@ -53,7 +53,9 @@ pub fn predict_plans(
             std::fs::remove_dir(&place.folder).ok();
         })?;
         // A comparison of before says nothing of what is made now.
-        [PLANS_JSON, PLANS_PAGE].map(|file| std::fs::remove_file(place.folder.join(file)).ok());
+        for file in [PLANS_JSON, PLANS_PAGE] {
+            std::fs::remove_file(place.folder.join(file)).ok();
+        }
         done.push((name, case, prediction));
     }
     let comparison = compared(&plans, &done, settings.predict.threshold_mm)?;

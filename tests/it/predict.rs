@@ -25,7 +25,8 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
     let (open, far) = (at("open.stl", &triangles(3, 0.0)), at("far.stl", &triangles(4, 4000.0)));
     let other = at("shape.vtp", b"<VTKFile/>");
     let points = at("points.csv", b"x,y,z\n1,2,3\n");
-    let brains = at("brains.toml", crate::population::of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45]).as_bytes());
+    let brains =
+        at("brains.toml", crate::population::of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45]).as_bytes());
     let one_tissue = ["--resection", &mask, "--population", &brains, "--tissues", "1", "--drained", "0.3"];
     let cases: [(&[&str], &[&str]); 19] = [
         (
