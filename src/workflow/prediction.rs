@@ -64,15 +64,20 @@ pub(super) fn predict_scan(
     work.hold(true)?;
     check_scan(work, &scan.sum)?;
     let before = Before::of(&work.case);
-    every_stage(work, scan, targets).inspect_err(|error| before.put_back(error))
+    let (made, prediction, outcome) = every_stage(work, scan, targets).inspect_err(|error| before.put_back(error))?;
+    let steps = plan(work.settings, Subject::Plan, Goal::Predict)?;
+    let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
+    let warnings = manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect();
+    finish(work, &ExperimentOutcome { warnings, ..outcome }, &manifests)?;
+    Ok((work.case.clone(), prediction))
 }
 
-/// Every stage of one plan, then outcome and page.
+/// Every stage of one plan, with its outcome but for the warnings.
 fn every_stage(
     work: &Work<'_>,
     scan: &PlannedScan,
     targets: Option<&Targets>,
-) -> Result<(Case, Prediction), WorkflowError> {
+) -> Result<(Made, Prediction, ExperimentOutcome), WorkflowError> {
     let settings = work.settings;
     keep_settings(work)?;
     let mut made = Made::default();
@@ -90,8 +95,6 @@ fn every_stage(
     let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
     let prediction = stages::predict(work, &mut made, &input)?;
     drop_other_evaluation(&work.case)?;
-    let steps = plan(settings, Subject::Plan, Goal::Predict)?;
-    let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
     let outcome = ExperimentOutcome {
         kind: ExperimentKind::Prediction,
         reference: "nothing: the operation is still to come".to_owned(),
@@ -99,11 +102,9 @@ fn every_stage(
         registrations: vec![posed.fit],
         sets: meshed.sets,
         mesh: Some(meshed.mesh),
-        warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
         ..ExperimentOutcome::default()
     };
-    finish(work, &outcome, &manifests)?;
-    Ok((work.case.clone(), prediction))
+    Ok((made, prediction, outcome))
 }
 
 /// Takes away what was found of an earlier prediction in this folder.
