@@ -1,16 +1,18 @@
 //! What to do about an error, in words of the command line: the library's messages name no options.
 
 use crate::anatomy::LabelError;
+use crate::experiment::predict::TaughtError;
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
 use crate::live::ReplayError;
 use crate::mesh::engine::EngineError;
+use crate::resect::PairError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
 use crate::workflow::cohort::DatasetError;
 use crate::workflow::{
-    AskedError, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
+    AskedError, Case, CaseError, CohortError, EvaluateError, InputError, LabelMapError, MaskRole, MeshFileError,
     PredictError, SettingsError, SimulationError, Subject, TakenUpError, WorkflowError,
 };
 
@@ -77,6 +79,10 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         }
         WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
         WorkflowError::Labels(_) => "see --labels",
+        // A scan alone may have been given.
+        WorkflowError::Pair(PairError::Head { .. }) => {
+            "--brain-mask takes a mask of your own, --dseg a label map, --pose a pose"
+        }
         WorkflowError::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
@@ -85,11 +91,21 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             | PredictError::NoPlan
             | PredictError::Ellipsoid { .. }
             | PredictError::NoSurface { .. }
+            | PredictError::OtherSurface { .. }
             | PredictError::OpenSurface { .. }
             | PredictError::NoVoxel { .. }
             | PredictError::BesideScan { .. },
         ) => "see --resection and --resection-ellipsoid",
-        WorkflowError::Predict(PredictError::OnePlan { .. }) => "name another folder (-o)",
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
+            "see --tissues and --population"
+        }
+        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => {
+            "see --population and --drained"
+        }
+        WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",
+        WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => {
+            "name another folder (-o)"
+        }
         WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
         WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
         WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {
@@ -196,6 +212,12 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::OtherScan { .. } => {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
         }
+        CaseError::Stale { folder, .. } if is_plan(folder) => {
+            format!(
+                "run `hgm predict` on {} again with the settings that are meant (`hgm why` tells what differs)",
+                folder.display()
+            )
+        }
         CaseError::Stale { folder, .. } => format!(
             "run `hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate` on {} again with the settings that are meant (`hgm why` \
              tells what differs)",
@@ -205,6 +227,10 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::NothingResected { .. } => "leave --before-resection out".to_owned(),
         CaseError::NoField { .. } | CaseError::NoStage { .. } | CaseError::Unreadable { .. } => return None,
     })
+}
+
+fn is_plan(folder: &std::path::Path) -> bool {
+    Case::open(folder).is_ok_and(|case| case.subject() == Some(Subject::Plan))
 }
 
 fn of_dataset(error: &DatasetError) -> Option<String> {

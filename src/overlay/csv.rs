@@ -1,4 +1,5 @@
-//! Points as a table: columns `x`, `y`, `z` (mm, RAS+), or the first three columns of numbers.
+//! Points as a table: columns `x`, `y`, `z` (mm, RAS+), or three columns of numbers and no others. A fourth may be a number of the
+//! row as well as a coordinate: then a header says which.
 
 use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, written};
 
@@ -11,6 +12,7 @@ pub(super) struct Table {
 }
 
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
+    refuse_other_separator(bytes, name)?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(false)
@@ -25,7 +27,11 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let Some(first) = rows.first().cloned() else { return Err(damaged(name, "the table", "it holds no row")) };
     let is_number = |cell: &String| cell.parse::<f64>().is_ok();
     let numbers = first.iter().filter(|cell| is_number(cell)).count();
-    let (header, columns) = if numbers >= 3 {
+    let (header, columns) = if numbers > 3 {
+        let problem =
+            format!("{numbers} columns of numbers and no header: say above them which are x, y and z (mm, RAS)");
+        return Err(damaged(name, "the first row", problem));
+    } else if numbers == 3 {
         let places: Vec<usize> = (0..first.len()).filter(|&c| is_number(&first[c])).collect();
         (None, [places[0], places[1], places[2]])
     } else {
@@ -55,6 +61,28 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let names =
         rows.iter().enumerate().map(|(n, row)| label.map_or_else(|| (n + 1).to_string(), |c| row[c].clone())).collect();
     Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Table { header, rows, columns }) })
+}
+
+/// Spreadsheets of half the world write semicolons, because their commas are decimal marks.
+fn refuse_other_separator(bytes: &[u8], name: &str) -> Result<(), OverlayError> {
+    let text = String::from_utf8_lossy(bytes);
+    let first =
+        text.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    let Some(first) = first else { return Ok(()) };
+    let tells = |cell: &str| {
+        let cell = cell.trim().to_lowercase();
+        ["x", "y", "z", "x_mm", "y_mm", "z_mm"].contains(&cell.as_str())
+            || cell.replace(',', ".").parse::<f64>().is_ok()
+    };
+    let telling = |mark: char| first.split(mark).filter(|cell| tells(cell)).count();
+    let other = [(';', "semicolons"), ('\t', "tabs")].into_iter().find(|(mark, _)| telling(*mark) >= 3);
+    match other.filter(|_| telling(',') < 3) {
+        None => Ok(()),
+        Some((_, marks)) => {
+            let problem = format!("its cells are parted by {marks}: part them by commas, with points as decimal marks");
+            Err(damaged(name, "the first row", problem))
+        }
+    }
 }
 
 impl Kept for Table {

@@ -13,6 +13,17 @@ fn is_point(line: &str) -> bool {
     !line.starts_with('#') && !line.trim().is_empty()
 }
 
+/// The cells of a line; a label with a comma stands in quotes.
+fn cells_of(line: &str) -> Vec<String> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+    let first = reader.records().next().and_then(Result::ok);
+    first.map_or_else(|| vec![line.to_owned()], |record| record.iter().map(str::to_owned).collect())
+}
+
+fn quoted(cell: &str) -> String {
+    if cell.contains([',', '"']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
+}
+
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     let text = std::str::from_utf8(bytes).map_err(|_| damaged(name, "the file", "not UTF-8 text"))?;
     let lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -24,15 +35,15 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     };
     let (mut points_mm, mut names) = (Vec::new(), Vec::new());
     for (n, line) in lines.iter().enumerate().filter(|(_, line)| is_point(line)) {
-        let cells: Vec<&str> = line.split(',').collect();
+        let cells = cells_of(line);
         let number = |c: usize| -> Result<f64, OverlayError> {
-            let cell = cells.get(c).copied().unwrap_or("");
+            let cell = cells.get(c).map_or("", String::as_str);
             let wrong = |_| damaged(name, format!("line {}", n + 1), format!("`{cell}` is not a number"));
             cell.trim().parse().map_err(wrong)
         };
         points_mm.push(turned([number(1)?, number(2)?, number(3)?], lps));
-        let label = cells.get(11).copied().filter(|label| !label.is_empty());
-        names.push(label.unwrap_or(cells[0]).to_owned());
+        let label = cells.get(11).filter(|label| !label.is_empty());
+        names.push(label.unwrap_or(&cells[0]).clone());
     }
     Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Lines { lines, lps }) })
 }
@@ -49,7 +60,7 @@ impl Kept for Lines {
                 text.push('\n');
                 continue;
             };
-            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            let mut cells = cells_of(line);
             for (cell, x) in cells[1..4].iter_mut().zip(turned(point.mm, self.lps)) {
                 *cell = written(x);
             }
@@ -60,7 +71,7 @@ impl Kept for Lines {
             if let Some(node) = cells.get_mut(13) {
                 node.clear();
             }
-            text += &cells.join(",");
+            text += &cells.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",");
             text.push('\n');
         }
         text.into_bytes()

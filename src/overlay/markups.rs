@@ -20,6 +20,11 @@ fn is_lps(markup: &Value) -> Option<bool> {
     }
 }
 
+/// 3D Slicer keeps points that are yet to be placed, at the origin.
+fn is_placed(point: &Value) -> bool {
+    point.get("positionStatus").and_then(Value::as_str).is_none_or(|status| status == "defined")
+}
+
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     let document: Value = serde_json::from_slice(bytes).map_err(|e| damaged(name, "the file", e.to_string()))?;
     let markups = document["markups"].as_array().ok_or_else(|| damaged(name, "markups", "there is no such list"))?;
@@ -27,7 +32,9 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     for (m, markup) in markups.iter().enumerate() {
         let lps = is_lps(markup)
             .ok_or_else(|| damaged(name, format!("markups[{m}].coordinateSystem"), "it is neither LPS nor RAS"))?;
-        for (n, point) in markup["controlPoints"].as_array().into_iter().flatten().enumerate() {
+        for (n, point) in
+            markup["controlPoints"].as_array().into_iter().flatten().enumerate().filter(|(_, p)| is_placed(p))
+        {
             let place = || format!("markups[{m}].controlPoints[{n}].position");
             let numbers: Vec<f64> =
                 point["position"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
@@ -47,7 +54,13 @@ impl Kept for Markups {
         for markup in document["markups"].as_array_mut().into_iter().flatten() {
             let lps = is_lps(markup).unwrap_or(true);
             markup.as_object_mut().map(|markup| markup.remove("measurements"));
-            for point in markup.get_mut("controlPoints").and_then(Value::as_array_mut).into_iter().flatten() {
+            for point in markup
+                .get_mut("controlPoints")
+                .and_then(Value::as_array_mut)
+                .into_iter()
+                .flatten()
+                .filter(|p| is_placed(p))
+            {
                 let Some(to) = carried.next() else { break };
                 point["position"] = json!(turned(to.mm, lps).map(|x| written(x).parse::<f64>().unwrap_or(x)));
                 point["description"] = json!(said(to));

@@ -41,12 +41,45 @@ fn pairs_of_a_tag_file_are_read_and_a_table_without_names_of_columns_too() {
     assert_eq!((table.points_mm.len(), table.names), (2, vec!["a".to_owned(), "b".to_owned()]));
 }
 
+/// What is not placed stays where it is, and no point takes its place.
+#[test]
+fn a_point_that_is_yet_to_be_placed_is_none() {
+    let text = r#"{"markups": [{"coordinateSystem": "RAS", "controlPoints": [{"label": "a", "position": [0, 0, 0], "positionStatus": "undefined"}, {"label": "b", "position": [1, 2, 3], "positionStatus": "defined"}]}]}"#;
+    let drawing = Drawing::decode(text.as_bytes(), "a.mrk.json").unwrap();
+    assert_eq!((&drawing.points_mm[..], &drawing.names[..]), (&[[1.0, 2.0, 3.0]][..], &["b".to_owned()][..]));
+    let said = String::from_utf8(drawing.encode(&moved(&drawing, [10.0, 0.0, 0.0]))).unwrap();
+    let again = Drawing::decode(said.as_bytes(), "a.mrk.json").unwrap();
+    assert!(again.points_mm == [[11.0, 2.0, 3.0]] && said.contains("undefined"), "{said}");
+}
+
+#[test]
+fn a_label_with_a_comma_is_one_label() {
+    let text = "# CoordinateSystem = 0\n1,5,6,7,0,0,0,1,1,1,0,\"STN, L\",said,node\n";
+    let drawing = Drawing::decode(text.as_bytes(), "a.fcsv").unwrap();
+    assert_eq!(drawing.names, ["STN, L"]);
+    let said = String::from_utf8(drawing.encode(&moved(&drawing, [10.0, 0.0, 0.0]))).unwrap();
+    assert!(said.contains("1,15,6,7,0,0,0,1,1,1,0,\"STN, L\",tissue sd 0.75 mm,\n"), "{said}");
+}
+
 #[test]
 fn a_damaged_file_is_refused_with_its_place() {
     let refuse = |bytes: &[u8], name: &str| Drawing::decode(bytes, name).unwrap_err().to_string();
     assert!(refuse(b"x,y\n1,2\n", "a.csv").contains("a.csv: the first row: no column is called `z`"));
     assert!(refuse(b"x,y,z\n1,2,up\n", "a.csv").contains("row 2: `up`"));
     assert!(refuse(b"x,y,z\n1,2,inf\n", "a.csv").contains("point 0"));
+    for text in ["1,-12,-20,-5\n", "1,2,3,4,a\n"] {
+        let said = refuse(text.as_bytes(), "a.csv");
+        assert!(said.contains("4 columns of numbers and no header") && said.contains("x, y and z"), "{said}");
+    }
+    for (text, marks) in [
+        ("name;x;y;z\nSTN;-12,0;-20,5;-5\n", "semicolons"),
+        ("1,5;2;3,5\n", "semicolons"),
+        ("x\ty\tz\n1\t2\t3\n", "tabs"),
+    ] {
+        let said = refuse(text.as_bytes(), "a.csv");
+        assert!(said.contains(marks) && said.contains("by commas"), "{said}");
+    }
+    assert_eq!(Drawing::decode(b"\"a;1;2;3\",1,2,3\n", "a.csv").unwrap().names, ["a;1;2;3"]);
     assert!(refuse(b"", "a.xyz").contains(".mrk.json"));
     assert!(refuse(b"{}", "a.mrk.json").contains("markups"));
     assert!(refuse(b"mrtrix tracks\ndatatype: Float32LE\nfile: . 50\nEND\n", "a.tck").contains("a.tck"));

@@ -53,6 +53,8 @@ pub fn prediction_table(found: &Prediction) -> String {
         );
     }
     for h in found.heads.iter().filter(|h| !h.targets.is_empty()) {
+        // As wide as the longest name.
+        let width = h.targets.iter().map(|t| t.called().chars().count()).max().unwrap_or(0).max(8);
         text += &format!(
             "\ntarget (head {})  expected at (mm)            shift (mm)  SD    P(over {} mm)\n",
             h.head, found.threshold_mm
@@ -60,10 +62,10 @@ pub fn prediction_table(found: &Prediction) -> String {
         for t in &h.targets {
             let [x, y, z] = t.expected_mm;
             text += &match t.place {
-                TargetPlace::Removed => format!("{:<8} {:<8} is to be taken\n", t.target, t.place.name()),
+                TargetPlace::Removed => format!("{:<width$} {:<8} is to be taken\n", t.called(), t.place.name()),
                 _ => format!(
-                    "{:<8} {:<8} {x:>8.1} {y:>8.1} {z:>8.1}  {:>9.2}  {:>5.2}  {:>6.2}\n",
-                    t.target,
+                    "{:<width$} {:<8} {x:>8.1} {y:>8.1} {z:>8.1}  {:>9.2}  {:>5.2}  {:>6.2}\n",
+                    t.called(),
                     t.place.name(),
                     t.shift_mm,
                     t.sd_mm,

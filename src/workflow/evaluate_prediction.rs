@@ -12,8 +12,8 @@ use super::user_file::{read_text, shown};
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::predict::{
-    Compared, Found, HeadEvaluation, LandmarkForecast, Locator, Modes, Prediction, PredictionEvaluation, Scatter,
-    TakenAgainstPlan, TargetPlace, scores,
+    Compared, Found, HeadEvaluation, LandmarkForecast, Locator, Modes, OtherWayRound, Prediction, PredictionEvaluation,
+    Scatter, TakenAgainstPlan, TargetPlace, scores,
 };
 use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
 use crate::image::Mask;
@@ -97,6 +97,7 @@ pub fn evaluate_prediction(folder: &Path, seen: &SeenAfterwards) -> Result<Predi
         evaluation.against.push(state.to_owned());
         evaluation.taken = Some(taken_against_plan(&case, later)?);
     }
+    evaluation.other_way_round = marked.as_ref().and_then(|marked| marked.other_way_round);
     evaluation.against.extend(marked.as_ref().map(|_| "landmarks".to_owned()));
     for head in &prediction.heads {
         let foretold = Foretold::read(&case, &head.state)?;
@@ -165,6 +166,16 @@ struct Marked {
     file: String,
     /// Name, place before, displacement without the rigid motion.
     rows: Vec<(String, [f64; 3], [f64; 3])>,
+    /// The rigid motion by hand fits far better turned round.
+    other_way_round: Option<OtherWayRound>,
+}
+
+/// How far landmarks lie apart by a rigid motion between the scans, mm (root mean square).
+fn apart_mm(pairs: &[Pair], pre_from_post: &RigidTransform<Post, Pre>) -> f64 {
+    let of = |(_, x, y): &Pair| {
+        (pre_from_post.apply(Position::new(y[0], y[1], y[2])).mm.coords - Vector3::from(*x)).norm_squared()
+    };
+    (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
 }
 
 impl Marked {
@@ -179,11 +190,16 @@ impl Marked {
                 return Err(EvaluateError::NoPose { file }.into());
             }
         };
+        // What the file would say, were it the other way round.
+        let turned = pre_from_post.inverse();
+        let inverse = RigidTransform::new(turned.rotation, turned.translation_mm);
+        let other_way_round = OtherWayRound::of(apart_mm(&found, &pre_from_post), apart_mm(&found, &inverse));
         let moved = |(name, x, y): Pair| {
             let back = pre_from_post.apply(Position::new(y[0], y[1], y[2])).mm;
             (name, x, [0, 1, 2].map(|a| back[a] - x[a]))
         };
-        Ok(Self { file, rows: found.into_iter().map(moved).collect() })
+        let rows = found.into_iter().map(moved).collect();
+        Ok(Self { file, rows, other_way_round: other_way_round.filter(|_| by_hand.is_some()) })
     }
 }
 

@@ -100,6 +100,9 @@ impl PlannedResection {
     ) -> Result<Mask<Pre>, WorkflowError> {
         let plan = self.to_string();
         let (mask, volume_mm3) = match self {
+            Self::Mask(path) if is_other_surface(path) => {
+                return Err(PredictError::OtherSurface { file: shown(path) }.into());
+            }
             Self::Mask(path) => {
                 let mask: Mask<Pre> = read_mask_of(path, &grid.relabelled(), options, warnings)?.relabelled();
                 if mask.count() == 0 {
@@ -137,6 +140,12 @@ impl PlannedResection {
         }
         Ok(mask)
     }
+}
+
+/// Whether a file's name says that it is a surface of a kind that is not read.
+fn is_other_surface(path: &Path) -> bool {
+    let others = ["vtp", "vtu", "obj", "off", "wrl", "x3d", "3mf", "glb", "gltf", "dae", "mz3", "fbx"];
+    path.extension().is_some_and(|end| others.iter().any(|other| end.eq_ignore_ascii_case(other)))
 }
 
 /// Volume of what a surface encloses, by the same rule as its voxels: parts that overlap count once, whichever way their triangles

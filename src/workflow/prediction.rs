@@ -1,21 +1,22 @@
 //! The job before an operation: one scan and a plan to the expected brain shift.
 
 use super::case::Case;
-use super::error::{CaseError, WorkflowError};
+use super::error::{CaseError, PredictError, WorkflowError};
 use super::facts::MeshFacts;
 use super::outcome::{finish, keep_settings};
 use super::plan::{Goal, plan};
 use super::planned_scan::{PlanInputs, PlannedScan};
 use super::progress::Progress;
+use super::put_back::Before;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::stages::{self, PlannedHead, PredictInput};
-use super::user_file::{read_input, shown};
+use super::targets::Targets;
 use super::work::{Made, Place, Work};
-use crate::artefact::Manifest;
+use crate::artefact::{Manifest, sha256_hex};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::Prediction;
-use crate::layout::REST_MESH;
+use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
+use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
 
 /// How the brain of a pre-operative scan will move when the planned tissue is taken, with its spread. Registration of the
@@ -29,6 +30,9 @@ pub fn predict(
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<(Case, Prediction), WorkflowError> {
+    if place.folder.join(PLANS_JSON).exists() || place.folder.join(PLAN_CASE.of("1")).is_dir() {
+        return Err(PredictError::SeveralPlans { folder: place.folder.clone() }.into());
+    }
     let work = Work::new(place, Subject::Plan, settings, progress);
     can_be_done(&work)?;
     let scan = PlannedScan::read(inputs, &work)?;
@@ -38,44 +42,59 @@ pub fn predict(
 
 /// Refuses what no prediction can be made with.
 pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
-    work.settings.check()?;
+    let settings = work.settings;
+    settings.check()?;
+    settings.predict.check_taught(&settings.resection, &settings.prior).map_err(PredictError::Taught)?;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
-    work.place.programs.engines().check(work.settings.mesh.engine).map_err(refused)?;
+    work.place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
     Ok(())
 }
 
-/// A file of targets by its name, with its bytes.
-pub(super) type TargetsFile = (String, Vec<u8>);
-
-/// The file of targets, where one was given.
-pub(super) fn targets_of(inputs: &PlanInputs) -> Result<Option<TargetsFile>, WorkflowError> {
-    let Some(path) = &inputs.targets else { return Ok(None) };
-    Ok(Some((shown(path), read_input(path)?)))
+/// The points that are asked for, where a file was given.
+pub(super) fn targets_of(inputs: &PlanInputs) -> Result<Option<Targets>, WorkflowError> {
+    inputs.targets.as_deref().map(Targets::read).transpose()
 }
 
-/// Every stage of one plan, then outcome and page.
+/// One plan in its folder; where it is refused the folder is of the settings that it had.
 pub(super) fn predict_scan(
     work: &Work<'_>,
     scan: &PlannedScan,
-    targets: Option<&TargetsFile>,
+    targets: Option<&Targets>,
 ) -> Result<(Case, Prediction), WorkflowError> {
-    let settings = work.settings;
     work.hold(true)?;
     check_scan(work, &scan.sum)?;
+    let before = Before::of(&work.case);
+    let (made, prediction, outcome) = every_stage(work, scan, targets).inspect_err(|error| before.put_back(error))?;
+    let steps = plan(work.settings, Subject::Plan, Goal::Predict)?;
+    let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
+    let warnings = manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect();
+    finish(work, &ExperimentOutcome { warnings, ..outcome }, &manifests)?;
+    Ok((work.case.clone(), prediction))
+}
+
+/// Every stage of one plan, with its outcome but for the warnings.
+fn every_stage(
+    work: &Work<'_>,
+    scan: &PlannedScan,
+    targets: Option<&Targets>,
+) -> Result<(Made, Prediction, ExperimentOutcome), WorkflowError> {
+    let settings = work.settings;
     keep_settings(work)?;
     let mut made = Made::default();
     let posed = stages::pose(work, &mut made, scan)?;
-    let planned = stages::plan(work, &mut made, scan)?;
+    let heads = twice(&settings.predict.heads, &stages::mni_from_pre(&work.case)?);
+    if let Some((first, second)) = heads {
+        return Err(PredictError::OneHead { first, second }.into());
+    }
+    let planned = stages::plan(work, &mut made, scan, targets)?;
     let head = PlannedHead::read(&work.case)?;
     let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;
     work.case.drop_stale();
     let bytes = work.case.read(REST_MESH)?;
     let mesh = vtu::decode(&bytes, REST_MESH)?.mesh;
-    let targets = targets.map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
     let input = PredictInput { mesh: (&mesh, &bytes, &meshed.mesh), plan: &planned.plan, targets };
     let prediction = stages::predict(work, &mut made, &input)?;
-    let steps = plan(settings, Subject::Plan, Goal::Predict)?;
-    let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
+    drop_other_evaluation(&work.case)?;
     let outcome = ExperimentOutcome {
         kind: ExperimentKind::Prediction,
         reference: "nothing: the operation is still to come".to_owned(),
@@ -84,11 +103,20 @@ pub(super) fn predict_scan(
         registrations: vec![posed.fit],
         sets: meshed.sets,
         mesh: Some(meshed.mesh),
-        warnings: manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect(),
         ..ExperimentOutcome::default()
     };
-    finish(work, &outcome, &manifests)?;
-    Ok((work.case.clone(), prediction))
+    Ok((made, prediction, outcome))
+}
+
+/// Takes away what was found of an earlier prediction in this folder.
+fn drop_other_evaluation(case: &Case) -> Result<(), WorkflowError> {
+    let Ok(text) = case.read_text(EVALUATION_JSON) else { return Ok(()) };
+    let sum = sha256_hex(&case.read(PREDICTION_JSON)?);
+    let of_this = serde_json::from_str(&text).is_ok_and(|found: PredictionEvaluation| found.prediction_sha256 == sum);
+    if !of_this {
+        std::fs::remove_file(case.path(EVALUATION_JSON)).ok();
+    }
+    Ok(())
 }
 
 /// Another scan is another patient's, unless it is meant.
@@ -98,4 +126,27 @@ fn check_scan(work: &Work<'_>, sum: &String) -> Result<(), WorkflowError> {
         return Err(CaseError::OtherScan { folder: work.case.folder().to_path_buf(), which: "pre-operative" }.into());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_evaluation_stays_with_its_prediction_and_goes_with_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = Case::at(folder.path());
+        for file in [PREDICTION_JSON, EVALUATION_JSON, ".stages/pose.manifest.json"] {
+            std::fs::create_dir_all(case.path(file).parent().unwrap()).unwrap();
+            std::fs::write(case.path(file), "{}").unwrap();
+        }
+        let sum = sha256_hex(&case.read(PREDICTION_JSON).unwrap());
+        let evaluation = PredictionEvaluation { prediction_sha256: sum, ..PredictionEvaluation::default() };
+        std::fs::write(case.path(EVALUATION_JSON), serde_json::to_string(&evaluation).unwrap()).unwrap();
+        drop_other_evaluation(&case).unwrap();
+        assert!(case.path(EVALUATION_JSON).exists());
+        std::fs::write(case.path(PREDICTION_JSON), "{ }").unwrap();
+        drop_other_evaluation(&case).unwrap();
+        assert!(!case.path(EVALUATION_JSON).exists());
+    }
 }

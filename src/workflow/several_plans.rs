@@ -42,17 +42,20 @@ pub fn predict_plans(
         let rest = others.iter().map(|plan| first.with_plan(plan, inputs, &work)).collect::<Result<Vec<_>, _>>()?;
         std::iter::once(first).chain(rest).collect::<Vec<PlannedScan>>()
     };
-    // A comparison of before says nothing of what is made now.
-    for file in [PLANS_JSON, PLANS_PAGE] {
-        std::fs::remove_file(place.folder.join(file)).ok();
-    }
     let mut done: Vec<(String, Case, Prediction)> = Vec::new();
     for (n, scan) in scans.iter().enumerate() {
         let name = PLAN_CASE.of(&(n + 1).to_string());
         let own = Place { folder: place.folder.join(&name), ..place.clone() };
         let work = Work::new(&own, Subject::Plan, settings, progress);
         work.tell(|p| p.noted(&format!("{name}: {}", scan.plan)));
-        let (case, prediction) = predict_scan(&work, scan, targets.as_ref())?;
+        let (case, prediction) = predict_scan(&work, scan, targets.as_ref()).inspect_err(|_| {
+            // Where nothing was in it before.
+            std::fs::remove_dir(&place.folder).ok();
+        })?;
+        // A comparison of before says nothing of what is made now.
+        for file in [PLANS_JSON, PLANS_PAGE] {
+            std::fs::remove_file(place.folder.join(file)).ok();
+        }
         done.push((name, case, prediction));
     }
     let comparison = compared(&plans, &done, settings.predict.threshold_mm)?;

@@ -23,10 +23,20 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         folder.path().join(name).display().to_string()
     };
     let (open, far) = (at("open.stl", &triangles(3, 0.0)), at("far.stl", &triangles(4, 4000.0)));
+    let other = at("shape.vtp", b"<VTKFile/>");
     let points = at("points.csv", b"x,y,z\n1,2,3\n");
-    let cases: [(&[&str], &[&str]); 14] = [
+    let brains =
+        at("brains.toml", crate::population::of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45]).as_bytes());
+    let one_tissue = ["--resection", &mask, "--population", &brains, "--tissues", "1", "--drained", "0.3"];
+    let cases: [(&[&str], &[&str]); 19] = [
+        (
+            &["--resection", &mask, "--population", &brains, "--tissues", "2"],
+            &["teaches `brain`", "`grey_matter` and `white_matter`", "`tissues = 1`", "--tissues"],
+        ),
+        (&one_tissue, &["100 kg/m3", "1040 kg/m3", "`drained`", "--population"]),
         (&["--resection", &open], &["open.stl", "the surface is open", "Close Holes", "--resection"]),
         (&["--resection", &far], &["far.stl", "is empty", "RAS+"]),
+        (&["--resection", &other], &["shape.vtp", ".stl, .ply or .surf.gii", "--resection"]),
         (&["--resection", &points], &["points.csv", "without triangles", ".stl"]),
         (
             &["--resection-label", "7", "--dseg", &mask],
@@ -40,7 +50,9 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         (&["--resection-ellipsoid", "1,2,3,4,5,0"], &["half axes above 0"]),
         (&["--resection-ellipsoid", "9000,0,0,5,5,5"], &["is empty", "--resection"]),
         (&["--resection", &mask, "--head", "0,0,0"], &["`0,0,0`", "supine, prone", "not all 0"]),
-        (&["--resection", &mask, "--head", "left", "--head", "left"], &["`heads`", "none twice"]),
+        (&["--resection", &mask, "--head", "left", "--head", "left"], &["`heads` is [left, left]", "none twice"]),
+        (&["--resection", &mask, "--head", "0,-1,0", "--head", "0,-2,0"], &["`heads`", "none twice"]),
+        (&["--resection", &mask, "--drained", "0"], &["`drained` is 0.0:", "above 0, at most 1"]),
         (&["--resection", &mask, "--drained", "1.5"], &["`drained`", "above 0, at most 1"]),
     ];
     for (n, (more, words)) in cases.into_iter().enumerate() {
@@ -51,6 +63,13 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         assert!(words.iter().all(|w| said.contains(w)) && said.trim().lines().count() == 1, "{more:?}: {said}");
         assert!(!case.exists(), "{more:?} left something behind");
     }
+    // A folder of several plans is no case of one.
+    let plans = folder.path().join("plans");
+    std::fs::create_dir_all(plans.join("plan-1")).unwrap();
+    let ended = planned(&plans, &["--resection", &mask]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(3) && said.contains("several plans") && said.contains("-o"), "{said}");
+    assert_eq!(contents(&plans).len(), 0);
     let none = planned(&folder.path().join("none"), &[]);
     assert_eq!(none.status.code(), Some(2));
     let unmapped = planned(&folder.path().join("none"), &["--resection-label", "7"]);
@@ -151,8 +170,10 @@ fn refuses_in_the_case(case: &Path, folder: &Path) {
         assert_eq!(ended.status.code(), Some(3), "{more:?}: {said}");
         assert!(words.iter().all(|w| said.contains(w)), "{more:?}: {said}");
     }
-    let prediction = "sim/prediction.json";
-    assert!(contents(case)[prediction] == kept[prediction], "a refused plan leaves the prediction as it was");
+    assert!(contents(case) == kept, "a refused plan leaves the case as it was, its settings too");
+    let fresh = folder.join("fresh");
+    let ended = planned(&fresh, &["--resection", &mask, "--targets", &far, "--head", "left"]);
+    assert!(ended.status.code() == Some(3) && !fresh.exists(), "a refused plan leaves no folder");
     let estimate = output(&["estimate", case.to_str().unwrap()]);
     let said = String::from_utf8_lossy(&estimate.stderr).into_owned();
     assert!(estimate.status.code() == Some(3) && said.contains("before an operation"), "{said}");

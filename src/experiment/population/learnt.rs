@@ -47,6 +47,11 @@ impl PopulationPrior {
         self.parameters.iter().find(|learnt| learnt.name == name)
     }
 
+    /// Whether its patients were estimated under this effective density.
+    pub fn is_under(&self, density_kg_per_m3: f64) -> bool {
+        (self.density_kg_per_m3 - density_kg_per_m3).abs() <= SAME_DENSITY * density_kg_per_m3.abs()
+    }
+
     /// Refuses numbers that are no prior, and a job that is not the patients'.
     ///
     /// # Errors
@@ -74,7 +79,7 @@ impl PopulationPrior {
                 self.law, self.law
             ));
         }
-        if (self.density_kg_per_m3 - density_kg_per_m3).abs() > SAME_DENSITY * density_kg_per_m3.abs() {
+        if !self.is_under(density_kg_per_m3) {
             return Err(format!(
                 "`population` was learnt under an effective density of {} kg/m3, and `density_kg_per_m3` of [resection] is {}: moduli \
                  go with it; give the same, or leave the population out",

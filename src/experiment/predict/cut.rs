@@ -27,6 +27,11 @@ pub enum PlannedError {
     #[error("{plan}: the mask is empty; draw what is to be taken, or check which label means it")]
     Empty { plan: String },
     #[error(
+        "{plan}: what it marks is too small ({mm3:.1} mm3): no voxel of 1 mm, which is as fine as the labels are, has its centre in it; draw \
+         what is to be taken whole"
+    )]
+    TooSmall { plan: String, mm3: f64 },
+    #[error(
         "{plan}: {percent:.0} % of what is to be taken lies outside the brain of this scan; check that it was drawn on this scan, in \
          its grid and frame (mm, RAS+)"
     )]
@@ -53,17 +58,23 @@ const MOST_OUTSIDE: f64 = 0.5;
 /// A part that comes loose and is larger than this is half a brain; smaller ones are specks at the border, cc.
 const LARGEST_SPECK_CC: f64 = 10.0;
 
-/// Looks at a plan before anything is computed from it; `plan` is its name for messages.
+/// Looks at a plan before anything is computed from it; `plan` is its name for messages, `drawn_mm3` its volume as it was drawn.
 ///
 /// # Errors
 /// [`PlannedError`] says what is wrong with it and what to do.
-pub fn planned<F: Frame>(plan: &str, mask: &Mask<F>, labels: &LabelMap<F>) -> Result<Planned, PlannedError> {
+pub fn planned<F: Frame>(
+    plan: &str,
+    drawn_mm3: f64,
+    mask: &Mask<F>,
+    labels: &LabelMap<F>,
+) -> Result<Planned, PlannedError> {
     let plan = || plan.to_owned();
     let voxel_cc = labels.grid.voxel_volume_mm3() / 1000.0;
     let both = || mask.data.iter().zip(&labels.data);
     let marked = mask.count();
     if marked == 0 {
-        return Err(PlannedError::Empty { plan: plan() });
+        let (plan, mm3) = (plan(), drawn_mm3);
+        return Err(if mm3 > 0.0 { PlannedError::TooSmall { plan, mm3 } } else { PlannedError::Empty { plan } });
     }
     let inside = both().filter(|(m, l)| **m && **l != label::BACKGROUND).count();
     let outside = 1.0 - inside as f64 / marked as f64;
@@ -125,7 +136,8 @@ mod tests {
 
     fn of(centre: [f64; 3], half_axes: [f64; 3]) -> Result<Planned, PlannedError> {
         let labels = labels();
-        planned("plan.nii", &ellipsoid_mask(&labels.grid, centre, half_axes), &labels)
+        let volume_mm3 = 4.0 / 3.0 * std::f64::consts::PI * half_axes.iter().product::<f64>();
+        planned("plan.nii", volume_mm3, &ellipsoid_mask(&labels.grid, centre, half_axes), &labels)
     }
 
     #[test]
@@ -134,7 +146,8 @@ mod tests {
         assert!(good.resected_cc > 0.5 && good.outside < 0.5 && good.resected_cc < 0.05 * good.tissue_cc, "{good:?}");
         let said = |centre, half_axes| of(centre, half_axes).unwrap_err().to_string();
         let cases = [
-            ([15.0, 20.0, 20.3], [0.1; 3], "is empty"),
+            ([15.0, 20.0, 20.3], [0.5, 0.5, 0.2], "too small (0.2 mm3)"),
+            ([15.0, 20.0, 20.3], [0.0; 3], "is empty"),
             ([15.0, 20.0, 39.0], [4.0; 3], "outside the brain"),
             ([29.5, 8.0, 8.0], [2.0; 3], "touches no grey or white matter"),
             ([20.0, 20.0, 20.0], [40.0, 30.0, 30.0], "more than half"),

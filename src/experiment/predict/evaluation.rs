@@ -18,6 +18,9 @@ pub struct PredictionEvaluation {
     pub taken: Option<TakenAgainstPlan>,
     /// Each way of lying; the first is the state `predicted`.
     pub heads: Vec<HeadEvaluation>,
+    /// How the rigid motion between the scans fits the landmarks, where it fits them far better turned round.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_way_round: Option<OtherWayRound>,
     /// What the figures do not say by themselves, in plain words.
     pub limits: Vec<String>,
 }
@@ -59,6 +62,30 @@ pub struct LandmarkForecast {
     pub error_mm: f64,
     /// Whether it was seen inside the ellipsoid that holds 95 % of the draws.
     pub inside_95: bool,
+}
+
+/// A rigid motion that seems to be the other way round.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[allow(clippy::struct_field_names, reason = "the unit is in the name")]
+pub struct OtherWayRound {
+    /// How far the landmarks of one scan lie from those of the other as it is given, mm (root mean square).
+    pub given_rms_mm: f64,
+    /// The same by its inverse, mm.
+    pub inverse_rms_mm: f64,
+}
+
+impl OtherWayRound {
+    /// A brain that shifts does not part the two so far: its inverse has to bring landmarks nearer by so many times ...
+    const TIMES: f64 = 2.0;
+    /// ... and by so much, mm.
+    const NEARER_MM: f64 = 5.0;
+
+    /// Something to say, where the inverse fits far better.
+    pub fn of(given_rms_mm: f64, inverse_rms_mm: f64) -> Option<Self> {
+        let better = given_rms_mm > Self::TIMES * inverse_rms_mm && given_rms_mm - inverse_rms_mm > Self::NEARER_MM;
+        better.then_some(Self { given_rms_mm, inverse_rms_mm })
+    }
 }
 
 /// What was taken against the plan, in the pre-operative scan's grid.
@@ -121,6 +148,13 @@ pub enum EvaluationLimit {
          construction. The observed state is of the images alone."
     )]
     FusedTruth,
+    /// The rigid motion was given the wrong way round.
+    #[error(
+        "The rigid motion between the scans leaves the landmarks {:.0} mm apart, and its inverse {:.0} mm: it seems to carry the earlier scan \
+         to the later one. Give the one from the later scan to the earlier.",
+        .0.given_rms_mm, .0.inverse_rms_mm
+    )]
+    OtherWayRound(OtherWayRound),
     /// Landmarks have an error of their own, which is not known.
     #[error("Landmarks are taken to be without error.")]
     LandmarksAreTrue,
@@ -142,6 +176,7 @@ impl PredictionEvaluation {
         let fused = self.against.iter().any(|state| state == "fused");
         let landmarks = self.heads.iter().any(|head| head.landmarks.is_some());
         [
+            self.other_way_round.map(EvaluationLimit::OtherWayRound),
             fields().next().map(|_| EvaluationLimit::OnePatient),
             within.map(|(seen_mm, error_mm)| EvaluationLimit::WithinError { seen_mm, error_mm }),
             self.taken.filter(TakenAgainstPlan::is_other).map(EvaluationLimit::OtherOperation),
@@ -173,6 +208,17 @@ mod tests {
         assert!(other.limits.len() == 3 && other.limits[1] == said, "{:?}", other.limits);
         assert!(other.found_limits().contains(&EvaluationLimit::FusedTruth));
         assert_eq!(of(18.0, "observed").found_limits(), [EvaluationLimit::OnePatient]);
+    }
+
+    #[test]
+    fn a_motion_that_fits_far_better_turned_round_is_said_to_and_a_shift_is_none() {
+        assert_eq!(
+            (OtherWayRound::of(9.0, 7.0), OtherWayRound::of(4.0, 0.1), OtherWayRound::of(3.0, 30.0)),
+            (None, None, None)
+        );
+        let other_way_round = OtherWayRound::of(31.0, 4.0);
+        let found = PredictionEvaluation { other_way_round, ..PredictionEvaluation::default() }.with_limits();
+        assert!(found.limits[0].contains("31 mm apart, and its inverse 4 mm"), "{:?}", found.limits);
     }
 
     #[test]

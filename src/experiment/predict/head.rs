@@ -9,7 +9,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// The way down, as a word for how the patient lies or as a direction of the scanner.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "String", try_from = "String")]
 #[schemars(with = "String")]
 pub enum Head {
@@ -86,6 +86,13 @@ impl fmt::Display for Head {
     }
 }
 
+/// As settings have it: messages show it so.
+impl fmt::Debug for Head {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
 impl Head {
     /// Gravity in the MNI frame, m/s2. Words are of the head's own axes, which the MNI frame has and a scanner has nearly.
     pub fn gravity_m_per_s2(&self, mni_from_pre: &RigidTransform<Pre, Mni>) -> [f64; 3] {
@@ -102,6 +109,15 @@ impl Head {
         (G * down).map(|x| x + 0.0).into()
     }
 
+    /// Whether both say one way down. A word is of the head's axes and a direction of the scanner's: of those two only the pose
+    /// tells ([`same_way`]).
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Down(a), Self::Down(b)) => same_way(*a, *b),
+            _ => self == other,
+        }
+    }
+
     /// The name of its state among a case's files: a word, or `head-2` for a direction.
     pub fn name(&self, number: usize) -> String {
         match self {
@@ -111,9 +127,35 @@ impl Head {
     }
 }
 
+/// Ways down nearer to each other than this are one, degrees: nobody lies that exactly.
+const ONE_WAY_DEG: f64 = 0.5;
+
+/// Whether two directions are one.
+pub fn same_way(a: [f64; 3], b: [f64; 3]) -> bool {
+    Vector3::from(a).angle(&Vector3::from(b)) < ONE_WAY_DEG.to_radians()
+}
+
+/// The first two of several heads that are one way to lie, once the pose is known.
+pub fn twice(heads: &[Head], mni_from_pre: &RigidTransform<Pre, Mni>) -> Option<(Head, Head)> {
+    let down: Vec<[f64; 3]> = heads.iter().map(|head| head.gravity_m_per_s2(mni_from_pre)).collect();
+    let pairs = (0..heads.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    pairs.into_iter().find(|&(a, b)| same_way(down[a], down[b])).map(|(a, b)| (heads[a], heads[b]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_way_to_lie_is_found_whatever_its_length_and_whatever_it_is_called() {
+        let down = |y: f64| Head::Down([0.0, y, 0.0]);
+        assert!(down(-1.0).is_same_as(&down(-2.0)) && !down(-1.0).is_same_as(&down(1.0)));
+        assert!(Head::Left.is_same_as(&Head::Left) && !Head::Left.is_same_as(&Head::Right));
+        let upright = RigidTransform::<Pre, Mni>::identity();
+        assert_eq!(twice(&[Head::Left, Head::Supine, down(-3.0)], &upright), Some((Head::Supine, down(-3.0))));
+        let nodding = RigidTransform::<Pre, Mni>::about([0.0; 3].into(), Vector3::x() * 0.1, Vector3::zeros());
+        assert_eq!(twice(&[Head::Supine, down(-3.0)], &nodding), None, "a scanner is not the head");
+    }
 
     #[test]
     fn a_head_is_a_word_or_a_direction_and_nothing_else() {

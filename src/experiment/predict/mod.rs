@@ -11,6 +11,7 @@ mod ellipsoid;
 mod evaluation;
 mod forecast;
 mod head;
+mod heads;
 mod low_discrepancy;
 mod modes;
 mod outcome;
@@ -23,15 +24,20 @@ mod score;
 mod settings;
 mod shares;
 mod spread;
+mod supported;
+mod taught;
 mod uncertain;
 
 pub use check::{Check, checked};
 pub use cut::{Planned, PlannedError, ellipsoid_mask, planned};
 pub use draws_table::{DrawsTableError, draws_from_csv, draws_to_csv, mode_name};
 pub use ellipsoid::{Ellipsoid, Scatter, ellipsoid_95};
-pub use evaluation::{EvaluationLimit, HeadEvaluation, LandmarkForecast, PredictionEvaluation, TakenAgainstPlan};
+pub use evaluation::{
+    EvaluationLimit, HeadEvaluation, LandmarkForecast, OtherWayRound, PredictionEvaluation, TakenAgainstPlan,
+};
 pub use forecast::{Forecast, ForecastError, Posed, forecast};
-pub use head::{Head, HeadParseError};
+pub use head::{Head, HeadParseError, same_way, twice};
+pub use heads::{HeadComparison, HeadDraws, compared_heads};
 pub use low_discrepancy::{halton, inverse_normal, normals};
 pub use modes::{DrawnState, Modes};
 pub use outcome::{HeadPrediction, Prediction, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome};
@@ -43,5 +49,6 @@ pub use response::{Beside, Coordinates, Response, SolvedState};
 pub use score::{Compared, Coverage, PlaceScore, Scores, crps, energy_score, score_place, scores};
 pub use settings::PredictSettings;
 pub use shares::{Shares, variance_shares};
-pub use spread::{Spread, spread};
+pub use spread::{Spread, farthest, spread};
+pub use taught::TaughtError;
 pub use uncertain::{Cause, Uncertain, Uncertainty};

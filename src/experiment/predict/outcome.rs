@@ -2,6 +2,7 @@
 
 use super::check::Check;
 use super::cut::Planned;
+use super::heads::HeadComparison;
 use super::shares::Shares;
 use super::uncertain::Cause;
 use schemars::JsonSchema;
@@ -19,9 +20,12 @@ pub struct Prediction {
     pub draws: usize,
     /// Each way of lying; the first is the state `predicted`.
     pub heads: Vec<HeadPrediction>,
+    /// With which head least moves, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<HeadComparison>,
     /// What was not known, and its prior.
     pub unknowns: Vec<UnknownOutcome>,
-    /// How the brain may be supported, and how probable that was taken to be.
+    /// How the brain may be supported, and how probable that was taken to be before any way was left out.
     pub supports: Vec<SupportWeight>,
     /// How far draws read from the response surface are off those solved whole.
     pub checks: Vec<Check>,
@@ -47,14 +51,20 @@ pub struct HeadPrediction {
     pub median_mm: f64,
     /// Median over the nodes of its standard deviation (root of the trace of the covariance), mm.
     pub sd_median_mm: f64,
-    /// Largest displacement that 95 % of the draws do not exceed, mm.
+    /// Largest of the nodes' own 95 % reaches, mm: 95 % of the draws move that one node less.
     pub reach95_largest_mm: f64,
+    /// In 95 % of the draws no node moves farther, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub farthest_95_mm: Option<f64>,
     /// Tissue that is expected to move by more than the threshold, cc: probabilities summed over the tissue.
     pub over_threshold_cc: f64,
     /// Which unknown contributes how much to the variance.
     pub shares: Shares,
     /// Equilibria that were solved for it, checks apart.
     pub states_solved: usize,
+    /// How the brain is supported in its draws, and how much that counts: a way without an equilibrium is left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub supports: Vec<SupportWeight>,
     /// Points that were asked for.
     pub targets: Vec<TargetPrediction>,
 }
@@ -89,6 +99,9 @@ impl TargetPlace {
 pub struct TargetPrediction {
     /// Its number in the file, from 1.
     pub target: usize,
+    /// Its name there, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Where it lies.
     pub place: TargetPlace,
     /// Where it is, mm.
@@ -105,6 +118,13 @@ pub struct TargetPrediction {
     pub axes: [[f64; 3]; 3],
     /// Probability of moving more than the threshold.
     pub over_threshold: f64,
+}
+
+impl TargetPrediction {
+    /// What it is called to a reader: its number, and its name where it has one.
+    pub fn called(&self) -> String {
+        self.name.as_ref().map_or_else(|| self.target.to_string(), |name| format!("{} {name}", self.target))
+    }
 }
 
 /// An unknown with its prior.

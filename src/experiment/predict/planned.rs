@@ -1,6 +1,6 @@
 //! A patient's unknowns with their priors, and what is assumed beside them.
 
-use super::outcome::{SupportWeight, UnknownOutcome};
+use super::outcome::{Prediction, UnknownOutcome};
 use super::settings::PredictSettings;
 use super::uncertain::{Cause, Uncertain, Uncertainty};
 use crate::experiment::estimate::{LogPrior, Scale, Turn, Unknown, Z_95};
@@ -96,11 +96,12 @@ impl PredictSettings {
 }
 
 impl UnknownOutcome {
-    /// The prior of an unknown in its own unit.
+    /// The prior of an unknown in its own unit, as draws have it: no more than all of the fluid drains.
     pub fn of(uncertain: &Uncertain) -> Self {
         let prior = &uncertain.prior;
         let sd = prior.sd.unwrap_or(0.0);
-        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd));
+        let most = if uncertain.levels_mm.is_empty() { f64::INFINITY } else { 1.0 };
+        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd).min(most));
         Self { name: prior.name.clone(), cause: uncertain.cause, median: at(0.0), interval_95: [at(-Z_95), at(Z_95)] }
     }
 }
@@ -109,22 +110,21 @@ fn rounded(x: f64) -> f64 {
     (x * 1e4).round() / 1e4 + 0.0
 }
 
-/// What was assumed, a sentence each.
+/// What was assumed, a sentence each; of `found` how the brain was supported is told.
 pub fn assumptions(
     settings: &PredictSettings,
     (own, prior): (&ResectionSettings, &PriorSettings),
-    supports: &[SupportWeight],
+    found: &Prediction,
 ) -> Vec<String> {
-    let stiffness = match prior.patients() {
-        None => "what published studies of brain tissue found".to_owned(),
-        Some(patients) => format!("what the scans of {patients} patients of a cohort have shown"),
-    };
+    let stiffness = prior.source_of(&settings.tissue_list());
     let mut said = vec![
         "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
             Some(part) => format!(
-                "About {:.0} % of the fluid drains from the top; tissue above its level has its own weight.",
-                100.0 * part
+                "About {:.0} % of the fluid drains from the top, give or take a factor of {:.1} and never more than all; tissue above its \
+                 level has its own weight.",
+                100.0 * part,
+                settings.drained_log_sd.exp()
             ),
             None => format!(
                 "How much fluid drains is not known: the tissue weighs about {:.0} kg/m3 more than what still carries it, give or take a \
@@ -133,19 +133,26 @@ pub fn assumptions(
                 settings.density_log_sd.exp()
             ),
         },
+        "How much fluid drains, and so how heavy the brain is, is not taken to depend on how much tissue is taken: a small plan has the \
+         same load as a large one."
+            .to_owned(),
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
-    let words = supports.iter().map(|s| {
-        let what = if s.supports == "sliding" { "slides on the skull" } else { "is held at its base and at the falx" };
-        format!("it {what} (weight {:.0} %)", 100.0 * s.weight)
-    });
-    said.push(format!("How the skull holds the brain: {}.", words.collect::<Vec<_>>().join(", or ")));
+    said.extend(found.supports_in_words());
+    if found.slides() && own.skull.gap_mm > 0.0 {
+        said.push(format!(
+            "Where it slides, the skull stands about {} mm off it, give or take a factor of {:.1}; it pushes back and never pulls.",
+            own.skull.gap_mm,
+            own.skull.gap_log_sd.exp()
+        ));
+    }
     said
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::outcome::SupportWeight;
     use super::*;
     use crate::geometry::Mni;
     use crate::image::Grid;
@@ -171,6 +178,46 @@ mod tests {
         assert_eq!(causes(&settings, Supports::Sliding), [&held[..], &[Room]].concat());
         let drained = PredictSettings { drained: Some(0.3), ..settings };
         assert_eq!(causes(&drained, Supports::Fixed), held);
+    }
+
+    #[test]
+    fn no_more_than_all_of_the_fluid_is_told_to_drain() {
+        for (drained, highest) in [(1.0, 1.0), (0.3, 0.6571)] {
+            let settings = PredictSettings { drained: Some(drained), ..PredictSettings::default() };
+            let own = settings.resection(&ResectionSettings::default(), [0.0, -9.81, 0.0], Supports::Fixed);
+            let found = settings.uncertainty(&own, &PriorSettings::default(), &labels()).unwrap();
+            let told: Vec<UnknownOutcome> = found.list.iter().map(UnknownOutcome::of).collect();
+            let part = told.iter().find(|u| u.name.contains("drained")).unwrap();
+            assert!((part.interval_95[1] - highest).abs() < 1e-3 && part.median == drained, "{part:?}");
+            assert!(told[0].interval_95[1] > 100.0, "a modulus has no such bound");
+        }
+    }
+
+    #[test]
+    fn every_cause_that_is_drawn_has_its_sentence() {
+        let settings = PredictSettings::default();
+        let told = |supports: Supports, settings: &PredictSettings| {
+            let way = SupportWeight { supports: supports.name().to_owned(), weight: 1.0 };
+            let found = Prediction { supports: vec![way], ..Prediction::default() };
+            assumptions(settings, (&ResectionSettings::default(), &PriorSettings::default()), &found).join(" ")
+        };
+        let sliding = told(Supports::Sliding, &settings);
+        for words in [
+            "stiff this brain is",
+            "fluid drains",
+            "depend on how much tissue is taken",
+            "within about 10 degrees",
+            "skull stands about",
+            "factor of 1.6",
+        ] {
+            assert!(sliding.contains(words), "{words}: {sliding}");
+        }
+        assert!(!told(Supports::Fixed, &settings).contains("skull stands"));
+        let drained = PredictSettings { drained: Some(0.3), ..settings };
+        assert!(
+            told(Supports::Fixed, &drained)
+                .contains("30 % of the fluid drains from the top, give or take a factor of 1.5")
+        );
     }
 
     #[test]

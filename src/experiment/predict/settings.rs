@@ -70,8 +70,7 @@ impl PredictSettings {
         let weights = [self.fixed_weight, self.sliding_weight];
         let weigh = weights.iter().all(|w| *w >= 0.0 && w.is_finite()) && weights.iter().sum::<f64>() > 0.0;
         let part = self.drained.is_none_or(|part| part > 0.0 && part <= 1.0);
-        let names: Vec<String> = self.heads.iter().enumerate().map(|(n, head)| head.name(n)).collect();
-        let apart = names.iter().enumerate().all(|(n, name)| !names[..n].contains(name));
+        let apart = (0..self.heads.len()).all(|n| !self.heads[..n].iter().any(|head| head.is_same_as(&self.heads[n])));
         first_broken(&[
             ("heads", &self.heads, !self.heads.is_empty() && apart, "one or more ways to lie, none twice"),
             (
@@ -84,7 +83,7 @@ impl PredictSettings {
             ("checks", &self.checks, self.checks <= self.draws, "at most as many as draws"),
             ("threshold_mm", &self.threshold_mm, (0.01..=50.0).contains(&self.threshold_mm), "0.01 to 50 mm"),
             ("density_log_sd", &self.density_log_sd, sd(self.density_log_sd), "0 to 3"),
-            ("drained", &self.drained, part, "a part above 0, at most 1"),
+            ("drained", &self.drained.unwrap_or_default(), part, "a part above 0, at most 1"),
             ("drained_log_sd", &self.drained_log_sd, sd(self.drained_log_sd), "0 to 3"),
             (
                 "tissue_density_kg_per_m3",
@@ -116,11 +115,14 @@ mod tests {
         };
         assert_eq!(of(&|_| ()), Ok(()));
         type Change<'a> = &'a dyn Fn(&mut PredictSettings);
-        let cases: [(&str, Change<'_>); 6] = [
+        let downward = |y: f64| Head::Down([0.0, y, 0.0]);
+        let cases: [(&str, Change<'_>); 8] = [
             ("`heads`", &|s| s.heads = Vec::new()),
-            ("`heads`", &|s| s.heads = vec![Head::Left, Head::Left]),
+            ("`heads` is [left, left]", &|s| s.heads = vec![Head::Left, Head::Left]),
+            ("`heads` is [0,-1,0, 0,-2,0]", &|s| s.heads = vec![downward(-1.0), downward(-2.0)]),
             ("`draws`", &|s| s.draws = 3),
-            ("`drained`", &|s| s.drained = Some(0.0)),
+            ("`drained` is 0.0:", &|s| s.drained = Some(0.0)),
+            ("`drained` is NaN:", &|s| s.drained = Some(f64::NAN)),
             ("`threshold_mm`", &|s| s.threshold_mm = f64::NAN),
             ("`fixed_weight and sliding_weight`", &|s| (s.fixed_weight, s.sliding_weight) = (0.0, 0.0)),
         ];

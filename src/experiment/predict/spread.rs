@@ -41,6 +41,13 @@ pub(super) fn weighed_quantile(values: &mut [(f64, f64)], share: f64) -> f64 {
     values.last().map_or(0.0, |v| v.0)
 }
 
+/// How far the place that moves most goes in all but the rest of the draws, mm: of whole draws, where a node's own reach is of
+/// that node alone.
+pub fn farthest(draws: &Draws, share: f64) -> f64 {
+    let most = |(weight, u): &(f64, Vec<[f64; 3]>)| (u.iter().map(length).fold(0.0, f64::max), *weight);
+    weighed_quantile(&mut draws.par_iter().map(most).collect::<Vec<_>>(), share)
+}
+
 /// The spread of draws over `nodes` nodes.
 pub fn spread(draws: &Draws, nodes: usize, threshold_mm: f64) -> Spread {
     let all: f64 = draws.iter().map(|(weight, _)| weight).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -90,6 +97,18 @@ mod tests {
         );
         assert!((found.sd_mm[1] - 1.0).abs() < 0.01 && (found.reach95_mm[1] - 1.96).abs() < 0.02);
         assert!((found.over[0] - 0.5).abs() < 0.01 && (found.over[1] - 0.3173).abs() < 0.01);
+    }
+
+    #[test]
+    fn no_place_goes_beyond_the_farthest_though_every_one_of_many_seldom_does() {
+        // Each of ten nodes goes far in a tenth of the draws of its own: alone it reaches 9 mm, and in every draw one does.
+        let draw =
+            |n: usize| (0..10).map(|node| [if node == n % 10 { 9.0 + n as f64 } else { 1.0 }, 0.0, 0.0]).collect();
+        let draws: Vec<(f64, Vec<[f64; 3]>)> = (0..40).map(|n| (1.0, draw(n))).collect();
+        let nodes = spread(&draws, 10, 2.0).reach95_mm.into_iter().fold(0.0, f64::max);
+        assert_eq!(farthest(&draws, 0.95), 9.0 + 37.0);
+        let within = draws.iter().filter(|(_, u)| u.iter().all(|x| x[0] <= farthest(&draws, 0.95))).count();
+        assert!(within == 38 && nodes != farthest(&draws, 0.95), "{within} {nodes}");
     }
 
     #[test]

@@ -148,10 +148,6 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
         }
         @if swept > 0 { (of_samples(outcome, swept, &cite(GENERATIVE_MODEL))) }
         @if let Some(estimate) = &outcome.estimate { (of_estimate(outcome, estimate, &cite(GENERATIVE_MODEL))) }
-        @if outcome.kind == ExperimentKind::Prediction {
-            "Unknowns were drawn by Halton's sequence from the priors stated above " (cite(GENERATIVE_MODEL))
-            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities. "
-        }
         @if !outcome.held_shear_modulus_pa.is_empty() && simulated {
             "Held at the mean of the prior of abnormal tissue: "
             (list(&outcome.held_shear_modulus_pa.keys().map(|name| tissue_name(name)).collect::<Vec<_>>())) ". "

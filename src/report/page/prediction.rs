@@ -2,7 +2,7 @@
 
 use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
-use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, TargetPlace};
+use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, SupportWeight, TargetPlace};
 use maud::{Markup, html};
 
 /// The section's body.
@@ -26,16 +26,16 @@ pub fn section(prediction: &Prediction, figure: Option<Markup>) -> Markup {
 pub fn in_a_sentence(prediction: &Prediction) -> String {
     let Some(head) = prediction.heads.first() else { return "Nothing was predicted.".to_owned() };
     let [x, y, z] = head.largest_at_mm.map(|v| fixed(v, 0));
-    let others = prediction.heads.iter().map(|h| (h.over_threshold_cc, &h.head));
-    let least = others.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| prediction.heads.len() > 1);
-    let least = least.map_or_else(String::new, |(_, name)| format!(" Least moves with the head {name}."));
+    let least = prediction.least.as_ref().map_or_else(String::new, |least| format!(" {}", least.sentence));
+    let no_farther = head.farthest_95_mm.map_or_else(String::new, |mm| {
+        format!("; in 95 of 100 cases no place moves by more than {} mm", number(mm, 2))
+    });
     format!(
-        "With the head {}, taking {} cc lets the brain move by about {} mm at most, at ({x}, {y}, {z}) mm of the scan; in 95 of 100 cases no \
-         place moves by more than {} mm. About {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
+        "With the head {}, once {} cc are taken and fluid drains, the brain is expected to move by about {} mm at most, at ({x}, {y}, {z}) mm \
+         of the scan{no_farther}. About {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
         head.head,
         number(prediction.plan.resected_cc, 2),
         number(head.largest_mm, 2),
-        number(head.reach95_largest_mm, 2),
         number(head.over_threshold_cc, 2),
         number(prediction.threshold_mm, 2),
         most(&head.shares),
@@ -113,7 +113,7 @@ fn targets(prediction: &Prediction, head: &HeadPrediction) -> Markup {
                     format!("{} %", fixed(100.0 * t.over_threshold, 0)),
                 ]
             };
-            (false, words([t.target.to_string(), t.place.name().to_owned()].into_iter().chain(cells)))
+            (false, words([t.called(), t.place.name().to_owned()].into_iter().chain(cells)))
         })
         .collect();
     html! { (table(&format!("Targets, head {}", head.head), &columns, &rows)) }
@@ -129,17 +129,23 @@ fn unknowns(prediction: &Prediction) -> Markup {
             (false, words([u.name.replace('_', " "), number(u.median, 3), format!("{low} to {high}")]))
         })
         .collect();
-    for s in &prediction.supports {
-        rows.push((
-            false,
-            words([
-                format!("supports {}", s.supports),
-                format!("{} %", fixed(100.0 * s.weight, 0)),
-                "\u{2013}".to_owned(),
-            ]),
-        ));
-    }
+    rows.extend(supports(prediction));
     table("What was drawn from", &head, &rows)
+}
+
+/// How the brain was supported in the draws: of every head where they are not alike.
+fn supports(prediction: &Prediction) -> Vec<Row> {
+    let row = |s: &SupportWeight, with: &str| -> Row {
+        let weight = format!("{} %", fixed(100.0 * s.weight, 0));
+        (false, words([format!("supports {}{with}", s.supports), weight, "\u{2013}".to_owned()]))
+    };
+    if let Some(shared) = prediction.shared_supports() {
+        return shared.iter().map(|s| row(s, "")).collect();
+    }
+    let of = |h: &HeadPrediction| -> Vec<Row> {
+        prediction.supports_of(h).iter().map(|s| row(s, &format!(", head {}", h.head))).collect()
+    };
+    prediction.heads.iter().flat_map(of).collect()
 }
 
 fn checks(checks: &[Check]) -> Markup {
@@ -161,17 +167,24 @@ fn checks(checks: &[Check]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::predict::TargetPrediction;
+    use crate::experiment::predict::{HeadComparison, TargetPrediction};
 
     fn prediction() -> Prediction {
         let head = |name: &str, cc: f64| HeadPrediction {
             head: name.to_owned(),
             largest_mm: 6.2,
-            reach95_largest_mm: 14.0,
+            reach95_largest_mm: 12.0,
+            farthest_95_mm: Some(14.0),
             over_threshold_cc: cc,
             shares: Shares { load: 0.5, stiffness: 0.2, ..Shares::default() },
             targets: vec![
-                TargetPrediction { target: 1, shift_mm: 3.25, over_threshold: 0.8, ..TargetPrediction::default() },
+                TargetPrediction {
+                    target: 1,
+                    name: Some("STN <left>".to_owned()),
+                    shift_mm: 3.25,
+                    over_threshold: 0.8,
+                    ..TargetPrediction::default()
+                },
                 TargetPrediction {
                     target: 2,
                     place: TargetPlace::Removed,
@@ -184,16 +197,16 @@ mod tests {
         Prediction {
             threshold_mm: 2.0,
             heads: vec![head("supine", 300.0), head("left", 120.0)],
+            least: Some(HeadComparison { sentence: "Least cannot be told.".to_owned(), ..HeadComparison::default() }),
             assumptions: vec!["Nothing <else> happens.".to_owned()],
             ..Prediction::default()
         }
     }
 
     #[test]
-    fn the_headline_says_how_far_how_sure_what_matters_and_which_head_moves_least() {
+    fn the_headline_says_how_far_how_sure_what_matters_and_whether_a_head_moves_least() {
         let said = in_a_sentence(&prediction());
-        for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least moves with the head left"]
-        {
+        for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."] {
             assert!(said.contains(words), "{words}: {said}");
         }
     }
@@ -202,6 +215,7 @@ mod tests {
     fn targets_have_their_row_and_of_removed_ones_nothing_is_said() {
         let page = section(&prediction(), None).into_string();
         assert!(page.contains("3.2") && page.contains("80 %") && page.contains("removed") && !page.contains("77"));
+        assert!(page.contains("1 STN &lt;left&gt;"));
         assert!(page.contains("&lt;else&gt;") && page.contains("Research software"));
     }
 }

@@ -190,6 +190,12 @@ fn what_the_images_show_of_the_shift_is_told_with_its_side() {
 }
 
 #[test]
+fn how_a_prediction_was_drawn_stands_in_its_methods_once() {
+    let html = page(outcome(ExperimentKind::Prediction)).to_html();
+    assert_eq!(html.matches("Halton").count(), 1);
+}
+
+#[test]
 fn a_worse_best_sample_is_not_praised() {
     let mut outcome = outcome(ExperimentKind::Resection);
     outcome.rest_rmse_mm = map(vec![("margin", 0.1), ("ventricle", 0.1)]);

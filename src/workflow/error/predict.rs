@@ -1,6 +1,6 @@
 //! Why no prediction can be made.
 
-use crate::experiment::predict::PlannedError;
+use crate::experiment::predict::{Head, PlannedError, TaughtError};
 use crate::mesh::OpenSurface;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -11,6 +11,8 @@ use thiserror::Error;
 pub enum PredictError {
     #[error(transparent)]
     Plan(#[from] PlannedError),
+    #[error(transparent)]
+    Taught(#[from] TaughtError),
     #[error("nothing is said of what is to be taken: give a mask in the scan's grid, or an ellipsoid")]
     NoPlan,
     #[error("`{given}` is no ellipsoid: give six numbers x,y,z,rx,ry,rz (mm, scanner, RAS+), the half axes above 0")]
@@ -28,6 +30,10 @@ pub enum PredictError {
     )]
     NoSurface { file: String },
     #[error(
+        "{file}: surfaces of this kind are not read: save it as .stl, .ply or .surf.gii (mm, RAS+), or give a mask (.nii, .nii.gz)"
+    )]
+    OtherSurface { file: String },
+    #[error(
         "{file}: {source}; close it (3D Slicer: Surface Toolbox, Fill Holes; MeshLab: Close Holes), or give a mask"
     )]
     OpenSurface { file: String, source: OpenSurface },
@@ -43,6 +49,10 @@ pub enum PredictError {
     BesideScan { plan: String, percent: f64 },
     #[error("{}: the case of one plan, and a folder for several is asked for", folder.display())]
     OnePlan { folder: PathBuf },
+    #[error("{}: the folder of several plans, and one is given", folder.display())]
+    SeveralPlans { folder: PathBuf },
+    #[error("the heads {first} and {second} lie in one way: leave one of them out")]
+    OneHead { first: Head, second: Head },
     #[error("{plan} is given twice")]
     Twice { plan: String },
     #[error("{file}: holds no point; give the targets as .csv (x,y,z in mm, RAS+), .fcsv or .mrk.json")]

@@ -4,6 +4,7 @@ use super::anat::{whole_numbers, without_resected};
 use super::earlier::HeadFacts;
 use super::reading::WithReading;
 use super::registration::pose;
+use super::shift::mask_of;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
 use crate::experiment::predict::{Planned, planned};
@@ -25,6 +26,7 @@ use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::planned_scan::{PlannedScan, once};
 use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::targets::Targets;
 use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
@@ -79,12 +81,18 @@ pub(crate) fn plan_stage(case: &Case, settings: &Settings, made: &Made, sum: &st
     made.stage((case, Subject::Plan), &NAME, VERSION, &posed).input_sha256("pre", sum).frame(Mni::NAME)
 }
 
-/// Segments the scan as a pair's would be, and looks whether the plan can be followed.
-pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Result<PlanFacts, WorkflowError> {
+/// Segments the scan as a pair's would be, and looks whether the plan can be followed and the targets lie in the head: what is
+/// refused replaces nothing.
+pub(crate) fn plan(
+    work: &Work<'_>,
+    made: &mut Made,
+    scan: &PlannedScan,
+    targets: Option<&Targets>,
+) -> Result<PlanFacts, WorkflowError> {
     let stage = plan_stage(&work.case, work.settings, made, &scan.sum);
     let stage = stage.input("resection", &encode_mask(&scan.resection));
     let stage = scan.given().fold(stage, |stage, (role, bytes)| stage.input(&role.to_string(), bytes));
-    work.run(made, &NAME, &stage, || {
+    let facts = work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("images", 2));
         work.tell(|p| p.doing("pre-operative tissue"));
         let mni_from_pre = pose(&work.case)?;
@@ -103,7 +111,9 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
-        let found = planned(&scan.plan, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
+        let drawn_mm3 = scan.resection.count() as f64 * scan.resection.grid.voxel_volume_mm3();
+        let found = planned(&scan.plan, drawn_mm3, &resected, &before.labels_mni).map_err(PredictError::Plan)?;
+        targets.map_or(Ok(()), |targets| targets.check_inside(&before.brain))?;
         let mut produced = Produced::default();
         produced.warn(&scan.plan_warnings);
         if found.outside > NOTED_OUTSIDE {
@@ -146,5 +156,10 @@ pub(crate) fn plan(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
             scans: ScanQualities { pre: Some(quality), post: None },
         });
         Ok(produced)
-    })
+    })?;
+    // Of labels that were there already.
+    if let Some(targets) = targets {
+        targets.check_inside(&mask_of(&work.case, PRE_NATIVE_BRAIN, &scan.pre.grid)?)?;
+    }
+    Ok(facts)
 }

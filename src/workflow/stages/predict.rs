@@ -10,12 +10,12 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, Forecast, ForecastError, Found, Head, HeadPrediction, Locator, Modes, PREDICTED, Planned, Posed, Prediction,
-    Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions, draws_to_csv, ellipsoid_95,
-    forecast, spread, variance_shares,
+    Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED,
+    Planned, Posed, Prediction, Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions,
+    compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast, spread, variance_shares,
 };
+use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
-use crate::image::morphology::dilate;
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
 use crate::layout::{
     NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
@@ -23,21 +23,19 @@ use crate::layout::{
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
-use crate::overlay::Drawing;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::stage_name::StageName;
+use crate::workflow::targets::Targets;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
-/// A target may lie this far outside the brain mask, in fluid or in a membrane, mm.
-const BESIDE_MM: f64 = 10.0;
 
 /// What a prediction needs of its case.
 pub(crate) struct PredictInput<'a> {
@@ -45,8 +43,8 @@ pub(crate) struct PredictInput<'a> {
     pub mesh: (&'a TetMesh, &'a [u8], &'a MeshOutcome),
     /// What is to be taken.
     pub plan: &'a Planned,
-    /// The file of targets by its name, with its bytes.
-    pub targets: Option<(&'a str, &'a [u8])>,
+    /// The points that are asked for, all in the head.
+    pub targets: Option<&'a Targets>,
 }
 
 /// Makes (or skips) the prediction.
@@ -57,28 +55,22 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
         "element": settings.estimate.element, "fields": settings.fields,
     });
     let stage = work.stage(made, &NAME, VERSION, &posed).input("mesh", input.mesh.1).frame(Pre::NAME);
-    let stage = input.targets.iter().fold(stage, |stage, (_, bytes)| stage.input("targets", bytes));
+    let stage = input.targets.iter().fold(stage, |stage, targets| stage.input("targets", &targets.bytes));
     work.run(made, &NAME, &stage, || {
         let patient = Patient::read(work, input)?;
         let mut produced = Produced::default();
         let weights = settings.predict.weights(&settings.resection);
-        let supports: Vec<SupportWeight> = weights
-            .iter()
-            .map(|(s, weight)| SupportWeight { supports: s.name().to_owned(), weight: *weight })
-            .collect();
+        let weighed = |(s, weight): &(Supports, f64)| SupportWeight { supports: s.name().to_owned(), weight: *weight };
         let mut prediction = Prediction {
             plan: input.plan.clone(),
             threshold_mm: settings.predict.threshold_mm,
             draws: settings.predict.draws,
-            assumptions: assumptions(&settings.predict, (&settings.resection, &settings.prior), &supports),
-            supports,
+            supports: weights.iter().map(weighed).collect(),
             ..Prediction::default()
         };
         let heads = &settings.predict.heads;
         let bodies: Vec<Vec<Posed>> = heads.iter().map(|head| patient.posed(work, head)).collect::<Result<_, _>>()?;
-        // The body with the most unknowns has them all.
-        let most = bodies[0].iter().max_by_key(|posed| posed.uncertainty.list.len());
-        prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
+        let mut drawn_heads = Vec::new();
         let forecasts = forecasts(work, &bodies, patient.input.mesh.0.nodes_mm().len());
         for (number, ((head, bodies), forecasts)) in heads.iter().zip(&bodies).zip(forecasts).enumerate() {
             let found = Lying::of(work, &patient, head, (bodies, forecasts), &mut produced)?;
@@ -86,11 +78,18 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             prediction.checks.extend(found.checks.iter().cloned());
             prediction.heads.push(found.in_numbers(&patient, head, &state));
             let field = patient.field(&found.spread);
-            patient.files(&state, &found, &field, &mut produced)?;
+            let draws = patient.files(&state, &found, &field, &mut produced)?;
+            drawn_heads.push(HeadDraws { head: head.to_string(), supports: found.supports, draws });
             if number == 0 {
                 carried(work, &field, &mut produced)?;
             }
         }
+        prediction.least = compared_heads(&drawn_heads);
+        // The drawn body with the most unknowns has them all.
+        let drawn = |posed: &&Posed| prediction.heads.iter().any(|head| head.is_of(&posed.supports));
+        let most = bodies[0].iter().filter(drawn).max_by_key(|posed| posed.uncertainty.list.len());
+        prediction.unknowns = most.iter().flat_map(|b| &b.uncertainty.list).map(UnknownOutcome::of).collect();
+        prediction.assumptions = assumptions(&settings.predict, (&settings.resection, &settings.prior), &prediction);
         let json = serde_json::to_string_pretty(&prediction).expect("figures are plain data") + "\n";
         produced.files.push((PREDICTION_JSON.to_owned(), json.into_bytes()));
         produced.facts = facts(&prediction);
@@ -126,6 +125,7 @@ fn forecasts(work: &Work<'_>, bodies: &[Vec<Posed>], nodes: usize) -> Vec<Vec<Re
 
 /// A target in both frames.
 struct Target {
+    name: Option<String>,
     at_mm: [f64; 3],
     place: TargetPlace,
     found: Found,
@@ -152,34 +152,23 @@ impl<'a> Patient<'a> {
         };
         let head = PlannedHead::read(case)?;
         let mut patient = Self { input, head, mni_from_pre, around, targets: Vec::new(), settings: work.settings };
-        if let Some((name, bytes)) = input.targets {
-            patient.targets = patient.targets_of(name, bytes)?;
-        }
+        patient.targets = input.targets.map_or_else(Vec::new, |targets| patient.targets_of(targets));
         Ok(patient)
     }
 
-    /// Finds every target in the mesh; one outside the head is refused.
-    fn targets_of(&self, name: &str, bytes: &[u8]) -> Result<Vec<Target>, WorkflowError> {
-        let drawing = Drawing::decode(bytes, name)?;
-        let file = || name.to_owned();
-        if drawing.points_mm.is_empty() {
-            return Err(PredictError::NoTarget { file: file() }.into());
-        }
-        let head = dilate(&self.around.brain, BESIDE_MM);
-        let of = |(n, x): (usize, &[f64; 3])| -> Result<Target, WorkflowError> {
+    /// Finds every target in the mesh.
+    fn targets_of(&self, targets: &Targets) -> Vec<Target> {
+        let of = |(x, name): (&[f64; 3], &Option<String>)| {
             let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
-            if head.nearest(p) != Some(true) {
-                return Err(PredictError::TargetOutside { file: file(), target: n + 1, at_mm: *x }.into());
-            }
             let found = Locator(self.input.mesh.0).find(self.mni_from_pre.apply(p).mm.into());
             let place = match self.around.resected.nearest(p) {
                 Some(true) => TargetPlace::Removed,
                 _ if found.outside_mm > 0.0 => TargetPlace::Fluid,
                 _ => TargetPlace::Tissue,
             };
-            Ok(Target { at_mm: *x, place, found })
+            Target { name: name.clone(), at_mm: *x, place, found }
         };
-        drawing.points_mm.iter().enumerate().map(of).collect()
+        targets.points_mm.iter().zip(&targets.names).map(of).collect()
     }
 
     /// The body as each way of supporting it poses it, for one head.
@@ -212,14 +201,14 @@ impl<'a> Patient<'a> {
         shift_field(&state, None, &self.mni_from_pre.inverse(), &self.around, &self.settings.fields)
     }
 
-    /// Fields of one state in the scan's frame, and the state on the mesh.
+    /// Fields of one state in the scan's frame, and the state on the mesh; returns the draws as they are kept.
     fn files(
         &self,
         state: &str,
         found: &Lying,
         field: &ShiftField,
         produced: &mut Produced,
-    ) -> Result<(), WorkflowError> {
+    ) -> Result<Vec<DrawnState>, WorkflowError> {
         let (mesh, spread) = (self.input.mesh.0, &found.spread);
         let pre_from_mni = self.mni_from_pre.inverse();
         let nodes: Vec<[f64; 3]> =
@@ -255,7 +244,7 @@ impl<'a> Patient<'a> {
         if field.changed > 0 {
             produced.warn([Warning::Folds { state: state.to_owned(), voxels: field.changed }]);
         }
-        Ok(())
+        Ok(modes.draws)
     }
 }
 
@@ -268,6 +257,7 @@ struct Lying {
     checks: Vec<Check>,
     shares: crate::experiment::predict::Shares,
     states: usize,
+    supports: Vec<SupportWeight>,
 }
 
 impl Lying {
@@ -304,6 +294,11 @@ impl Lying {
             thinned.iter().map(|(weight, response, unknowns)| (*weight, response, *unknowns)).collect();
         let shares = variance_shares(&models);
         let states = found.iter().map(|(_, f)| f.states).sum();
+        let used = |(posed, _): &(&Posed, Forecast)| SupportWeight {
+            supports: posed.supports.clone(),
+            weight: posed.weight / all,
+        };
+        let supports = found.iter().map(used).collect();
         let (mut draws, mut named, mut told) = (Vec::new(), Vec::new(), Vec::new());
         for (posed, forecast) in found {
             let weight = posed.weight / all / forecast.draws_mm.len() as f64;
@@ -312,7 +307,7 @@ impl Lying {
             told.extend(forecast.check);
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
-        Ok(Self { draws, named, spread, checks: told, shares, states })
+        Ok(Self { draws, named, spread, checks: told, shares, states, supports })
     }
 
     /// The draws as they are kept.
@@ -349,17 +344,24 @@ impl Lying {
             median_mm: rounded(median(&sizes)),
             sd_median_mm: rounded(median(&self.spread.sd_mm)),
             reach95_largest_mm: rounded(self.spread.reach95_mm.iter().copied().fold(0.0, f64::max)),
+            farthest_95_mm: Some(rounded(farthest(&self.draws, 0.95))),
             over_threshold_cc: rounded(over.sum()),
             shares: self.shares,
             states_solved: self.states,
+            supports: self.supports.clone(),
             targets: (0..patient.targets.len()).map(|n| self.target(patient, n)).collect(),
         }
     }
 
     fn target(&self, patient: &Patient<'_>, number: usize) -> TargetPrediction {
-        let Target { at_mm, place, found } = &patient.targets[number];
-        let mut told =
-            TargetPrediction { target: number + 1, place: *place, at_mm: *at_mm, ..TargetPrediction::default() };
+        let Target { name, at_mm, place, found } = &patient.targets[number];
+        let mut told = TargetPrediction {
+            target: number + 1,
+            name: name.clone(),
+            place: *place,
+            at_mm: *at_mm,
+            ..TargetPrediction::default()
+        };
         if *place == TargetPlace::Removed {
             told.expected_mm = *at_mm;
             return told;

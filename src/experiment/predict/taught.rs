@@ -1,0 +1,120 @@
+//! Whether a cohort's prior is of what a prediction draws. A prior that is taken up in part, or not at all, would be called the
+//! cohort's all the same.
+
+use super::settings::PredictSettings;
+use crate::experiment::prior::PriorSettings;
+use crate::experiment::resection::ResectionSettings;
+use crate::experiment::sample::Tissue;
+use thiserror::Error;
+
+/// What a cohort's moduli are called, before the tissue's name.
+const MODULUS: &str = "shear_modulus_pa of ";
+
+/// Why a cohort says nothing of a prediction.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum TaughtError {
+    #[error(
+        "`population` of the table [prior] teaches {}, and the prediction has {}: give `tissues = {}` in the table [predict], or leave \
+         the population out",
+        in_words(taught), in_words(drawn), 3 - drawn.len().clamp(1, 2)
+    )]
+    OtherTissues { taught: Vec<String>, drawn: Vec<String> },
+    #[error(
+        "`population` of the table [prior] was learnt under an effective density of {learnt} kg/m3, and where a part of the fluid has drained \
+         (`drained` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that part out"
+    )]
+    OtherWeight { learnt: f64, weighs: f64 },
+}
+
+impl PredictSettings {
+    /// Refuses a cohort of other tissues, or one that was weighed otherwise.
+    ///
+    /// # Errors
+    /// [`TaughtError`].
+    pub fn check_taught(&self, own: &ResectionSettings, prior: &PriorSettings) -> Result<(), TaughtError> {
+        let Some(population) = prior.population.as_ref().filter(|p| !p.parameters.is_empty()) else { return Ok(()) };
+        let drawn: Vec<String> = self.tissue_list().into_iter().map(|tissue| tissue.name).collect();
+        let taught: Vec<String> = prior.taught_tissues().map(str::to_owned).collect();
+        if taught.iter().any(|tissue| !drawn.contains(tissue)) {
+            return Err(TaughtError::OtherTissues { taught, drawn });
+        }
+        // Without `drained` the load is what the settings were held against already.
+        let weighs = self.drained.map_or(own.density_kg_per_m3, |_| self.tissue_density_kg_per_m3);
+        if population.is_under(weighs) {
+            return Ok(());
+        }
+        Err(TaughtError::OtherWeight { learnt: population.density_kg_per_m3, weighs })
+    }
+}
+
+impl PriorSettings {
+    /// The tissues whose moduli a cohort has taught.
+    pub fn taught_tissues(&self) -> impl Iterator<Item = &str> {
+        let taught = self.population.iter().flat_map(|population| &population.parameters);
+        taught.filter_map(|learnt| learnt.name.strip_prefix(MODULUS))
+    }
+
+    /// Where the stiffness of these tissues is drawn from, in words.
+    pub(super) fn source_of(&self, tissues: &[Tissue]) -> String {
+        let studies = "what published studies of brain tissue found";
+        let taught = |tissue: &&Tissue| self.taught_tissues().any(|name| name == tissue.name);
+        let (cohort, others): (Vec<&Tissue>, Vec<&Tissue>) = tissues.iter().partition(taught);
+        let Some(patients) = self.patients().filter(|_| !cohort.is_empty()) else { return studies.to_owned() };
+        let shown = format!("what the scans of {patients} patients of a cohort have shown");
+        if others.is_empty() {
+            return shown;
+        }
+        let names = |of: &[&Tissue]| of.iter().map(|t| t.name.replace('_', " ")).collect::<Vec<_>>().join(" and ");
+        format!("{shown} ({}) and {studies} ({})", names(&cohort), names(&others))
+    }
+}
+
+fn in_words(tissues: &[String]) -> String {
+    tissues.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::population::{LearntPrior, PopulationPrior};
+
+    fn taught(names: &[&str]) -> PriorSettings {
+        let learnt = |name: &&str| LearntPrior { name: format!("{MODULUS}{name}"), log_mean: 6.3, log_sd: 0.2 };
+        let parameters = names.iter().map(learnt).collect();
+        let population =
+            PopulationPrior { density_kg_per_m3: 100.0, patients: 8, parameters, ..PopulationPrior::none() };
+        PriorSettings { population: Some(population), ..PriorSettings::default() }
+    }
+
+    fn refused(settings: &PredictSettings, names: &[&str]) -> Option<String> {
+        let own = ResectionSettings::default();
+        settings.check_taught(&own, &taught(names)).err().map(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_cohort_of_other_tissues_is_refused_and_one_of_some_of_them_is_said_to_be() {
+        let two = PredictSettings::default();
+        let one = PredictSettings { tissues: 1, ..PredictSettings::default() };
+        let said = refused(&two, &["brain"]).unwrap();
+        for words in ["teaches `brain`", "`grey_matter` and `white_matter`", "`tissues = 1`"] {
+            assert!(said.contains(words), "{said}");
+        }
+        assert!(refused(&one, &["grey_matter", "white_matter"]).unwrap().contains("`tissues = 2`"));
+        assert_eq!(
+            (refused(&one, &["brain"]), refused(&two, &["grey_matter"]), refused(&two, &[])),
+            (None, None, None)
+        );
+        let of = |names: &[&str]| taught(names).source_of(&two.tissue_list());
+        assert!(!of(&[]).contains("cohort") && !of(&["grey_matter", "white_matter"]).contains("studies"));
+        assert!(of(&["grey_matter"]).contains("cohort have shown (grey matter) and what published studies"));
+    }
+
+    #[test]
+    fn a_cohort_weighed_otherwise_is_refused_where_fluid_has_drained_too() {
+        let drained = PredictSettings { tissues: 1, drained: Some(0.3), ..PredictSettings::default() };
+        let said = refused(&drained, &["brain"]).unwrap();
+        assert!(said.contains("100 kg/m3") && said.contains("1040 kg/m3") && said.contains("`drained`"), "{said}");
+        assert_eq!(refused(&PredictSettings { tissue_density_kg_per_m3: 100.0, ..drained }, &["brain"]), None);
+    }
+}

@@ -1,0 +1,91 @@
+//! What a refused job leaves: the settings that the folder had, and nothing of its own where the folder was no case.
+
+use super::case::Case;
+use super::error::{ErrorKind, WorkflowError};
+use crate::artefact::write_whole;
+use crate::layout;
+
+/// How a folder was before a job.
+#[derive(Debug)]
+pub(crate) struct Before {
+    case: Case,
+    /// The bytes of its settings.
+    settings: Option<Vec<u8>>,
+    /// No job had finished a stage in it.
+    empty: bool,
+}
+
+impl Before {
+    /// Remembers a folder.
+    pub fn of(case: &Case) -> Self {
+        let settings = std::fs::read(case.path(layout::SETTINGS)).ok();
+        Self { case: case.clone(), settings, empty: case.subject().is_none() }
+    }
+
+    /// After an error: the settings as they were, so that what is there is still of its settings; and where an input was refused
+    /// in a folder that was no case, what the job has made there is taken away.
+    pub fn put_back(&self, error: &WorkflowError) {
+        let settings = self.case.path(layout::SETTINGS);
+        // The job's own error is told, not the disk's.
+        match &self.settings {
+            Some(bytes) => write_whole(&settings, bytes).unwrap_or_default(),
+            None => std::fs::remove_file(settings).unwrap_or_default(),
+        }
+        if self.empty && error.kind() == ErrorKind::Rejected && self.settings.is_none() {
+            self.clear();
+        }
+    }
+
+    /// Files of the stages that have finished, then folders that are empty without them.
+    fn clear(&self) {
+        for manifest in self.case.recorded() {
+            manifest.remove(self.case.folder());
+            for file in manifest.outputs.keys() {
+                let folders = std::path::Path::new(file).ancestors().skip(1).filter(|f| !f.as_os_str().is_empty());
+                folders.for_each(|folder| std::fs::remove_dir(self.case.folder().join(folder)).unwrap_or_default());
+            }
+        }
+        std::fs::remove_dir(self.case.path(".stages")).ok();
+        std::fs::remove_file(self.case.path(layout::LOCK)).ok();
+        std::fs::remove_dir(self.case.folder()).ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::artefact::{Produced, Stage};
+    use crate::workflow::error::PredictError;
+
+    /// A job that writes settings, finishes its first stage and is then refused.
+    fn refused_in(folder: &std::path::Path) {
+        let case = Case::at(folder);
+        let before = Before::of(&case);
+        std::fs::create_dir_all(folder).unwrap();
+        std::fs::write(case.path(layout::SETTINGS), "new").unwrap();
+        let made = Produced { files: vec![(layout::MNI_FROM_PRE_TEXT.to_owned(), vec![1])], ..Produced::default() };
+        Stage::new("pose", 1, folder, &"new").run(false, || Ok::<_, PredictError>(made)).unwrap();
+        before.put_back(&PredictError::NoPlan.into());
+    }
+
+    #[test]
+    fn a_refused_job_leaves_no_folder_of_its_own_and_no_settings_of_its_own() {
+        let all = tempfile::tempdir().unwrap();
+        let fresh = all.path().join("fresh");
+        refused_in(&fresh);
+        assert!(!fresh.exists());
+        let users = all.path().join("users");
+        std::fs::create_dir(&users).unwrap();
+        std::fs::write(users.join("notes.txt"), "mine").unwrap();
+        refused_in(&users);
+        let left: Vec<_> = std::fs::read_dir(&users).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["notes.txt"]);
+        let used = all.path().join("used");
+        std::fs::create_dir_all(used.join(".stages")).unwrap();
+        std::fs::write(used.join(".stages/pose.manifest.json"), "{}").unwrap();
+        std::fs::write(used.join(layout::SETTINGS), "old").unwrap();
+        refused_in(&used);
+        assert_eq!(std::fs::read(used.join(layout::SETTINGS)).unwrap(), b"old");
+        assert!(used.join(layout::MNI_FROM_PRE_TEXT).exists(), "a case keeps what is finished");
+    }
+}
