@@ -65,9 +65,9 @@ fn is_near(brain: &Mask<Pre>, x: [f64; 3]) -> bool {
         // A range of negative length holds nothing.
         if low > high { 0..0 } else { low as usize..high as usize + 1 }
     };
-    let [xs, ys, zs] = [0, 1, 2].map(around);
+    let [mut xs, ys, zs] = [0, 1, 2].map(around);
     let near = |voxel: [usize; 3]| (grid.centre(voxel).mm - p.mm).norm() <= BESIDE_MM;
-    xs.into_iter().any(|i| ys.clone().any(|j| zs.clone().any(|k| brain.data[grid.index(i, j, k)] && near([i, j, k]))))
+    xs.any(|i| ys.clone().any(|j| zs.clone().any(|k| brain.data[grid.index(i, j, k)] && near([i, j, k]))))
 }
 
 #[cfg(test)]

@@ -138,8 +138,8 @@ pub fn same_way(a: [f64; 3], b: [f64; 3]) -> bool {
 /// The first two of several heads that are one way to lie, once the pose is known.
 pub fn twice(heads: &[Head], mni_from_pre: &RigidTransform<Pre, Mni>) -> Option<(Head, Head)> {
     let down: Vec<[f64; 3]> = heads.iter().map(|head| head.gravity_m_per_s2(mni_from_pre)).collect();
-    let pairs = (0..heads.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-    pairs.into_iter().find(|&(a, b)| same_way(down[a], down[b])).map(|(a, b)| (heads[a], heads[b]))
+    let mut pairs = (0..heads.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    pairs.find(|&(a, b)| same_way(down[a], down[b])).map(|(a, b)| (heads[a], heads[b]))
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! A draw of a number is the same patient however the head lies, so heads are compared draw by draw, as plans are.
 
 use super::modes::DrawnState;
-use super::outcome::SupportWeight;
 use super::plans::{PlanDraws, compared_plans};
+use super::support::SupportWeight;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

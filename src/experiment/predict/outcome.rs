@@ -4,6 +4,7 @@ use super::check::Check;
 use super::cut::Planned;
 use super::heads::HeadComparison;
 use super::shares::Shares;
+use super::support::SupportWeight;
 use super::uncertain::Cause;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -139,14 +140,4 @@ pub struct UnknownOutcome {
     pub median: f64,
     /// 95 % of its prior lie between.
     pub interval_95: [f64; 2],
-}
-
-/// A way of supporting the brain.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SupportWeight {
-    /// `fixed` or `sliding`.
-    pub supports: String,
-    /// How probable it was taken to be.
-    pub weight: f64,
 }

@@ -152,7 +152,7 @@ pub fn assumptions(
 
 #[cfg(test)]
 mod tests {
-    use super::super::outcome::SupportWeight;
+    use super::super::support::SupportWeight;
     use super::*;
     use crate::geometry::Mni;
     use crate::image::Grid;

@@ -1,7 +1,8 @@
 //! How the skull holds the brain, as it was drawn: a way that finds no equilibrium with a head is left out, and the others count
 //! for more.
 
-use super::outcome::{HeadPrediction, Prediction, SupportWeight};
+use super::outcome::{HeadPrediction, Prediction};
+use super::support::SupportWeight;
 
 impl Prediction {
     /// The ways that a head's draws are of. An earlier version did not keep them.
@@ -18,7 +19,7 @@ impl Prediction {
     /// How the skull holds the brain: a sentence, or one for each head where a way was left out of some.
     pub(super) fn supports_in_words(&self) -> Vec<String> {
         let of = |with: String, used: &[SupportWeight]| {
-            let ways = used.iter().map(in_words).collect::<Vec<_>>().join(", or ");
+            let ways = used.iter().map(SupportWeight::in_words).collect::<Vec<_>>().join(", or ");
             let left_out = used.len() < self.supports.len();
             let rest = if left_out {
                 " Held otherwise it finds no equilibrium under these loads; that is left out."
@@ -45,17 +46,6 @@ impl HeadPrediction {
     pub fn is_of(&self, supports: &str) -> bool {
         self.supports.iter().any(|way| way.supports == supports)
     }
-}
-
-impl SupportWeight {
-    fn slides(&self) -> bool {
-        self.supports == "sliding"
-    }
-}
-
-fn in_words(way: &SupportWeight) -> String {
-    let what = if way.slides() { "slides on the skull" } else { "is held at its base and at the falx" };
-    format!("it {what} (weight {:.0} %)", 100.0 * way.weight)
 }
 
 #[cfg(test)]
