@@ -36,10 +36,15 @@ pub enum FemError {
     )]
     NoFacets { set: String },
     #[error(
-        "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four nodes of cell {cell}; mesh the \
+        "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four facets of cell {cell}; mesh the \
          body so that it conforms to the sheet, or hold the set in `fixed`"
     )]
     NoSheet { set: String, cell: usize },
+    #[error(
+        "the body cut open along set `{set}` leaves a piece of {cells} cells, among them cell {cell}, that hangs on to the rest by no \
+         facet and is not held: hold a set of it in `fixed`, mesh the body with smaller cells there, or hold `{set}` as well"
+    )]
+    Floats { set: String, cells: usize, cell: usize },
     #[error(
         "the wall before set `{set}` is the field `{name}`, which a scenario file cannot hold; give the wall as \
          \"own-surface\" or \"plane\", or call the library with the field"
