@@ -13,6 +13,18 @@ pub enum FemError {
     UnknownSet { set: String, known: String },
     #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
     NothingHeld,
+    #[error("set `{set}` is both {first} and {second}: take one of the two away")]
+    TwoSupports { set: String, first: &'static str, second: &'static str },
+    #[error(
+        "the whole body lies beyond the plane before set `{set}`, by {least_mm:.1} mm and more: turn `wall.normal`, which points to \
+         the side that is free, or move `wall.point_mm`"
+    )]
+    BeyondWall { set: String, least_mm: f64 },
+    #[error(
+        "nothing but springs holds the body, and they would give way by {give_mm:.3e} mm under its load, more than the body is large \
+         ({size_mm:.0} mm): raise `tethers.stiffness_pa_per_mm`, or hold a set in `fixed`"
+    )]
+    WeakSprings { give_mm: f64, size_mm: f64 },
     #[error("set `{set}` is empty: nothing can be held by it; name another set, or tag the mesh again")]
     EmptySet { set: String },
     #[error("every node is held: there is nothing to compute; take a set out of `fixed`")]

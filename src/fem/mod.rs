@@ -44,7 +44,7 @@ pub use scenario::{
 pub use sensitivity::By;
 pub use state::State;
 pub use stiffness::Stiffness;
-pub use warning::FemWarning;
+pub use warning::{FemWarning, Idle};
 
 use crate::mesh::TetMesh;
 
