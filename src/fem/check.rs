@@ -80,7 +80,6 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     if let Some(csf) = loads.csf.filter(|csf| csf.density_kg_per_m3 <= 0.0) {
         return refuse("loads.csf.density_kg_per_m3", csf.density_kg_per_m3, "positive (1007 for cerebrospinal fluid)");
     }
-    check_supports(scenario)?;
     for contact in &scenario.contact {
         let key = |name: &str| format!("contact.{name}` of set `{}", contact.set);
         for (name, value) in
@@ -129,8 +128,9 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     Ok(())
 }
 
-/// No set is held in two ways that exclude each other.
-fn check_supports(scenario: &Scenario) -> Result<(), FemError> {
+/// No set is held in two ways that exclude each other. Not of a model that is changed while it is looked at: there a set that slides
+/// may be held for a while.
+pub(super) fn check_supports(scenario: &Scenario) -> Result<(), FemError> {
     let sliding = |set: &String| scenario.supports.get(set) == Some(&Support::Sliding);
     if let Some(set) = scenario.fixed.iter().find(|set| sliding(set)) {
         return Err(FemError::TwoSupports {
