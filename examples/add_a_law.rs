@@ -11,8 +11,8 @@ use hgm::fem::{Loads, Scenario, simulate};
 use hgm::geometry::Native;
 use hgm::image::{Grid, LabelMap};
 use hgm::material::law::{
-    Card, Hyperelastic, Law, LawParameter, Material, Range, Role, Stability, Tangent, UniaxialCurve, Values, Volume,
-    check_hyperelastic,
+    Card, Estimated, Hyperelastic, Law, LawParameter, Material, Range, Role, Stability, Tangent, UniaxialCurve, Values,
+    Volume, check_hyperelastic,
 };
 use hgm::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use hgm::segment::label;
@@ -65,6 +65,10 @@ impl Law for Definition {
 
     fn measured(&self, _values: &[f64]) -> Option<([f64; 2], Stability)> {
         None
+    }
+
+    fn estimated(&self) -> Estimated {
+        Estimated::Not
     }
 
     fn examples(&self) -> Vec<Values> {

@@ -9,6 +9,7 @@ use crate::material::generative::{
     GenerativeModel, SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
 };
 use crate::material::gp::Spread;
+use crate::material::law::{Estimated, Shape, ShapeKnown};
 use crate::material::literature::{Curves, LiteratureModel, table};
 use crate::material::meta_model::{FitError, MetaModel, MetaModelSettings};
 use crate::material::rheometry::{Measured, Rheometry, fit_rheometry};
@@ -115,6 +116,15 @@ pub enum PriorError {
     /// The study-level model of the embedded studies could not be fitted.
     #[error("the study-level model gives no prior: {0}")]
     StudyLevel(#[from] study_level::FitError),
+    /// The law does not say what an estimate may change of it.
+    #[error(
+        "setting `law` of the table [prior] is `{law}`, whose parameters no estimate can change; take one of {}",
+        MetaModel::estimable().join(", ")
+    )]
+    NotEstimated {
+        /// The law.
+        law: MetaModel,
+    },
     /// No level.
     #[error(
         "setting `sd_levels` of the table [resection] (of a phantom: [phantom]) is empty: give at least one level, \
@@ -258,11 +268,11 @@ const DRAWN_STRETCHES: usize = 101;
 /// Standard deviation of the log odds of a share of which nothing is known but that it is one (the logistic's).
 const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 
-/// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and the exponent of
-/// Ogden's law or the share of C1 of Mooney and Rivlin's. The modulus' mean and spread, and its correlation with an exponent,
-/// are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
+/// The joint prior of all that an estimate may change of a tissue's law: the shear modulus at rest, and what the
+/// law names beside it: the exponent of Ogden's, the limit of Gent's, the share of C1 of Mooney and Rivlin's. The modulus' mean and
+/// spread, and its correlation with an exponent or a limit, are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
 /// report) or, of the study-level model, of persons nobody has measured; then what the paper's process says stands beside it, as the
-/// average of the studies. Those curves share their shape far more than studies do, so an exponent's mean and spread are those
+/// average of the studies. Those curves share their shape far more than studies do, so an exponent's or a limit's mean and spread are those
 /// of the published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
 /// as another. A person's tissues go together (a laboratory that finds one soft finds the other soft): how much stiffer one is
@@ -332,9 +342,11 @@ fn of_one_person(known: &mut [(&Tissue, (Unknown, LogPrior))], prior: &PriorSett
 /// The same as the literature alone has it.
 fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unknown, LogPrior)>, PriorError> {
     let modulus = Unknown::ShearModulus(tissue.clone());
-    if prior.law == MetaModel::NEO_HOOKEAN {
-        return Ok(vec![(modulus, log_prior(tissue, prior)?)]);
-    }
+    let shape = match prior.law.estimated() {
+        Estimated::Modulus => return Ok(vec![(modulus, log_prior(tissue, prior)?)]),
+        Estimated::Shaped(shape) => shape,
+        Estimated::Not => return Err(PriorError::NotEstimated { law: prior.law }),
+    };
     let law = if prior.law == MetaModel::OGDEN { MetaModel::OGDEN_HIGH } else { prior.law };
     let settings = SampleSettings { model: law, stretches: DRAWN_STRETCHES, ..sample_settings(prior) };
     let task = task_of(tissue, prior.study)?;
@@ -349,29 +361,31 @@ fn literature_priors(tissue: &Tissue, prior: &PriorSettings) -> Result<Vec<(Unkn
     let draws = draws.map_err(|source| PriorError::Fit { tissue: tissue.name.clone(), source })?;
     let moduli: Vec<f64> = draws.iter().map(|d| d.shear_modulus_pa.ln()).collect();
     let (mean, sd) = mean_and_sd(&moduli);
-    let shape = Unknown::Shape(tissue.clone(), law);
-    let of_shape = if law == MetaModel::MOONEY_RIVLIN {
-        shape.prior(0.0, ANY_SHARE_SD)
-    } else {
-        let exponents: Vec<f64> = draws.iter().map(|d| d.fit.parameters[1]).collect();
-        let (drawn_mean, drawn_sd) = mean_and_sd(&exponents);
-        let products = moduli.iter().zip(&exponents).map(|(m, e)| (m - mean) * (e - drawn_mean));
-        let correlation = products.sum::<f64>() / (draws.len() as f64 - 1.0) / (sd * drawn_sd);
-        let (shape_mean, shape_sd) = mean_and_sd(&exponents_of_studies(law));
-        LogPrior { correlation: vec![correlation], ..shape.prior(shape_mean, shape_sd) }
+    let unknown = Unknown::Shape(tissue.clone(), shape);
+    let of_shape = match shape.known {
+        ShapeKnown::AnyShare => unknown.prior(0.0, ANY_SHARE_SD),
+        ShapeKnown::Studies => {
+            let drawn: Vec<f64> = draws.iter().map(|d| (shape.number)(&law.values(&d.fit.parameters))).collect();
+            let (drawn_mean, drawn_sd) = mean_and_sd(&drawn);
+            let products = moduli.iter().zip(&drawn).map(|(m, e)| (m - mean) * (e - drawn_mean));
+            let correlation = products.sum::<f64>() / (draws.len() as f64 - 1.0) / (sd * drawn_sd);
+            let (shape_mean, shape_sd) = mean_and_sd(&shapes_of_studies(law, shape));
+            LogPrior { correlation: vec![correlation], ..unknown.prior(shape_mean, shape_sd) }
+        }
     };
-    Ok(vec![(modulus.clone(), modulus.prior(mean, sd)), (shape, of_shape)])
+    Ok(vec![(modulus.clone(), modulus.prior(mean, sd)), (unknown, of_shape)])
 }
 
-/// Exponents of the published hyperelastic models of healthy tissue, each fitted over the stretches it was measured at.
-fn exponents_of_studies(law: MetaModel) -> Vec<f64> {
+/// Shapes of the published hyperelastic models of healthy tissue, each fitted over the stretches it was measured at.
+fn shapes_of_studies(law: MetaModel, shape: &Shape) -> Vec<f64> {
     let healthy = |model: &LiteratureModel| model.task.region != Region::Abnormal;
     let hyperelastic = |model: &LiteratureModel| model.task.kind == StudyKind::Hyperelastic;
     let fitted = |model: LiteratureModel| {
         let curve = model.curve(Curves::Corrected);
         let values_pa = curve.energies_pa.iter().map(|w| w.max(0.0)).collect();
         let test = Rheometry { measured: Measured::Energy, stretches: curve.stretches, values_pa };
-        fit_rheometry(law, &test, &MetaModelSettings::default()).ok().map(|fit| fit.parameters[1])
+        let fit = fit_rheometry(law, &test, &MetaModelSettings::default()).ok()?;
+        Some((shape.number)(&law.values(&fit.parameters)))
     };
     table().into_iter().filter(hyperelastic).filter(healthy).filter_map(fitted).collect()
 }
@@ -473,7 +487,7 @@ mod tests {
     #[test]
     fn a_persons_tissues_go_together() {
         let tissues = Tissue::grey_and_white();
-        for law in [MetaModel::NEO_HOOKEAN, MetaModel::OGDEN, MetaModel::MOONEY_RIVLIN] {
+        for law in MetaModel::all() {
             let person = PriorSettings { model: Some(GenerativeModel::StudyLevel), law, ..PriorSettings::default() };
             let priors: Vec<LogPrior> = law_priors(&tissues, &person).unwrap().into_iter().map(|(_, p)| p).collect();
             let white = priors.len() / 2;
@@ -527,5 +541,11 @@ mod tests {
         assert!((ogden[0].1.mean - neo[0].1.mean).abs() < 0.5 * neo[0].1.sd.unwrap(), "{ogden:?} {neo:?}");
         assert!(ogden[1].1.mean < -6.0 && ogden[1].1.sd.unwrap() > 0.1, "{ogden:?}");
         assert!(ogden[1].1.correlation[0].abs() < 1.0);
+        // Random curves share their shape, studies do not: a limit is known within powers of ten, in its logarithm.
+        let gent = PriorSettings { law: "gent".parse().unwrap(), ..PriorSettings::default() };
+        let gent = law_priors(std::slice::from_ref(tissue), &gent).unwrap();
+        let limit = &gent[1].1;
+        assert_eq!((limit.scale, limit.name.as_str()), (Scale::Logarithm, "jm of grey_matter"));
+        assert!(limit.of_average().sd.unwrap() > 1.0 && limit.correlation[0].abs() < 1.0, "{limit:?}");
     }
 }

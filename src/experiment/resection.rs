@@ -51,7 +51,7 @@ impl CsfSettings {
     pub fn check(&self) -> Result<(), SettingError> {
         let density = self.density_kg_per_m3;
         first_broken(&[
-            ("csf.density_kg_per_m3", &density, density >= 0.0 && density.is_finite(), "0 or more"),
+            ("csf.density_kg_per_m3", &density, density > 0.0 && density.is_finite(), "positive"),
             ("csf.drained", &self.drained, (0.0..=1.0).contains(&self.drained), "a part from 0 to 1"),
         ])
     }
@@ -157,7 +157,17 @@ impl Default for ResectionSettings {
     }
 }
 
+/// What a tissue's density must be where there is a fluid.
+const TISSUE_RULE: &str = "at least the fluid's density in the table [resection.csf]: beside a fluid it is the tissue's own (1040), an \
+    effective density (100, 300) goes without that table";
+
 impl ResectionSettings {
+    /// Whether anything pulls or pushes.
+    pub fn is_loaded(&self) -> bool {
+        let weight = self.gravity_m_per_s2 != [0.0; 3] && self.density_kg_per_m3 > 0.0;
+        weight || self.pressure.iter().any(|load| load.pressure_pa != 0.0)
+    }
+
     /// Refuses what no simulation can be posed with.
     ///
     /// # Errors
@@ -170,10 +180,13 @@ impl ResectionSettings {
         if let Some(csf) = &self.csf {
             csf.check()?;
         }
+        // Lighter tissue would float: an effective density has the fluid's part of the weight taken off already.
+        let own = self.csf.as_ref().is_none_or(|csf| density >= csf.density_kg_per_m3);
         first_broken(&[
             ("tissues", &self.tissues, (1..=2).contains(&self.tissues), TISSUES_RULE),
             ("gravity_m_per_s2", &g, g.iter().all(|x| x.is_finite()), "three numbers"),
             ("density_kg_per_m3", &density, density >= 0.0 && density.is_finite(), "0 or more"),
+            ("density_kg_per_m3", &density, own, TISSUE_RULE),
             ("pressure", &self.pressure, pressures, "pressures in Pa, each a number"),
             ("poisson_ratio", &self.poisson_ratio, (0.0..0.5).contains(&self.poisson_ratio), POISSON_RULE),
             ("sd_levels", &self.sd_levels, levels_hold(&self.sd_levels), LEVELS_RULE),
@@ -223,6 +236,29 @@ pub fn improvement(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> &'stat
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn beside_a_fluid_a_density_is_the_tissues_own() {
+        let with = |csf: Option<CsfSettings>, density_kg_per_m3: f64| {
+            ResectionSettings { csf, density_kg_per_m3, ..ResectionSettings::default() }.check()
+        };
+        let fluid = || Some(CsfSettings::default());
+        for effective in [33.0, 100.0, 300.0, 1006.0] {
+            assert_eq!(with(fluid(), effective).unwrap_err().name, "density_kg_per_m3");
+            assert_eq!(with(None, effective), Ok(()));
+        }
+        assert_eq!(with(fluid(), 1040.0), Ok(()));
+        let none = Some(CsfSettings { density_kg_per_m3: 0.0, ..CsfSettings::default() });
+        assert_eq!(with(none, 1040.0).unwrap_err().name, "csf.density_kg_per_m3");
+    }
+
+    #[test]
+    fn a_pressure_is_a_load_without_gravity() {
+        let still = ResectionSettings { gravity_m_per_s2: [0.0; 3], ..ResectionSettings::default() };
+        assert!(ResectionSettings::default().is_loaded() && !still.is_loaded());
+        let pressure = vec![PressureLoad { set: "ventricle".to_owned(), pressure_pa: -200.0 }];
+        assert!(ResectionSettings { pressure, ..still }.is_loaded());
+    }
 
     #[test]
     fn a_change_below_the_noise_floor_is_not_distinguishable() {

@@ -1,9 +1,9 @@
 //! What must hold of mesh and scenario before anything is solved.
 
-use super::FemError;
-use super::contact::Wall;
+use super::contact::{Support, Wall};
 use super::order::Graph;
 use super::scenario::{Materials, Scenario};
+use super::{FemError, FemWarning};
 use crate::mesh::TetMesh;
 
 /// The node set of a name.
@@ -77,6 +77,9 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     if loads.density_kg_per_m3 <= 0.0 {
         return refuse("loads.density_kg_per_m3", loads.density_kg_per_m3, "positive");
     }
+    if let Some(csf) = loads.csf.filter(|csf| csf.density_kg_per_m3 <= 0.0) {
+        return refuse("loads.csf.density_kg_per_m3", csf.density_kg_per_m3, "positive (1007 for cerebrospinal fluid)");
+    }
     for contact in &scenario.contact {
         let key = |name: &str| format!("contact.{name}` of set `{}", contact.set);
         for (name, value) in
@@ -123,6 +126,31 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
         }
     }
     Ok(())
+}
+
+/// No set is held in two ways that exclude each other. Not of a model that is changed while it is looked at: there a set that slides
+/// may be held for a while.
+pub(super) fn check_supports(scenario: &Scenario) -> Result<(), FemError> {
+    let sliding = |set: &String| scenario.supports.get(set) == Some(&Support::Sliding);
+    if let Some(set) = scenario.fixed.iter().find(|set| sliding(set)) {
+        return Err(FemError::TwoSupports {
+            set: set.clone(),
+            first: "held in `fixed`",
+            second: "sliding in `supports`",
+        });
+    }
+    let moved = scenario.prescribed.iter().filter(|p| p.displacement_mm != [0.0; 3]);
+    match moved.map(|p| &p.set).find(|set| scenario.held().any(|held| held == *set)) {
+        Some(set) => Err(FemError::TwoSupports { set: set.clone(), first: "held", second: "moved in `prescribed`" }),
+        None => Ok(()),
+    }
+}
+
+/// Tissue lighter than the fluid around it floats.
+pub(super) fn floating(scenario: &Scenario) -> Option<FemWarning> {
+    let tissue = scenario.loads.density_kg_per_m3;
+    let fluid = scenario.loads.csf?.density_kg_per_m3;
+    (tissue < fluid).then_some(FemWarning::LighterThanFluid { tissue, fluid })
 }
 
 /// Every material obeys its rules.

@@ -13,6 +13,18 @@ pub enum FemError {
     UnknownSet { set: String, known: String },
     #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
     NothingHeld,
+    #[error("set `{set}` is both {first} and {second}: take one of the two away")]
+    TwoSupports { set: String, first: &'static str, second: &'static str },
+    #[error(
+        "the whole body lies beyond the plane before set `{set}`, by {least_mm:.1} mm and more: turn `wall.normal`, which points to \
+         the side that is free, or move `wall.point_mm`"
+    )]
+    BeyondWall { set: String, least_mm: f64 },
+    #[error(
+        "nothing but springs holds the body, and they would give way by {give_mm:.3e} mm under its load, more than the body is large \
+         ({size_mm:.0} mm): raise `tethers.stiffness_pa_per_mm`, or hold a set in `fixed`"
+    )]
+    WeakSprings { give_mm: f64, size_mm: f64 },
     #[error("set `{set}` is empty: nothing can be held by it; name another set, or tag the mesh again")]
     EmptySet { set: String },
     #[error("every node is held: there is nothing to compute; take a set out of `fixed`")]
@@ -36,10 +48,15 @@ pub enum FemError {
     )]
     NoFacets { set: String },
     #[error(
-        "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four nodes of cell {cell}; mesh the \
+        "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four facets of cell {cell}; mesh the \
          body so that it conforms to the sheet, or hold the set in `fixed`"
     )]
     NoSheet { set: String, cell: usize },
+    #[error(
+        "the body cut open along set `{set}` leaves a piece of {cells} cells, among them cell {cell}, that hangs on to the rest by no \
+         facet and is not held: hold a set of it in `fixed`, mesh the body with smaller cells there, or hold `{set}` as well"
+    )]
+    Floats { set: String, cells: usize, cell: usize },
     #[error(
         "the wall before set `{set}` is the field `{name}`, which a scenario file cannot hold; give the wall as \
          \"own-surface\" or \"plane\", or call the library with the field"

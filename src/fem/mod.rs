@@ -44,7 +44,7 @@ pub use scenario::{
 pub use sensitivity::By;
 pub use state::State;
 pub use stiffness::Stiffness;
-pub use warning::FemWarning;
+pub use warning::{FemWarning, Idle};
 
 use crate::mesh::TetMesh;
 
@@ -53,6 +53,7 @@ use crate::mesh::TetMesh;
 /// # Errors
 /// [`FemError`] names what is wrong with the input, or why there is no equilibrium.
 pub fn simulate(mesh: &TetMesh, scenario: &Scenario, progress: &dyn Fn(&Progress)) -> Result<Outcome, FemError> {
+    check::check_supports(scenario)?;
     let model = Model::new(mesh, scenario)?;
     match scenario.solver.method {
         Method::Static => model.solve(&scenario.materials, None, progress).map(|(outcome, _)| outcome),
@@ -72,6 +73,7 @@ pub fn simulate_from(
     start_mm: &[[f64; 3]],
     progress: &dyn Fn(&Progress),
 ) -> Result<Outcome, FemError> {
+    check::check_supports(scenario)?;
     let model = Model::new(mesh, scenario)?;
     let start = model.state(start_mm)?;
     model.solve(&scenario.materials, Some(&start), progress).map(|(outcome, _)| outcome)

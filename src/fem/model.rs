@@ -2,17 +2,17 @@
 //! every solve.
 
 use super::buoyancy::Buoyancy;
-use super::check::{check_held_together, check_materials, check_settings, materials_of_cells, node_set};
+use super::check::{check_held_together, check_materials, check_settings, floating, materials_of_cells, node_set};
 use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
 use super::linear::{Symbolic, Tangent};
-use super::load::{NodalForces, nodal_forces_n};
+use super::load::{Load, NodalForces, nodal_forces_n};
 use super::order::{Graph, renumbered, reverse_cuthill_mckee};
 use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sharing::Sharing;
 use super::sparse::{BlockMatrix, BlockPattern, HELD};
-use super::units::{metres, millimetres};
-use super::{FemError, FemWarning, State};
+use super::units::{METRES_PER_MM, metres, millimetres};
+use super::{FemError, FemWarning, Idle, State};
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use std::sync::{Arc, OnceLock};
@@ -174,6 +174,11 @@ impl Model {
                 (0..3).for_each(|i| sum[i] += force[i]);
             }
         }
+        // Walls may catch what springs let go.
+        let any_held = (0..nodes).any(|n| held[n] != [false; 3] && !graph.of(n).is_empty());
+        if !moving && !supports.has_walls() && !any_held {
+            check_springs(&supports, &load_n, &nodes_m)?;
+        }
         let buoyancy = buoyancy.map(|b| b.ordered(&order));
         let pattern = Arc::new(BlockPattern::new(&renumbered(&graph, &order, &number), &row_of));
 
@@ -188,6 +193,9 @@ impl Model {
         });
         let partition = body.partition(&row_of, &pattern);
         let mut warnings = unstable_laws(&scenario.materials);
+        warnings.extend(floating(scenario));
+        warnings.extend(supports.idle.iter().cloned());
+        warnings.extend(idle_loads(&load_parts, &row_of, scenario));
         if let Some(limit) = element.locks_above() {
             let poisson_ratio = scenario.materials.values().map(Material::poisson_ratio).fold(0.0, f64::max);
             if poisson_ratio > limit {
@@ -366,6 +374,34 @@ impl Model {
         of_nodes.iter().zip(&self.number).for_each(|(v, &new)| all[new as usize] = *v);
         all
     }
+}
+
+/// Springs that are all there is to hold the body must hold it somewhere near.
+fn check_springs(supports: &Supports, load_n: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Result<(), FemError> {
+    let reach = |axis: usize| {
+        let of = || nodes_m.iter().map(|x| x[axis]);
+        of().fold(f64::NEG_INFINITY, f64::max) - of().fold(f64::INFINITY, f64::min)
+    };
+    let size_mm = (0..3).map(|axis| reach(axis).powi(2)).sum::<f64>().sqrt() / METRES_PER_MM;
+    match supports.give_mm(load_n) {
+        Some(give_mm) if give_mm > size_mm => Err(FemError::WeakSprings { give_mm, size_mm }),
+        _ => Ok(()),
+    }
+}
+
+/// Forces and pressures that act on held nodes alone.
+fn idle_loads(parts: &[NodalForces], row_of: &[u32], scenario: &Scenario) -> Vec<FemWarning> {
+    let idle = |forces: &[[f64; 3]]| {
+        let mut pushed = forces.iter().zip(row_of).filter(|(force, _)| **force != [0.0; 3]).peekable();
+        pushed.peek().is_some() && pushed.all(|(_, row)| *row == HELD)
+    };
+    let named = |load: &Load| match load {
+        Load::Weight => None,
+        Load::Patch(n) => Some((scenario.loads.patch[*n].set.clone(), Idle::Patch)),
+        Load::Pressure(n) => Some((scenario.loads.pressure[*n].set.clone(), Idle::Pressure)),
+    };
+    let without = parts.iter().filter(|(_, forces)| idle(forces)).filter_map(|(load, _)| named(load));
+    without.map(|(set, idle)| FemWarning::NoEffect { set, idle }).collect()
 }
 
 /// Every law that is unstable where it was measured.

@@ -4,6 +4,31 @@ use super::element::ElementKind;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// What acts on held nodes alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Idle {
+    /// A wall.
+    Contact,
+    /// Springs.
+    Tether,
+    /// A force over a set.
+    Patch,
+    /// A pressure.
+    Pressure,
+}
+
+impl Idle {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Contact => "wall (`contact`)",
+            Self::Tether => "spring (`tethers`)",
+            Self::Patch => "force (`loads.patch`)",
+            Self::Pressure => "pressure (`loads.pressure`)",
+        }
+    }
+}
+
 /// What a reader of a simulation should know.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -26,6 +51,16 @@ pub enum FemWarning {
          the damping"
     )]
     StillMoves { steps: usize, time_s: f64, fastest_mm_per_s: f64 },
+    #[error(
+        "the tissue ({tissue} kg/m3) is lighter than the fluid of `loads.csf` ({fluid} kg/m3) and floats below its level: where a \
+         fluid is given, `loads.density_kg_per_m3` is the tissue's own (about 1040), not an effective one"
+    )]
+    LighterThanFluid { tissue: f64, fluid: f64 },
+    #[error(
+        "the {} of set `{set}` has no effect: every node of it is held; take the set out of what is held, or leave the {0} out",
+        idle.words()
+    )]
+    NoEffect { set: String, idle: Idle },
     #[error("{cells} cells are inside out, among them cell {worst}: lower the load or raise the modulus")]
     InsideOut { cells: usize, worst: usize },
     #[error("{cells} cells are squeezed below a tenth of their volume: treat stresses with care")]

@@ -9,6 +9,7 @@ pub mod format;
 mod isosurface;
 mod label_field;
 mod optimise;
+mod pieces;
 pub mod quality;
 mod repair;
 mod sheet;

@@ -199,7 +199,8 @@ impl TetMesh {
     }
 }
 
-fn root_of(root: &mut [u32], mut t: u32) -> u32 {
+/// The first of what has been joined with `t`.
+pub(super) fn root_of(root: &mut [u32], mut t: u32) -> u32 {
     while root[t as usize] != t {
         root[t as usize] = root[root[t as usize] as usize];
         t = root[t as usize];

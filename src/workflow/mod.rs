@@ -179,10 +179,21 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
     if goal == Goal::Images {
         return Ok(());
     }
+    if goal == Goal::Estimate {
+        can_be_estimated(work)?;
+    }
     let engine = work.settings.mesh.engine;
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(engine).map_err(refused)?;
     plan(work.settings, work.subject, goal).map(|_| ())
+}
+
+/// An estimate holds what has moved against a load, and changes parameters that its law names.
+fn can_be_estimated(work: &Work<'_>) -> Result<(), WorkflowError> {
+    if work.subject == Subject::Patient && !work.settings.resection.is_loaded() {
+        return Err(WorkflowError::NoLoad);
+    }
+    Ok(())
 }
 
 /// The prior's samples on a prepared case: one part of them and nothing else, or all with outcome and page.
@@ -238,6 +249,7 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
     if subject == Subject::Plan {
         return Err(CaseError::Planned { folder: place.folder.clone() }.into());
     }
+    can_be_estimated(&work)?;
     if subject == Subject::Patient {
         let patient = Patient::new(&work, Prepared::read(&work)?)?;
         outcome::keep_settings(&work)?;
@@ -263,6 +275,7 @@ pub fn compare(
 ) -> Result<(Case, Comparison), WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
     prepared_case(&work, true)?;
+    can_be_estimated(&work)?;
     let comparison = Patient::new(&work, Prepared::read(&work)?)?.compare()?;
     Ok((work.case.clone(), comparison))
 }

@@ -17,7 +17,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Raised when the solver's code changes its results.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// The files of a simulation.
 #[derive(Clone, Debug, Default)]

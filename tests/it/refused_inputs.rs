@@ -147,11 +147,15 @@ fn settings_that_would_stop_a_later_stage_stop_the_job_before_the_first() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let pair = [pre.to_str().unwrap(), post.to_str().unwrap()];
-    let settings: [(&str, &[&str]); 7] = [
+    let settings: [(&str, &[&str]); 8] = [
         ("[registr]\n", &["no table [registr]", "[register]"]),
         ("[resection]\npoisson_ratio = 0.6\n", &["[resection]", "poisson_ratio", "below 0.5"]),
         ("[resection]\nfixed = [\"skull\"]\n", &["[resection]", "skull", "base, falx"]),
         ("[resection]\ntissues = 7\n", &["tissues", "1 (the whole brain) or 2"]),
+        (
+            "[resection]\ndensity_kg_per_m3 = 300.0\ncsf = {}\n",
+            &["[resection]", "density_kg_per_m3", "tissue's own (1040)"],
+        ),
         ("[prior]\nstudy = \"mri\"\n", &["[prior]", "mri", "mre"]),
         ("[mesh]\nsize = { cells = 0 }\n", &["[mesh]", "size.cells"]),
         ("[estimate]\nphantom_noise_mm = nan\n", &["[estimate]", "phantom_noise_mm"]),
@@ -162,6 +166,10 @@ fn settings_that_would_stop_a_later_stage_stop_the_job_before_the_first() {
         let run = ["--config", &config, "run", pair[0], pair[1], "-o", &path("case")];
         refuses(&run, "settings.toml", words, &path("case"));
     }
+    std::fs::write(path("settings.toml"), "[resection]\ngravity_m_per_s2 = [0.0, 0.0, 0.0]\n").unwrap();
+    let config = path("settings.toml");
+    let run = ["--config", &config, "run", pair[0], pair[1], "--estimate", "-o", &path("case")];
+    refuses(&run, "there is no load", &["gravity_m_per_s2", "[resection]"], &path("case"));
     let run = ["run", pair[0], pair[1], "--cells", "0", "-o", &path("case")];
     refuses(&run, "--cells", &["1 or more"], &path("case"));
 }

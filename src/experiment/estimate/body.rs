@@ -5,8 +5,7 @@ use super::{LogPrior, Scale};
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::sample::Tissue;
 use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State, Within};
-use crate::material::law::{Material, Parameter};
-use crate::material::meta_model::MetaModel;
+use crate::material::law::{Material, Parameter, Shape};
 use crate::mesh::TetMesh;
 use nalgebra::{DMatrix, DVector, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -17,9 +16,8 @@ use thiserror::Error;
 pub enum Unknown {
     /// Shear modulus of a tissue at rest, Pa.
     ShearModulus(Tissue),
-    /// What else the tissue's law has, its shear modulus held: the exponent of Ogden's, or the share of C1 in C1 + C2 of
-    /// Mooney and Rivlin's (its log odds).
-    Shape(Tissue, MetaModel),
+    /// What else the tissue's law has, its shear modulus held; the law says what that is.
+    Shape(Tissue, &'static Shape),
     /// Effective density of all tissue, kg/m3.
     Density,
     /// Pressure on the facets of a set, Pa: `loads.pressure` of this index, in the direction given there.
@@ -54,9 +52,9 @@ impl Unknown {
     pub fn scale(&self) -> Scale {
         match self {
             Self::GravityTurn(_) => Scale::Angle,
-            Self::Shape(_, law) if *law == MetaModel::MOONEY_RIVLIN => Scale::Share,
-            Self::Shape(..) | Self::CsfLevel => Scale::Plain,
-            _ => Scale::Logarithm,
+            Self::Shape(_, shape) => shape.scale.into(),
+            Self::CsfLevel => Scale::Plain,
+            Self::ShearModulus(_) | Self::Density | Self::Pressure(_) | Self::Gap(_) => Scale::Logarithm,
         }
     }
 
@@ -77,10 +75,7 @@ impl Unknown {
     pub fn name(&self) -> String {
         match self {
             Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
-            Self::Shape(tissue, law) if *law == MetaModel::MOONEY_RIVLIN => {
-                format!("share of c1_pa in c1_pa + c2_pa of {}", tissue.name)
-            }
-            Self::Shape(tissue, _) => format!("alpha of {}", tissue.name),
+            Self::Shape(tissue, shape) => format!("{} of {}", shape.name, tissue.name),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
             Self::CsfLevel => "level_mm of the fluid".to_owned(),
@@ -383,10 +378,10 @@ impl<'a> Body<'a> {
                     let turning = self.turning(log_parameters, n);
                     by.extend((0..3).map(|axis| (By::Gravity(axis), n, turning[axis])));
                 }
-                Unknown::Shape(tissue, law) => {
+                Unknown::Shape(tissue, shape) => {
                     for name in tissue.labels.iter().filter_map(|&l| self.template.label_name(l)) {
                         let own = materials.get(name);
-                        for (parameter, weight) in shape_slopes(*law, log_parameters[n]) {
+                        for (parameter, weight) in (shape.slopes)(log_parameters[n]) {
                             let parameter = own.and_then(|material| material.parameter(parameter, 0));
                             by.extend(
                                 parameter.map(|p| (By::Material { name: name.to_owned(), parameter: p }, n, weight)),
@@ -492,7 +487,7 @@ fn materials(
     for (unknown, log) in unknowns.iter().zip(log_parameters) {
         if let Unknown::ShearModulus(tissue) = unknown {
             let shape = unknowns.iter().zip(log_parameters).find_map(|(other, value)| match other {
-                Unknown::Shape(of, law) if of == tissue => Some((*law, *value)),
+                Unknown::Shape(of, shape) if of == tissue => Some((*shape, *value)),
                 _ => None,
             });
             for &label in &tissue.labels {
@@ -506,26 +501,11 @@ fn materials(
 }
 
 /// The material of a shear modulus at rest (Pa) and what else its law has.
-pub fn material(shear_modulus_pa: f64, shape: Option<(MetaModel, f64)>, poisson_ratio: f64) -> Material {
+pub fn material(shear_modulus_pa: f64, shape: Option<(&Shape, f64)>, poisson_ratio: f64) -> Material {
     match shape {
-        Some((law, value)) if law == MetaModel::MOONEY_RIVLIN => {
-            // mu = 2 (C1 + C2).
-            let (sum, share) = (0.5 * shear_modulus_pa, Scale::Share.value(value));
-            MetaModel::MOONEY_RIVLIN.material(&[share * sum, (1.0 - share) * sum], poisson_ratio)
-        }
-        // mu = mu_1 alpha_1 / 2.
-        Some((law, alpha)) => law.material(&[2.0 * shear_modulus_pa / alpha, alpha], poisson_ratio),
+        Some((shape, number)) => Material::new(shape.law, (shape.values)(shear_modulus_pa, number), poisson_ratio),
         None => Material::neo_hookean(shear_modulus_pa, poisson_ratio),
     }
-}
-
-/// How a law's own parameters change with its shape, the shear modulus held: d ln(parameter) / d shape.
-fn shape_slopes(law: MetaModel, shape: f64) -> [(&'static str, f64); 2] {
-    if law == MetaModel::MOONEY_RIVLIN {
-        let share = Scale::Share.value(shape);
-        return [("c1_pa", 1.0 - share), ("c2_pa", -share)];
-    }
-    [("alpha", 1.0 / shape), ("mu_pa", -1.0 / shape)]
 }
 
 fn normal_of([a, b, c]: [Point3<f64>; 3]) -> Vector3<f64> {

@@ -43,6 +43,7 @@ pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration
 pub use rigid_remainder::RigidModes;
 pub use solve::solve_problem;
 
+use crate::material::law::ShapeScale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -117,6 +118,16 @@ impl Scale {
             Self::Angle => value.to_radians(),
             Self::Plain => value,
             Self::Share => (value / (1.0 - value)).ln(),
+        }
+    }
+}
+
+impl From<ShapeScale> for Scale {
+    fn from(scale: ShapeScale) -> Self {
+        match scale {
+            ShapeScale::Plain => Self::Plain,
+            ShapeScale::Logarithm => Self::Logarithm,
+            ShapeScale::Share => Self::Share,
         }
     }
 }

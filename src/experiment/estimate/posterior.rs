@@ -55,6 +55,9 @@ pub struct Identifiability {
     pub valley_log_sd: f64,
 }
 
+/// From what part of a prior's standard deviation on the data have added little.
+const LITTLE: f64 = 0.7;
+
 /// Two-sided 95 % of a Gaussian.
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
@@ -125,8 +128,12 @@ pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]
     let from_average = invert(&(fisher + joint_precision(&average)));
     let verdict = |p: usize| {
         let sd = data_only[(p, p)].max(0.0).sqrt();
+        // A parameter that goes along with another is known better once that one is: what the data leave of its own
+        // prior is asked as well.
+        let as_before = prior[p].sd.is_some_and(|sd| log_sd[p] > LITTLE * sd);
         match average[p].sd {
-            Some(sd) if from_average[(p, p)].max(0.0).sqrt() > 0.7 * sd => Knowledge::PriorDominated,
+            Some(_) if as_before => Knowledge::PriorDominated,
+            Some(sd) if from_average[(p, p)].max(0.0).sqrt() > LITTLE * sd => Knowledge::PriorDominated,
             Some(_) => Knowledge::Identified,
             // Written so that an infinite or NaN variance is not identifiable.
             None if Z_95 * sd <= 10f64.ln() => Knowledge::Identified,
@@ -329,5 +336,18 @@ mod tests {
             laplace(&[7.0], &fisher, std::slice::from_ref(&person)).identifiability.verdicts[0]
         };
         assert_eq!([told(0.5), told(0.2)], [Knowledge::PriorDominated, Knowledge::Identified]);
+    }
+
+    #[test]
+    fn what_is_known_only_along_with_another_parameter_is_not_narrowed_by_itself() {
+        use crate::experiment::estimate::Average;
+        let of =
+            |sd: f64, average: f64| LogPrior { average: Some(Average { mean: 7.0, sd: average }), ..prior(Some(sd)) };
+        // A person's modulus may be anything; the studies' average of it is narrow, and would fix the exponent along the valley.
+        let known = [of(2.2, 0.35), LogPrior { scale: Scale::Plain, ..of(11.9, 11.9) }];
+        let seen = DMatrix::from_row_slice(1, 2, &[1.0, 0.05]) / 0.01;
+        let found = laplace(&[7.0; 2], &information(&seen, 2, &[]), &known);
+        assert!(found.log_sd[1] > 0.9 * 11.9, "{:?}", found.log_sd);
+        assert_eq!(found.identifiability.verdicts[1], Knowledge::PriorDominated);
     }
 }

@@ -148,7 +148,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
 fn tissue_materials(unknowns: &[Unknown], values: &[f64], poisson_ratio: f64) -> BTreeMap<String, Material> {
     let shape = |of: &Tissue| {
         unknowns.iter().zip(values).find_map(|(unknown, value)| match unknown {
-            Unknown::Shape(tissue, law) if tissue == of => Some((*law, *value)),
+            Unknown::Shape(tissue, shape) if tissue == of => Some((*shape, *value)),
             _ => None,
         })
     };
@@ -172,6 +172,7 @@ mod tests {
     use crate::experiment::sweep::scenario_of;
     use crate::experiment::verdict::{Claim, Reason};
     use crate::fem::{Scenario, simulate};
+    use crate::material::law::{gent, mooney_rivlin, ogden};
     use crate::material::meta_model::MetaModel;
     use crate::mesh::TetMesh;
 
@@ -513,7 +514,7 @@ mod tests {
     #[test]
     fn the_parameters_of_ogdens_and_of_mooney_and_rivlins_law_come_back_inside_their_intervals() {
         let (alpha, modulus) = (-19.0, 670.0);
-        let truth = material(modulus, Some((MetaModel::OGDEN_HIGH, alpha)), 0.45);
+        let truth = material(modulus, Some((&ogden::SHAPE, alpha)), 0.45);
         let (found, materials) = of_law(&truth, MetaModel::OGDEN);
         let inside = |outcome: &EstimateOutcome, n: usize, value: f64| {
             let [low, high] = outcome.posterior.interval_95[n];
@@ -522,10 +523,26 @@ mod tests {
         inside(&found, 0, modulus);
         inside(&found, 1, alpha);
         assert_eq!(materials["brain"].name(), "ogden");
-        let truth = material(670.0, Some((MetaModel::MOONEY_RIVLIN, 0.5)), 0.45);
+        let truth = material(670.0, Some((&mooney_rivlin::SHAPE, 0.5)), 0.45);
         let (found, materials) = of_law(&truth, MetaModel::MOONEY_RIVLIN);
         inside(&found, 0, 670.0);
         inside(&found, 1, Scale::Share.value(0.5));
         assert_eq!(materials["brain"].name(), "mooney-rivlin");
+    }
+
+    #[test]
+    fn the_parameters_of_gents_law_come_back_inside_their_intervals() {
+        let (jm, modulus) = (1.5_f64, 670.0);
+        let truth = material(modulus, Some((&gent::SHAPE, jm.ln())), 0.45);
+        let meta_model = MetaModel::all().find(|law| law.name() == "gent").unwrap();
+        let (found, materials) = of_law(&truth, meta_model);
+        let inside = |n: usize, value: f64| {
+            let [low, high] = found.posterior.interval_95[n];
+            assert!(low <= value && value <= high, "{value} {:?}", found.posterior);
+        };
+        inside(0, modulus);
+        inside(1, jm);
+        assert_eq!(materials["brain"].name(), "gent");
+        assert_ne!(found.verdict.finding, Finding::Conflict, "{:?}", found.verdict);
     }
 }

@@ -1,6 +1,7 @@
 //! How a prediction is made; the table `[predict]` of the settings.
 
 use super::head::Head;
+use crate::experiment::resection::CsfSettings;
 use crate::experiment::setting::{SettingError, first_broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -88,8 +89,8 @@ impl PredictSettings {
             (
                 "tissue_density_kg_per_m3",
                 &self.tissue_density_kg_per_m3,
-                (500.0..=2000.0).contains(&self.tissue_density_kg_per_m3),
-                "500 to 2000",
+                (CsfSettings::default().density_kg_per_m3..=2000.0).contains(&self.tissue_density_kg_per_m3),
+                "1007 (the fluid's) to 2000",
             ),
             (
                 "direction_sd_deg",

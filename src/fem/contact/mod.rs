@@ -13,13 +13,14 @@ mod sheet;
 pub use settings::{Contact, Support, Tether, Wall};
 pub(super) use sheet::all_contacts;
 
-use super::FemError;
 use super::linear::Tangent;
 use super::load::{area_m2, facets_of};
 use super::scenario::Scenario;
 use super::sharing::Sharing;
 use super::sparse::HELD;
 use super::units::{METRES_PER_MM, metres, millimetres};
+use super::warning::Idle;
+use super::{FemError, FemWarning};
 use crate::geometry::SmoothField;
 use nalgebra::{Matrix3, Vector3};
 use potential::Potential;
@@ -96,6 +97,8 @@ pub(super) struct Supports {
     standing: Vec<Standing>,
     tethered: Vec<Tethered>,
     walls: Vec<Barrier>,
+    /// Walls and springs that nothing free is at.
+    pub idle: Vec<FemWarning>,
 }
 
 /// Gap (m), its gradient, its second derivatives (1/m).
@@ -111,11 +114,12 @@ pub(super) struct Numbering<'a> {
 impl Supports {
     /// The scenario's walls and springs on its mesh (cut open, as [`Scenario::body`] leaves it).
     pub(super) fn new(sharing: &Sharing, scenario: &Scenario, at: &Numbering) -> Result<Self, FemError> {
-        let mut supports = Self { standing: Vec::new(), tethered: Vec::new(), walls: Vec::new() };
+        let mut supports = Self { standing: Vec::new(), tethered: Vec::new(), walls: Vec::new(), idle: Vec::new() };
         for contact in all_contacts(scenario) {
             supports.add_wall(sharing, &contact, at)?;
         }
         for tether in &scenario.tethers {
+            let before = supports.tethered.len();
             for (node, area, normal) in surface_nodes(sharing, &tether.set)? {
                 let node = at.number[node as usize];
                 let stiffness = tether.stiffness_pa_per_mm / METRES_PER_MM * area;
@@ -124,6 +128,9 @@ impl Supports {
                 if row != HELD {
                     supports.tethered.push(Tethered { node, row, stiffness, along });
                 }
+            }
+            if supports.tethered.len() == before {
+                supports.idle.push(FemWarning::NoEffect { set: tether.set.clone(), idle: Idle::Tether });
             }
         }
         Ok(supports)
@@ -146,9 +153,14 @@ impl Supports {
             Wall::Field { distance_mm, .. } => distance_mm.clone(),
             _ => None,
         };
+        if let Wall::Plane { point_mm, normal } = &contact.wall {
+            check_plane(&contact.set, *point_mm, *normal, at)?;
+        }
+        let mut all_held = true;
         for (node, area_m2, normal) in surface_nodes(sharing, &contact.set)? {
             let node = at.number[node as usize];
             let row = at.row_of[node as usize];
+            all_held &= row == HELD;
             // The two sides of a sheet meet at its edge, which stays free.
             let edge = matches!(contact.wall, Wall::OwnSurface | Wall::Sheet) && normal == Vector3::zeros();
             if row == HELD || edge {
@@ -177,6 +189,9 @@ impl Supports {
             };
             self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap, field_slope });
         }
+        if all_held {
+            self.idle.push(FemWarning::NoEffect { set: contact.set.clone(), idle: Idle::Contact });
+        }
         self.walls.push(Barrier { set: contact.set.clone(), potential, field, gap_m: gap });
         Ok(())
     }
@@ -186,6 +201,15 @@ impl Supports {
         if let Some(wall) = self.walls.get_mut(wall) {
             wall.gap_m = (gap_mm * METRES_PER_MM).max(0.5 * wall.potential.softness_m);
         }
+    }
+
+    /// How far springs that are all there is to hold the body give way under a load (N), mm; `None` where there are none.
+    pub(super) fn give_mm(&self, load_n: &[[f64; 3]]) -> Option<f64> {
+        // Springs along normals hold a closed surface as well, by how much its shape says.
+        let everywhere = self.tethered.iter().all(|t| t.along.is_none());
+        let stiffness: f64 = self.tethered.iter().map(|t| t.stiffness).sum();
+        let total = load_n.iter().fold(Vector3::zeros(), |sum, f| sum + Vector3::from(*f));
+        (everywhere && stiffness > 0.0).then(|| total.norm() / stiffness / METRES_PER_MM)
     }
 
     /// Whether anything stands before a wall.
@@ -371,6 +395,17 @@ impl Supports {
         }
         (walls, pressure_pa)
     }
+}
+
+/// A plane with the whole body beyond it leaves no state to begin from: it looks the wrong way, or stands elsewhere.
+fn check_plane(set: &str, point_mm: [f64; 3], normal: [f64; 3], at: &Numbering) -> Result<(), FemError> {
+    let (n, point) = (Vector3::from(normal).normalize(), Vector3::from(metres(point_mm)));
+    let rooms = at.nodes_m.iter().map(|x| n.dot(&(Vector3::from(*x) - point)));
+    let most = rooms.fold(f64::NEG_INFINITY, f64::max);
+    if most >= 0.0 {
+        return Ok(());
+    }
+    Err(FemError::BeyondWall { set: set.to_owned(), least_mm: -most / METRES_PER_MM })
 }
 
 /// Nodes on springs that leave no direction free, in the mesh's numbering.

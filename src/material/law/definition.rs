@@ -16,6 +16,8 @@ pub trait Law: Sync {
     fn curves(&self) -> &'static [&'static dyn UniaxialCurve];
     /// Over which stretches the law was measured, with the verdict there; `None` where it makes no claim.
     fn measured(&self, values: &[f64]) -> Option<([f64; 2], Stability)>;
+    /// What an estimate may change of it.
+    fn estimated(&self) -> Estimated;
     /// Numbers to test the law with: at least one set.
     fn examples(&self) -> Vec<Values>;
 }
@@ -100,4 +102,77 @@ pub struct Volume {
     pub lame_lambda_pa: f64,
     /// Volume ratio below which the energy is continued so that inverted elements can recover; 0: never.
     pub inversion_threshold: f64,
+}
+
+/// How an estimate changes a law. Every law says so itself: another law's way of turning a modulus and a shape into
+/// parameters would give a body that nobody asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Estimated {
+    /// The shear modulus is all there is: the neo-Hookean law.
+    Modulus,
+    /// The shear modulus, and one number beside it.
+    Shaped(&'static Shape),
+    /// Not at all: nobody has said what would be estimated of it.
+    Not,
+}
+
+/// A law's parameters in terms of its shear modulus at rest and one number for everything else.
+pub struct Shape {
+    /// The law.
+    pub law: &'static dyn Law,
+    /// The quantity behind the number, as tables name it.
+    pub name: &'static str,
+    /// What the number is to the quantity.
+    pub scale: ShapeScale,
+    /// Where what is known of it beforehand comes from.
+    pub known: ShapeKnown,
+    /// The law's parameters at a shear modulus (Pa) and a number.
+    pub values: fn(f64, f64) -> Values,
+    /// The number of such parameters: the inverse of `values`.
+    pub number: fn(&[f64]) -> f64,
+    /// d ln(parameter) / d number by the parameters' names, the shear modulus held.
+    pub slopes: fn(f64) -> Vec<(&'static str, f64)>,
+}
+
+/// What a shape's number is to the quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShapeScale {
+    /// The quantity itself.
+    Plain,
+    /// The logarithm of a positive quantity.
+    Logarithm,
+    /// The logarithm of the odds of a share between 0 and 1.
+    Share,
+}
+
+/// Where what is known of a shape comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShapeKnown {
+    /// From nowhere: draws put it at a bound. Any share is as likely as another.
+    AnyShare,
+    /// From the law fitted to the published studies, each over the stretches it was measured at.
+    Studies,
+}
+
+impl ShapeScale {
+    /// The quantity behind the number.
+    pub fn value(self, number: f64) -> f64 {
+        match self {
+            Self::Plain => number,
+            Self::Logarithm => number.exp(),
+            Self::Share => 1.0 / (1.0 + (-number).exp()),
+        }
+    }
+}
+
+impl PartialEq for Shape {
+    fn eq(&self, other: &Self) -> bool {
+        (self.law.card().name, self.name) == (other.law.card().name, other.name)
+    }
+}
+
+impl std::fmt::Debug for Shape {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} of {}", self.name, self.law.card().name)
+    }
 }

@@ -1,7 +1,9 @@
 //! Gent's law: tissue that stretches no further than a limit.
 
 use super::curve::{Data, Search, Slope, Start, UniaxialCurve};
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{
+    Card, Estimated, Law, LawParameter, Range, Role, Shape, ShapeKnown, ShapeScale, Values, Volume,
+};
 use super::hyperelastic::{Hyperelastic, Tangent};
 use super::stability::{Stability, StabilityRange};
 use super::volume::{OfVolume, VolumeLogarithm, add_tangent_of_volume, cofactors, volume_change};
@@ -56,10 +58,25 @@ impl Law for Definition {
         None
     }
 
+    fn estimated(&self) -> Estimated {
+        Estimated::Shaped(&SHAPE)
+    }
+
     fn examples(&self) -> Vec<Values> {
         vec![vec![1000.0, 2.0], vec![333.28, 1.008267796]]
     }
 }
+
+/// The modulus is a parameter itself; the limit is positive and spans powers of ten, so its logarithm is the number.
+pub static SHAPE: Shape = Shape {
+    law: &Definition,
+    name: "jm",
+    scale: ShapeScale::Logarithm,
+    known: ShapeKnown::Studies,
+    values: |shear_modulus_pa, log_jm| vec![shear_modulus_pa, log_jm.exp()],
+    number: |values| values[1].ln(),
+    slopes: |_| vec![("jm", 1.0)],
+};
 
 /// How near the limit may come to the data's largest I1 - 3, as a factor on it.
 const NEAREST_LIMIT: f64 = 1.0001;

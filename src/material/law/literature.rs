@@ -1,7 +1,7 @@
 //! The published models of brain tissue as they are: the energy of one row of the literature table in three dimensions.
 
 use super::curve::UniaxialCurve;
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{Card, Estimated, Law, LawParameter, Range, Role, Values, Volume};
 use super::hyperelastic::Hyperelastic;
 use super::stability::{Stability, StabilityRange};
 use crate::material::form::{Form, Jet, Number, Solid, StretchEnergy};
@@ -63,6 +63,10 @@ impl Law for Definition {
     fn measured(&self, values: &[f64]) -> Option<([f64; 2], Stability)> {
         let Published { form, window, .. } = published(values[0]);
         Some((*window, scan(form, *window)))
+    }
+
+    fn estimated(&self) -> Estimated {
+        Estimated::Not
     }
 
     fn examples(&self) -> Vec<Values> {

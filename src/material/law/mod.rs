@@ -27,7 +27,7 @@ pub mod stable_neo_hookean;
 pub use battery::{check_hyperelastic, check_hyperelastic_within};
 pub use compression_resistance::CompressionResistance;
 pub use curve::{Data, MOST_PARAMETERS, Search, Slope, Start, UniaxialCurve};
-pub use definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+pub use definition::{Card, Estimated, Law, LawParameter, Range, Role, Shape, ShapeKnown, ShapeScale, Values, Volume};
 pub use hyperelastic::{Hyperelastic, Tangent};
 pub use material::{Material, MaterialError, Parameter};
 pub use mooney_rivlin::MooneyRivlin;

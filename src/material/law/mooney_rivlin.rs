@@ -1,7 +1,9 @@
 //! Compressible Mooney-Rivlin law.
 
 use super::curve::{Data, Search, Slope, Start, UniaxialCurve};
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{
+    Card, Estimated, Law, LawParameter, Range, Role, Shape, ShapeKnown, ShapeScale, Values, Volume,
+};
 use super::hyperelastic::{Hyperelastic, Tangent};
 use super::stability::{Stability, StabilityRange};
 use super::volume::{OfVolume, VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
@@ -45,10 +47,31 @@ impl Law for Definition {
         None
     }
 
+    fn estimated(&self) -> Estimated {
+        Estimated::Shaped(&SHAPE)
+    }
+
     fn examples(&self) -> Vec<Values> {
         vec![vec![300.0, 200.0], vec![700.0, -100.0]]
     }
 }
+
+/// The share of C1 in the sum, which is half the modulus: mu = 2 (C1 + C2).
+pub static SHAPE: Shape = Shape {
+    law: &Definition,
+    name: "share of c1_pa in c1_pa + c2_pa",
+    scale: ShapeScale::Share,
+    known: ShapeKnown::AnyShare,
+    values: |shear_modulus_pa, log_odds| {
+        let (sum, share) = (0.5 * shear_modulus_pa, ShapeScale::Share.value(log_odds));
+        vec![share * sum, (1.0 - share) * sum]
+    },
+    number: |values| (values[0] / values[1]).ln(),
+    slopes: |log_odds| {
+        let share = ShapeScale::Share.value(log_odds);
+        vec![("c1_pa", 1.0 - share), ("c2_pa", -share)]
+    },
+};
 
 /// W = c1 (I1 - 3) + c2 (I2 - 3). With g = l^4 + 2 l rising: W'' = 2 l^-4 (c1 g(l) + 3 c2); W' = 2 (l - l^-2)(c1 + c2/l);
 /// (l W')' = c1 (4 l + 2 l^-2) + c2 (2 + 4 l^-3). Both constants not negative: stable at every stretch.

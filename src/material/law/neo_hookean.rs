@@ -1,7 +1,7 @@
 //! Compressible neo-Hookean law.
 
 use super::curve::{Data, Search, Slope, Start, UniaxialCurve};
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{Card, Estimated, Law, LawParameter, Range, Role, Values, Volume};
 use super::hyperelastic::{Hyperelastic, Tangent};
 use super::stability::{Stability, StabilityRange};
 use super::volume::{VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
@@ -45,6 +45,10 @@ impl Law for Definition {
 
     fn measured(&self, _values: &[f64]) -> Option<([f64; 2], Stability)> {
         None
+    }
+
+    fn estimated(&self) -> Estimated {
+        Estimated::Modulus
     }
 
     fn examples(&self) -> Vec<Values> {

@@ -1,7 +1,9 @@
 //! Compressible Ogden law of any number of terms, in principal stretches.
 
 use super::curve::{Data, Search, Slope, Start, UniaxialCurve};
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{
+    Card, Estimated, Law, LawParameter, Range, Role, Shape, ShapeKnown, ShapeScale, Values, Volume,
+};
 use super::hyperelastic::{Hyperelastic, Tangent};
 use super::stability::{Stability, StabilityRange};
 use super::volume::{OfVolume, VolumeLogarithm, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
@@ -56,10 +58,25 @@ impl Law for Definition {
         None
     }
 
+    fn estimated(&self) -> Estimated {
+        Estimated::Shaped(&SHAPE)
+    }
+
     fn examples(&self) -> Vec<Values> {
         vec![vec![-4.0, -500.0], vec![-4.7, -300.0, 2.0, 200.0]]
     }
 }
+
+/// The exponent of a single term, which may have either sign: mu = mu_1 alpha_1 / 2.
+pub static SHAPE: Shape = Shape {
+    law: &Definition,
+    name: "alpha",
+    scale: ShapeScale::Plain,
+    known: ShapeKnown::Studies,
+    values: |shear_modulus_pa, alpha| vec![alpha, 2.0 * shear_modulus_pa / alpha],
+    number: |values| values[0],
+    slopes: |alpha| vec![("alpha", 1.0 / alpha), ("mu_pa", -1.0 / alpha)],
+};
 
 fn terms(values: &[f64]) -> Vec<OgdenTerm> {
     values.as_chunks().0.iter().map(|&[alpha, mu_pa]| OgdenTerm { alpha, mu_pa }).collect()

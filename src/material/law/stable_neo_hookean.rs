@@ -1,7 +1,7 @@
 //! Stable neo-Hookean law.
 
 use super::curve::UniaxialCurve;
-use super::definition::{Card, Law, LawParameter, Range, Role, Values, Volume};
+use super::definition::{Card, Estimated, Law, LawParameter, Range, Role, Values, Volume};
 use super::hyperelastic::{Hyperelastic, Tangent};
 use super::stability::Stability;
 use super::volume::{OfVolume, add_tangent_of_volume, cofactors, lame_lambda_pa, volume_change};
@@ -43,6 +43,10 @@ impl Law for Definition {
 
     fn measured(&self, _values: &[f64]) -> Option<([f64; 2], Stability)> {
         None
+    }
+
+    fn estimated(&self) -> Estimated {
+        Estimated::Not
     }
 
     fn examples(&self) -> Vec<Values> {

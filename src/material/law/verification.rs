@@ -1,7 +1,10 @@
 //! Stresses tabulated by hand and by other codes: mu = 1000 Pa, nu = .45; Mooney-Rivlin C1 = 300, C2 = 200 Pa; Ogden
 //! alpha = -4, mu1 = -500 Pa.
 
-use super::{Hyperelastic, LAWS, Material, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, check_hyperelastic_within};
+use super::{
+    Estimated, Hyperelastic, LAWS, Material, MooneyRivlin, NeoHookean, Ogden, OgdenTerm, Shape,
+    check_hyperelastic_within,
+};
 use nalgebra::{Matrix3, Vector3};
 
 fn laws() -> [(&'static str, Box<dyn Hyperelastic>); 3] {
@@ -88,4 +91,57 @@ fn every_law_of_the_list_obeys_the_laws_of_hyperelasticity() {
             check_hyperelastic_within(&material.law(), size.min(1.0));
         }
     }
+}
+
+/// Numbers on either side of the middle of every scale; an exponent must not be 0.
+const NUMBERS: [f64; 3] = [-3.0, 0.4, 1.7];
+
+fn shapes() -> impl Iterator<Item = &'static Shape> {
+    LAWS.into_iter().filter_map(|law| match law.estimated() {
+        Estimated::Shaped(shape) => Some(shape),
+        Estimated::Modulus | Estimated::Not => None,
+    })
+}
+
+#[test]
+fn modulus_and_shape_come_back_from_the_parameters_they_give() {
+    for shape in shapes() {
+        for number in NUMBERS {
+            let material = Material::new(shape.law, (shape.values)(670.0, number), 0.45);
+            assert_eq!(material.check(), Ok(()), "{shape:?}");
+            assert!((material.shear_modulus_pa() / 670.0 - 1.0).abs() < 1e-12, "{shape:?} at {number}");
+            assert!(((shape.number)(&material.values) - number).abs() < 1e-9, "{shape:?} at {number}");
+        }
+    }
+}
+
+#[test]
+fn slopes_are_those_of_the_stress_by_the_shape() {
+    let h = Matrix3::new(0.02, -0.01, 0.03, 0.01, -0.02, 0.01, -0.02, 0.01, 0.03);
+    let step = 1e-5;
+    for shape in shapes() {
+        for number in NUMBERS {
+            let at = |number: f64| Material::new(shape.law, (shape.values)(670.0, number), 0.45);
+            let stress = |material: &Material| material.law().first_piola_kirchhoff_pa(&h);
+            let whole = (stress(&at(number + step)) - stress(&at(number - step))) / (2.0 * step);
+            // lambda hangs on the modulus, which stays as it is: parameters are moved together.
+            let mut moved = [at(number), at(number)];
+            for (name, slope) in (shape.slopes)(number) {
+                let parameter = moved[0].parameter(name, 0).unwrap_or_else(|| panic!("{shape:?}: {name}"));
+                for (material, way) in moved.iter_mut().zip([1.0, -1.0]) {
+                    *material = material.scaled(parameter, (way * step * slope).exp()).unwrap();
+                }
+            }
+            let by_parts = (stress(&moved[0]) - stress(&moved[1])) / (2.0 * step);
+            let off = (whole - by_parts).abs().max();
+            assert!(off < 1e-4 * whole.abs().max().max(1e-3), "{shape:?} at {number}: {off}");
+        }
+    }
+}
+
+#[test]
+fn every_law_that_is_fitted_can_be_estimated() {
+    let fitted = LAWS.into_iter().filter(|law| !law.curves().is_empty());
+    assert!(fitted.clone().count() > 3);
+    fitted.for_each(|law| assert_ne!(law.estimated(), Estimated::Not, "{law:?}"));
 }

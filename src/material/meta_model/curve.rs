@@ -1,6 +1,8 @@
 //! The meta-models there are: the curves of the laws, in the order of the list of laws.
 
-use crate::material::law::{LAWS, Law, Material, Slope, Stability, UniaxialCurve, mooney_rivlin, neo_hookean, ogden};
+use crate::material::law::{
+    Estimated, LAWS, Law, Material, Slope, Stability, UniaxialCurve, mooney_rivlin, neo_hookean, ogden,
+};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::cmp::Ordering;
@@ -33,6 +35,11 @@ impl MetaModel {
     /// The words of all meta-models in files and on the command line.
     pub fn names() -> Vec<&'static str> {
         Self::all().map(Self::name).collect()
+    }
+
+    /// The words of those an estimate can change the parameters of.
+    pub fn estimable() -> Vec<&'static str> {
+        Self::all().filter(|model| model.estimated() != Estimated::Not).map(Self::name).collect()
     }
 
     /// The word in files and on the command line.
@@ -78,6 +85,16 @@ impl MetaModel {
     /// The law as a compressible material of a scenario.
     pub fn material(self, parameters: &[f64], poisson_ratio: f64) -> Material {
         Material::new(self.law, self.curve.values(parameters), poisson_ratio)
+    }
+
+    /// What an estimate may change of the law.
+    pub fn estimated(self) -> Estimated {
+        self.law.estimated()
+    }
+
+    /// The law's own numbers for these parameters.
+    pub fn values(self, parameters: &[f64]) -> Vec<f64> {
+        self.curve.values(parameters)
     }
 
     pub(super) fn curve(self) -> &'static dyn UniaxialCurve {

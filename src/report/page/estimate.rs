@@ -4,7 +4,7 @@ use super::super::html::{fixed, number};
 use super::posterior::{figures, parameter};
 use super::results::{Row, table, words};
 use crate::experiment::compare::{Candidate, Comparison};
-use crate::experiment::estimate::{EstimateOutcome, Knowledge};
+use crate::experiment::estimate::{EstimateOutcome, Knowledge, Scale};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -79,7 +79,7 @@ pub fn section(
                 "Correlation of the first two sensitivities " (number(panel.sensitivity_correlation[0][1], 3))
                 "; condition number " (number(panel.condition, 3)) ". The cost has its valley along ("
                 (direction.join(", ")) "), where the data alone leave a standard deviation of "
-                (number(panel.valley_log_sd, 2)) " in the logarithm."
+                (number(panel.valley_log_sd, 2)) (counted_by(estimate)) "."
             }
         }
         @if !estimate.limits.is_empty() {
@@ -88,6 +88,28 @@ pub fn section(
         }
     }
 }
+
+/// By what the parameters of the valley count: most by their logarithm, some as they are.
+fn counted_by(estimate: &EstimateOutcome) -> String {
+    let posterior = &estimate.posterior;
+    let along = |n: &usize| posterior.identifiability.valley[*n].abs() >= SHOWN;
+    let of = |scale: Scale| -> Vec<String> {
+        let these = (0..posterior.names.len()).filter(along).filter(|n| estimate.prior[*n].scale == scale);
+        these.map(|n| parameter(&posterior.names[n]).0).collect()
+    };
+    let words =
+        [(Scale::Plain, "as it is"), (Scale::Angle, "in radians"), (Scale::Share, "by the logarithm of its odds")];
+    let others: Vec<String> =
+        words.iter().flat_map(|(scale, how)| of(*scale).into_iter().map(move |name| format!("{name} {how}"))).collect();
+    match (of(Scale::Logarithm).is_empty(), others.is_empty()) {
+        (_, true) => " in the logarithm".to_owned(),
+        (true, false) => format!(", which counts {}", others.join(", ")),
+        (false, false) => format!(", which counts {}, the others by their logarithm", others.join(", ")),
+    }
+}
+
+/// The least share of a valley's direction that two decimals show.
+const SHOWN: f64 = 0.005;
 
 /// A parameter with its unit, for a table.
 fn in_words(name: &str) -> String {

@@ -144,6 +144,11 @@ pub enum WorkflowError {
          one model must have an equilibrium"
     )]
     NoEvidence,
+    #[error(
+        "there is no load: `gravity_m_per_s2` is [0, 0, 0] (or the density 0) and no pressure is given, so that nothing can be \
+         estimated from what has moved; give one of them in the table [resection]"
+    )]
+    NoLoad,
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
     #[error(transparent)]

@@ -28,7 +28,7 @@ use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 24;
+const VERSION: u32 = 25;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;

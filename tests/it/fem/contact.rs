@@ -177,6 +177,38 @@ fn the_edge_of_a_sheet_inside_the_body_stays_whole() {
     assert!(farthest > 1.0, "the other side moves away: {farthest}");
 }
 
+/// A sheet whose fold takes in one cell whole: that cell stays with a neighbour, and the body has its equilibrium.
+#[test]
+fn a_sheet_that_folds_about_a_cell_still_slides() {
+    let mut mesh = block([6, 6, 6], |x| [80.0 * x[0] - 40.0, 40.0 * x[1], 40.0 * x[2]]);
+    let on = |x: f64| {
+        let near = |f: &[u32; 3]| f.iter().all(|&n| (mesh.nodes_mm()[n as usize][0] - x).abs() < 1e-9);
+        mesh.facets().into_iter().filter(|f| f.2.is_some() && near(&f.0)).collect::<Vec<_>>()
+    };
+    let plane = on(0.0);
+    let cell = plane[plane.len() / 2].1;
+    let own = mesh.facets().into_iter().filter(|f| f.2.is_some() && (f.1 == cell || f.2 == Some(cell)));
+    let folded: Vec<[u32; 3]> = plane.iter().copied().chain(own).map(|f| f.0).collect();
+    let held = (0..mesh.nodes_mm().len() as u32).filter(|&n| mesh.nodes_mm()[n as usize][2] == 0.0).collect();
+    mesh.facet_sets.insert("falx".to_owned(), folded);
+    mesh.set_nodes("base", held).unwrap();
+    let text = format!(
+        "[supports]\nbase = 'fixed'\nfalx = 'sliding'\n{GREY}[loads]\ngravity_m_per_s2 = [9.81, 0, 0]\n\
+         density_kg_per_m3 = 100.0\n"
+    );
+    let body = Scenario::from_toml(&text).unwrap().body(&mesh).unwrap().into_owned();
+    let mut pieces = body.pieces_beside(&[]);
+    pieces.sort_unstable();
+    pieces.dedup();
+    assert_eq!(pieces.len(), 2, "the two halves");
+    assert!(solved(&mesh, &text).convergence.worst_volume_ratio > 0.3);
+    // A half that nothing holds is named at once.
+    let left = (0..mesh.nodes_mm().len() as u32).filter(|&n| mesh.nodes_mm()[n as usize][0] == -40.0).collect();
+    mesh.set_nodes("base", left).unwrap();
+    let refused = Scenario::from_toml(&text).unwrap().body(&mesh).unwrap_err().to_string();
+    assert!(refused.contains("by no facet") && refused.contains("`falx`"), "{refused}");
+}
+
 const LEANING: &str = "
     fixed = ['x0']
     [materials.grey_matter]

@@ -1,7 +1,7 @@
 //! Bad input is refused by name.
 
 use super::meshes::{cube, two_tissue_cube};
-use hgm::fem::{FemError, Scenario, simulate};
+use hgm::fem::{FemError, FemWarning, Idle, Scenario, simulate};
 use hgm::mesh::TetMesh;
 
 const GREY: &str = "[materials.grey_matter]\nlaw = 'neo-hookean'\nshear_modulus_pa = 1000.0\npoisson_ratio = 0.45\n";
@@ -72,4 +72,92 @@ fn bad_numbers_are_refused_by_key() {
     }
     let density = format!("fixed = ['z0']\n{GREY}[loads]\ndensity_kg_per_m3 = -1.0");
     assert!(refusal(&mesh, &density).1.contains("density_kg_per_m3"));
+}
+
+#[test]
+fn a_set_is_not_held_in_two_ways_at_once() {
+    let mesh = cube(2, 10.0);
+    let (error, message) = refusal(&mesh, &format!("fixed = ['z0', 'x0']\n[supports]\nx0 = 'sliding'\n{GREY}"));
+    assert!(matches!(error, FemError::TwoSupports { .. }) && message.contains("`x0`"), "{message}");
+    let moved = "[[prescribed]]\nset = 'z0'\ndisplacement_mm = [0, 0, 1]\n";
+    let (error, message) = refusal(&mesh, &format!("fixed = ['z0']\n{moved}{GREY}"));
+    assert!(matches!(error, FemError::TwoSupports { .. }) && message.contains("`prescribed`"), "{message}");
+}
+
+#[test]
+fn what_acts_on_held_nodes_alone_is_said_to_have_no_effect() {
+    let mesh = cube(2, 10.0);
+    let weight = "[loads]\ngravity_m_per_s2 = [0, 0, -9.81]\n";
+    let solved = |text: &str| simulate(&mesh, &Scenario::from_toml(text).unwrap(), &|_| ()).unwrap();
+    let alone = solved(&format!("fixed = ['z0']\n{GREY}{weight}"));
+    assert!(alone.warnings.is_empty(), "{:?}", alone.warnings);
+    for (more, idle) in [
+        ("[[contact]]\nset = 'z0'\nwall = { shape = 'own-surface' }\n", Idle::Contact),
+        ("[[tethers]]\nset = 'z0'\nstiffness_pa_per_mm = 50.0\n", Idle::Tether),
+        ("[[loads.pressure]]\nset = 'z0'\npressure_pa = 500.0\n", Idle::Pressure),
+        ("[[loads.patch]]\nset = 'z0'\nforce_n = [0, 0, -1]\n", Idle::Patch),
+    ] {
+        let (before, after) = if more.contains("loads") { ("", more) } else { (more, "") };
+        let found = solved(&format!("fixed = ['z0']\n{before}{GREY}{weight}{after}"));
+        assert_eq!(found.warnings, [FemWarning::NoEffect { set: "z0".to_owned(), idle }]);
+        assert_eq!(found.displacement_mm, alone.displacement_mm);
+    }
+    // A neighbour that shares only an edge with what is held is free.
+    let beside = format!("fixed = ['z0']\n{GREY}{weight}[[loads.pressure]]\nset = 'x0'\npressure_pa = 5.0\n");
+    assert!(solved(&beside).warnings.is_empty());
+}
+
+#[test]
+fn a_fluid_has_a_weight_and_tissue_that_floats_in_it_is_pointed_out() {
+    let mesh = cube(2, 10.0);
+    let text = |tissue: f64, fluid: f64| {
+        format!(
+            "fixed = ['z0']\n{GREY}[loads]\ngravity_m_per_s2 = [0, 0, -9.81]\ndensity_kg_per_m3 = {tissue}\n\
+             csf = {{ density_kg_per_m3 = {fluid}, level_mm = 5.0 }}\n"
+        )
+    };
+    for none in [0.0, -1007.0] {
+        assert!(refusal(&mesh, &text(1040.0, none)).1.contains("`loads.csf.density_kg_per_m3`"));
+    }
+    let floats = |tissue: f64| {
+        let found = simulate(&mesh, &Scenario::from_toml(&text(tissue, 1007.0)).unwrap(), &|_| ()).unwrap();
+        found.warnings.iter().any(|w| matches!(w, FemWarning::LighterThanFluid { .. }))
+    };
+    assert!(floats(100.0) && floats(300.0) && !floats(1040.0));
+}
+
+#[test]
+fn a_plane_before_which_nothing_lies_is_named_for_what_it_is() {
+    let mesh = cube(2, 10.0);
+    let wall = |z: f64, up: f64| {
+        format!(
+            "fixed = ['z0']\n[[contact]]\nset = 'z1'\nwall = {{ shape = 'plane', point_mm = [0, 0, {z}], \
+             normal = [0, 0, {up}] }}\n{GREY}"
+        )
+    };
+    let (error, message) = refusal(&mesh, &wall(200.0, 1.0));
+    assert!(matches!(error, FemError::BeyondWall { .. }) && message.contains("`wall.normal`"), "{message}");
+    assert!(message.contains("190.0 mm"), "{message}");
+    // Turned round it is far away, and a plane a little into the body presses it.
+    for (z, up) in [(200.0, -1.0), (9.9, -1.0)] {
+        assert!(simulate(&mesh, &Scenario::from_toml(&wall(z, up)).unwrap(), &|_| ()).is_ok());
+    }
+}
+
+#[test]
+fn springs_that_give_way_by_more_than_the_body_hold_nothing() {
+    let mesh = cube(2, 10.0);
+    let text = |stiffness: f64| {
+        format!(
+            "[[tethers]]\nset = 'surface'\nstiffness_pa_per_mm = {stiffness:e}\n{GREY}[loads]\n\
+             gravity_m_per_s2 = [0, 0, -9.81]\ndensity_kg_per_m3 = 100.0\n"
+        )
+    };
+    let (error, message) = refusal(&mesh, &text(1e-12));
+    assert!(matches!(error, FemError::WeakSprings { .. }) && message.contains("`tethers."), "{message}");
+    assert!(simulate(&mesh, &Scenario::from_toml(&text(50.0)).unwrap(), &|_| ()).is_ok());
+    // Weak springs beside what is held are weak springs.
+    assert!(
+        simulate(&mesh, &Scenario::from_toml(&format!("fixed = ['z0']\n{}", text(1e-12))).unwrap(), &|_| ()).is_ok()
+    );
 }
