@@ -381,8 +381,8 @@ mod tests {
         let labels = folds.map(|x| if x > 130.0 { label::WHITE_MATTER } else { label::GREY_MATTER });
         let brain = labels.map(|_| true);
         let before = Segmentation::<Pre> {
-            brain: brain.relabelled(),
-            labels: labels.relabelled(),
+            brain: brain.clone().relabelled(),
+            labels: labels.clone().relabelled(),
             t1_mni: folds.clone(),
             known_mni: brain.clone(),
             brain_mni: brain.clone(),
