@@ -27,8 +27,8 @@ pub enum PlannedError {
     #[error("{plan}: the mask is empty; draw what is to be taken, or check which label means it")]
     Empty { plan: String },
     #[error(
-        "{plan}: what it marks is too small ({mm3:.1} mm3): no voxel of 1 mm, which is as fine as the labels are, has its centre in it; draw \
-         what is to be taken whole"
+        "{plan}: what it marks is too small ({mm3:.1} mm3): in the grid of the labels (1 mm) nothing is left of it; draw what is to be \
+         taken whole"
     )]
     TooSmall { plan: String, mm3: f64 },
     #[error(
