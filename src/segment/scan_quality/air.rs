@@ -6,12 +6,26 @@
 
 use super::super::label;
 use super::super::posed_scan::PosedScan;
-use super::{Air, block_of};
+use super::block::block_of;
 use crate::geometry::{Frame, Mni, Position};
 use crate::image::blocks::block_means_along;
 use crate::image::components::{Connectivity, fill_holes, largest_component};
 use crate::image::morphology::dilate;
 use crate::image::{LabelMap, Mask, Volume};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the air around the head can tell of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Air {
+    /// Air with its noise is in the field of view.
+    Seen,
+    /// Most of it is of one value: the scan was stripped, masked or defaced, or its noise was cut off. What lay there cannot be told.
+    Blank,
+    /// Hardly any air above the skull's base lies in the field of view.
+    Outside,
+}
 
 /// The head is brighter than this share of white matter, averaged over blocks; ghosts are darker.
 const HEAD: f64 = 0.25;

@@ -1,7 +1,7 @@
 //! Grey against white matter: how far apart they are, over how much they vary.
 
 use super::super::label;
-use super::block_of;
+use super::block::block_of;
 use super::gain::WhiteGain;
 use crate::geometry::Frame;
 use crate::image::{LabelMap, Volume};

@@ -6,8 +6,9 @@ use crate::image::blocks::block_means_along;
 use crate::image::gaussian::gaussian;
 use crate::image::{LabelMap, Volume};
 
-/// As wide as a coil's gain changes (standard deviation).
-const SIGMA_MM: f64 = 12.0;
+/// White matter is averaged over this (standard deviation): narrower than a coil's gain changes, for at the border of white
+/// matter the average is the gain about as far inside.
+const SIGMA_MM: f64 = 6.0;
 /// Blocks with this share of white matter count for the range.
 const MUCH_WHITE: f32 = 0.5;
 /// Weight of the mean gain, over the largest weight of a neighbourhood: where no white matter is near, the gain is the mean one.
