@@ -75,11 +75,11 @@ pub fn scan_quality<F: Frame>(
     template_from_patient: &DisplacementField<Mni>,
     template_correlation: Option<f64>,
 ) -> ScanQuality {
-    let (t1, blocks) = (scan.t1, block::factors(&scan.t1.grid));
-    let gain = gain::white_gain(t1, labels, blocks);
+    let (t1, blocks) = (scan.t1, block::Blocks::of(&scan.t1.grid));
+    let gain = gain::white_gain(t1, labels, &blocks);
     let white = gain.as_ref().map_or(0.0, |gain| gain.mean);
-    let seen = air::seen(scan, labels, blocks, white);
-    let tissue = gain.as_ref().map(|gain| contrast::tissues(t1, labels, gain));
+    let seen = air::seen(scan, labels, &blocks, white);
+    let tissue = gain.as_ref().map(|gain| contrast::tissues(t1, labels, gain, &blocks));
     let air_deviation = seen.noise.as_ref().map_or(0.0, |noise| noise.deviation);
     let told = seen.air == Air::Seen;
     let voxel_mm = t1.grid.spacing_mm();
