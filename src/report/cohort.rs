@@ -1,11 +1,12 @@
 //! Many patients in one table: a line of figures each, their median and spread, those that stand apart first.
 
 pub use super::cohort_population::{CohortPopulation, Pupil};
+pub use super::member::{Member, Status};
 
 use super::cohort_tasks::{TaskRanks, compare_tasks};
 use super::look_first::{LookFirst, scan_measures};
 use super::median_samples::{MedianSample, median_samples};
-use crate::experiment::outcome::{Answer, ExperimentOutcome};
+use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::rmse::median_and_mad;
 use crate::experiment::verdict::Claim;
 use schemars::JsonSchema;
@@ -13,39 +14,6 @@ use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use thiserror::Error;
-
-/// How a subject of a cohort ended.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Status {
-    /// Every stage ran within its checks.
-    Done,
-    /// Computed, but a boundary set is not to be believed.
-    QualityGate,
-    /// One head twice, and nothing was taken out.
-    NoOperation,
-    /// The two scans show two heads.
-    NotOnePerson,
-    /// It ended with an error.
-    Failed,
-    /// It has not been run.
-    Missing,
-}
-
-/// A subject as its folder holds it.
-#[derive(Clone, Debug)]
-pub struct Member {
-    /// `sub-01`.
-    pub participant_id: String,
-    /// How it ended.
-    pub status: Status,
-    /// Why it did not end well.
-    pub message: Option<String>,
-    /// Its numbers, where there are any.
-    pub outcome: Option<ExperimentOutcome>,
-    /// Checksum of its settings: subjects with different ones are not to be compared.
-    pub settings_sha256: Option<String>,
-}
 
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -196,34 +164,6 @@ impl Cohort {
             lines.push([&first[..], &numbers(&row.figures), &place, &measures].concat());
         }
         lines.iter().map(|line| line.join("\t") + "\n").collect()
-    }
-}
-
-impl Status {
-    /// How a subject ended that a quality gate stopped, with the scans' answer where they gave one.
-    pub fn of(answer: Option<Answer>) -> Self {
-        match answer {
-            None => Self::QualityGate,
-            Some(Answer::NoOperation) => Self::NoOperation,
-            Some(Answer::NotOnePerson) => Self::NotOnePerson,
-        }
-    }
-
-    /// The word of tables.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::QualityGate => "quality-gate",
-            Self::NoOperation => Answer::NoOperation.name(),
-            Self::NotOnePerson => Answer::NotOnePerson.name(),
-            Self::Failed => "failed",
-            Self::Missing => "missing",
-        }
-    }
-
-    /// Whether the subject has a page.
-    pub fn has_page(&self) -> bool {
-        !matches!(self, Self::Failed | Self::Missing)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Scans to look at first: a cohort's subjects by risk.
 
-use super::cohort::{Member, Status};
+use super::member::{Member, Status};
 use super::scan_measure::{Good, SCAN_MEASURES, ScanMeasure, WhichScan};
 use crate::experiment::rmse::median_and_mad;
 use schemars::JsonSchema;

@@ -24,6 +24,7 @@ pub mod look_first;
 pub mod material_figure;
 pub mod material_tables;
 pub mod median_samples;
+pub mod member;
 pub mod mesh_figure;
 pub mod page;
 pub mod paper;

@@ -132,7 +132,7 @@ pub const SCAN_MEASURES: [ScanMeasure; 9] = [
         name: "fit of the template",
         unit: "",
         good: Good::High,
-        hint: "higher is better: how alike template and scan are once one lies on the other (below 0.4 a scan is refused)",
+        hint: "higher is better: how alike template and scan are once one lies on the other",
         step: 0.02,
         decimals: 2,
         of: |scan| scan.template_correlation,

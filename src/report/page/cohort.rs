@@ -181,14 +181,14 @@ impl Cohort {
         let found = &self.look_first;
         let row = |id: &str| self.subjects.iter().find(|row| row.participant_id == id);
         let lines = || found.subjects.iter().filter_map(|subject| Some((subject, row(&subject.participant_id)?)));
-        let head = ["subject", "place", "why", "ended", "warnings"].map(str::to_owned);
+        let head = ["subject", "place", "ended", "why", "warnings"].map(str::to_owned);
         let body = html! {
             @for (place, (subject, row)) in lines().enumerate() {
                 tr data-subject=(row.participant_id) data-verdict=(said(row)) data-apart=(apart(row)) {
                     th scope="row" { (linked(row)) }
                     td data-value=(place + 1) { (place + 1) }
-                    td class="words" { (subject.because()) }
                     td class="words" { (row.status.name()) }
+                    td class="words" { (subject.because()) }
                     td data-value=(row.warnings) { (row.warnings) }
                 }
             }

@@ -6,12 +6,25 @@
 
 use super::super::label;
 use super::super::posed_scan::PosedScan;
-use super::{Air, block_of};
+use super::block::Blocks;
 use crate::geometry::{Frame, Mni, Position};
-use crate::image::blocks::block_means_along;
 use crate::image::components::{Connectivity, fill_holes, largest_component};
 use crate::image::morphology::dilate;
 use crate::image::{LabelMap, Mask, Volume};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the air around the head can tell of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Air {
+    /// Air with its noise is in the field of view.
+    Seen,
+    /// Most of it is of one value: the scan was stripped, masked or defaced, or its noise was cut off. What lay there cannot be told.
+    Blank,
+    /// Hardly any air above the skull's base lies in the field of view.
+    Outside,
+}
 
 /// The head is brighter than this share of white matter, averaged over blocks; ghosts are darker.
 const HEAD: f64 = 0.25;
@@ -45,9 +58,9 @@ pub(super) struct SeenAir {
     pub noise: Option<Noise>,
 }
 
-/// Looks at the air; `white` is the brightness of white matter, `factor` the voxels to a block.
-pub(super) fn seen<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, factor: [usize; 3], white: f64) -> SeenAir {
-    let place = air_of(scan, labels, factor, white);
+/// Looks at the air; `white` is the brightness of white matter, `blocks` those of the scan.
+pub(super) fn seen<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, blocks: &Blocks<F>, white: f64) -> SeenAir {
+    let place = air_of(scan, labels, blocks, white);
     let t1 = scan.t1;
     let all: Vec<u32> = (0..t1.data.len() as u32).filter(|&n| place.data[n as usize]).collect();
     if all.len() < LEAST || white <= 0.0 {
@@ -67,10 +80,10 @@ pub(super) fn seen<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, fact
 }
 
 /// The voxels of air above the base of the skull.
-fn air_of<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, factor: [usize; 3], white: f64) -> Mask<F> {
+fn air_of<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, blocks: &Blocks<F>, white: f64) -> Mask<F> {
     let grid = scan.t1.grid;
-    let mean = block_means_along(&grid, factor, |n| scan.t1.data[n]);
-    let brain = block_means_along(&grid, factor, |n| f32::from(u8::from(labels.data[n] != label::BACKGROUND)));
+    let mean = blocks.means(|n| scan.t1.data[n]);
+    let brain = blocks.means(|n| f32::from(u8::from(labels.data[n] != label::BACKGROUND)));
     let bright = largest_component(&mean.map(|x| f64::from(x) > HEAD * white), Connectivity::Faces);
     let around = dilate(&brain.map(|share| share > 0.0), SKULL_MM);
     let head = fill_holes(&Volume::from_fn(mean.grid, |n| bright.data[n] || around.data[n]));
@@ -78,7 +91,7 @@ fn air_of<F: Frame>(scan: &PosedScan<'_, F>, labels: &LabelMap<F>, factor: [usiz
     let air = Mask::from_fn(mean.grid, |n| {
         !near.data[n] && above_the_base(scan.mni_from_t1.apply(mean.grid.centre(mean.grid.voxel(n))))
     });
-    Volume::from_voxels(grid, |voxel| air.data[block_of(&air.grid, factor, voxel)])
+    Volume::from_voxels(grid, |voxel| air.data[blocks.place(voxel)])
 }
 
 /// Above the plane through the nasion and the cerebellum's lowest point, from ear to ear.

@@ -1,7 +1,7 @@
 //! Grey against white matter: how far apart they are, over how much they vary.
 
 use super::super::label;
-use super::block_of;
+use super::block::Blocks;
 use super::gain::WhiteGain;
 use crate::geometry::Frame;
 use crate::image::{LabelMap, Volume};
@@ -78,7 +78,12 @@ impl Tissues {
 }
 
 /// Slice by slice, then the slices in their order. Voxels of 0 are blank: of lost slices, of a mask.
-pub(super) fn tissues<F: Frame>(t1: &Volume<f32, F>, labels: &LabelMap<F>, gain: &WhiteGain<F>) -> Tissues {
+pub(super) fn tissues<F: Frame>(
+    t1: &Volume<f32, F>,
+    labels: &LabelMap<F>,
+    gain: &WhiteGain<F>,
+    blocks: &Blocks<F>,
+) -> Tissues {
     let none = || Tissues { grey: Moments::default(), white: Moments::default(), deep_white: Moments::default() };
     let of_slice = |k: usize| {
         let mut found = none();
@@ -89,8 +94,7 @@ pub(super) fn tissues<F: Frame>(t1: &Volume<f32, F>, labels: &LabelMap<F>, gain:
                 if !(own == label::GREY_MATTER || own == label::WHITE_MATTER) || value <= 0.0 {
                     continue;
                 }
-                let flat =
-                    f64::from(value / gain.over_mean.data[block_of(&gain.over_mean.grid, gain.factor, [i, j, k])]);
+                let flat = f64::from(value / gain.over_mean.data[blocks.place([i, j, k])]);
                 if own == label::GREY_MATTER {
                     found.grey.add(flat);
                     continue;

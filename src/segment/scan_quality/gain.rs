@@ -1,13 +1,14 @@
 //! The coil's gain as white matter shows it.
 
 use super::super::label;
+use super::block::Blocks;
 use crate::geometry::Frame;
-use crate::image::blocks::block_means_along;
 use crate::image::gaussian::gaussian;
 use crate::image::{LabelMap, Volume};
 
-/// As wide as a coil's gain changes (standard deviation).
-const SIGMA_MM: f64 = 12.0;
+/// White matter is averaged over this (standard deviation): narrower than a coil's gain changes, for at the border of white
+/// matter the average is the gain about as far inside.
+const SIGMA_MM: f64 = 6.0;
 /// Blocks with this share of white matter count for the range.
 const MUCH_WHITE: f32 = 0.5;
 /// Weight of the mean gain, over the largest weight of a neighbourhood: where no white matter is near, the gain is the mean one.
@@ -17,8 +18,6 @@ const FLOOR: f32 = 1e-3;
 pub(super) struct WhiteGain<F: Frame> {
     /// Over the mean one, on the grid of blocks.
     pub over_mean: Volume<f32, F>,
-    /// Voxels to a block along each axis.
-    pub factor: [usize; 3],
     /// Mean brightness of white matter, in the scan's units.
     pub mean: f64,
     /// Brightest over darkest part.
@@ -29,11 +28,11 @@ pub(super) struct WhiteGain<F: Frame> {
 pub(super) fn white_gain<F: Frame>(
     t1: &Volume<f32, F>,
     labels: &LabelMap<F>,
-    factor: [usize; 3],
+    blocks: &Blocks<F>,
 ) -> Option<WhiteGain<F>> {
     let white = |n: usize| labels.data[n] == label::WHITE_MATTER && t1.data[n] > 0.0;
-    let share = block_means_along(&t1.grid, factor, |n| f32::from(u8::from(white(n))));
-    let bright = block_means_along(&t1.grid, factor, |n| if white(n) { t1.data[n] } else { 0.0 });
+    let share = blocks.means(|n| f32::from(u8::from(white(n))));
+    let bright = blocks.means(|n| if white(n) { t1.data[n] } else { 0.0 });
     let sum = |v: &Volume<f32, F>| v.data.iter().map(|&x| f64::from(x)).sum::<f64>();
     let mean = sum(&bright) / sum(&share);
     if !(mean.is_finite() && mean > 0.0) {
@@ -49,5 +48,5 @@ pub(super) fn white_gain<F: Frame>(
     gains.sort_unstable_by(f32::total_cmp);
     let last = gains.len().checked_sub(1)?;
     let at = |q: f64| f64::from(gains[(q * last as f64).round() as usize]);
-    Some(WhiteGain { over_mean, factor, mean, times: at(0.98) / at(0.02) })
+    Some(WhiteGain { over_mean, mean, times: at(0.98) / at(0.02) })
 }

@@ -5,29 +5,20 @@
 //! None of them changes when all intensities are scaled.
 
 mod air;
+mod block;
 mod contrast;
 mod coverage;
 mod focus;
 mod gain;
 
+pub use air::Air;
+
 use super::posed_scan::PosedScan;
 use crate::geometry::{Frame, Mni};
-use crate::image::{Grid, LabelMap};
+use crate::image::LabelMap;
 use crate::register::deformable::DisplacementField;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// What the air around the head can tell of a scan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Air {
-    /// Air with its noise is in the field of view.
-    Seen,
-    /// Most of it is of one value: the scan was stripped, masked or defaced, or its noise was cut off. What lay there cannot be told.
-    Blank,
-    /// Hardly any air above the skull's base lies in the field of view.
-    Outside,
-}
 
 /// The measures of one scan. One that cannot be told is absent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -84,11 +75,11 @@ pub fn scan_quality<F: Frame>(
     template_from_patient: &DisplacementField<Mni>,
     template_correlation: Option<f64>,
 ) -> ScanQuality {
-    let (t1, blocks) = (scan.t1, factors(&scan.t1.grid));
-    let gain = gain::white_gain(t1, labels, blocks);
+    let (t1, blocks) = (scan.t1, block::Blocks::of(&scan.t1.grid));
+    let gain = gain::white_gain(t1, labels, &blocks);
     let white = gain.as_ref().map_or(0.0, |gain| gain.mean);
-    let seen = air::seen(scan, labels, blocks, white);
-    let tissue = gain.as_ref().map(|gain| contrast::tissues(t1, labels, gain));
+    let seen = air::seen(scan, labels, &blocks, white);
+    let tissue = gain.as_ref().map(|gain| contrast::tissues(t1, labels, gain, &blocks));
     let air_deviation = seen.noise.as_ref().map_or(0.0, |noise| noise.deviation);
     let told = seen.air == Air::Seen;
     let voxel_mm = t1.grid.spacing_mm();
@@ -106,17 +97,6 @@ pub fn scan_quality<F: Frame>(
         anisotropy: longest / shortest,
         template_correlation,
     }
-}
-
-/// Voxels to a block along each axis: blocks of about 4 mm.
-fn factors<F: Frame>(grid: &Grid<F>) -> [usize; 3] {
-    const BLOCK_MM: f64 = 4.0;
-    grid.spacing_mm().map(|mm| (BLOCK_MM / mm).round().max(1.0) as usize)
-}
-
-/// The place in memory of the block that holds a voxel.
-fn block_of<F: Frame>(blocks: &Grid<F>, factor: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
-    blocks.index(i / factor[0], j / factor[1], k / factor[2])
 }
 
 #[cfg(test)]

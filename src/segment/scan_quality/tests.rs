@@ -1,6 +1,6 @@
 use super::*;
 use crate::geometry::{Pre, RigidTransform};
-use crate::image::{Volume, VoxelBox};
+use crate::image::{Grid, Volume, VoxelBox};
 use crate::register::deformable::DisplacementField;
 use crate::segment::atlas;
 
@@ -93,7 +93,7 @@ fn noise_lowers_contrast_to_noise_and_makes_nothing_better() {
     assert!(loud.white_signal_to_noise.unwrap() < 0.9 * quiet.white_signal_to_noise.unwrap(), "{quiet:?} {loud:?}");
     for (good, bad) in good.into_iter().zip(bad) {
         // What is about as good as before may differ in the third digit.
-        assert!(bad > good - 2e-3 * good.abs(), "{quiet:?} {loud:?}");
+        assert!(bad >= good - 2e-3 * good.abs(), "{quiet:?} {loud:?}");
     }
 }
 
@@ -140,9 +140,9 @@ fn shading_is_told_as_gain_and_not_as_noise() {
     let shaded =
         Volume::from_fn(t1.grid, |n| scan.data[n] * (t1.grid.centre(t1.grid.voxel(n)).mm.z / 100.0).exp() as f32);
     let [even, shaded] = [&scan, &shaded].map(|scan| measured(scan, &labels));
-    assert!(even.gain_times.unwrap() < 1.25 && shaded.gain_times.unwrap() > 1.8, "{even:?} {shaded:?}");
+    assert!(even.gain_times.unwrap() < 1.3 && shaded.gain_times.unwrap() > 1.8, "{even:?} {shaded:?}");
     let kept = shaded.contrast_to_noise.unwrap() / even.contrast_to_noise.unwrap();
-    assert!((kept - 1.0).abs() < 0.05, "{kept}");
+    assert!((kept - 1.0).abs() < 0.08, "{kept}");
 }
 
 #[test]
@@ -188,8 +188,8 @@ fn of_an_air_that_was_cut_out_nothing_is_told() {
     let found = measured(&stripped, &labels);
     assert_eq!((found.air, found.entropy_focus, found.air_artefact_percent), (Air::Blank, None, None));
     assert!(found.contrast_to_noise.is_some());
-    // A field of view that ends at the scalp.
-    let tight = VoxelBox { first: [12, 12, 0], end: [100, 118, 96] };
+    // A field of view that ends within the head.
+    let tight = VoxelBox { first: [26, 28, 20], end: [86, 100, 90] };
     let found = measured(&noise.cropped(&tight), &labels.cropped(&tight));
     assert_eq!((found.air, found.air_artefact_percent), (Air::Outside, None));
 }
