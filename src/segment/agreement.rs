@@ -38,7 +38,7 @@ pub enum Disagreement {
 
 /// How far a map is moved to see whether it lies better there, mm: farther than cortex is thick.
 const ASIDE_MM: f64 = 8.0;
-/// A map lies on its scan when it explains so many times what it explains beside. Maps of nine scans, among them thick slices
+/// A map lies on its scan when it explains so many times what it explains beside. Maps of six scans, among them thick slices
 /// and a surface coil's, explain 6.9 to 11 times as much; mirrored left to right 2.0 times.
 const TIMES: f64 = 2.5;
 /// Fluid lies outside what grey and white matter span by at least this share of their distance.

@@ -10,6 +10,7 @@ mod brain;
 mod carried;
 mod cerebellum;
 mod coil;
+mod folia;
 mod import;
 mod labelled;
 mod mixture;

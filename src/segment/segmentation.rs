@@ -2,8 +2,8 @@
 
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
-use super::cerebellum::with_whole_folia;
 use super::coil::{evened, strong_gain};
+use super::folia::with_whole_folia;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
 use super::native::{labels_on, mask_on};
