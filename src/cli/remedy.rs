@@ -96,7 +96,8 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             | PredictError::NoVoxel { .. }
             | PredictError::BesideScan { .. },
         ) => "see --resection and --resection-ellipsoid",
-        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
+        WorkflowError::OtherCohort { .. }
+        | WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
             "see --tissues and --population"
         }
         WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => {

@@ -193,6 +193,14 @@ fn can_be_estimated(work: &Work<'_>) -> Result<(), WorkflowError> {
     if work.subject == Subject::Patient && !work.settings.resection.is_loaded() {
         return Err(WorkflowError::NoLoad);
     }
+    // A prior that is not taken up would be called the cohort's all the same.
+    let taught: Vec<&str> = work.settings.prior.taught_tissues().collect();
+    let drawn = work.settings.resection.tissue_list();
+    let foreign = taught.iter().any(|name| drawn.iter().all(|tissue| tissue.name != *name));
+    if work.subject == Subject::Patient && foreign {
+        let names: Vec<&str> = drawn.iter().map(|tissue| tissue.name.as_str()).collect();
+        return Err(WorkflowError::OtherCohort { taught: taught.join(" and "), drawn: names.join(" and ") });
+    }
     Ok(())
 }
 

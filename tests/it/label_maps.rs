@@ -248,12 +248,13 @@ fn exchange_white(n: i16) -> i16 {
 #[test]
 fn numbers_of_no_tool_are_meshed_as_they_are_and_a_table_of_ones_own_names_them() {
     let lump = |p: Place| match p {
-        Place::White(_) => 20,
+        Place::White(_) | Place::Thalamus(_) => 20,
         Place::Cortex(_) => 30,
         Place::Ventricle(_) => 40,
         _ => 0,
     };
-    assert_eq!(meshed(&map(lump), &[]).0, Some(0));
+    let (code, said) = meshed(&map(lump), &[]);
+    assert_eq!(code, Some(0), "{said}");
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("mine.tsv");
     std::fs::write(&table, "index\tname\ttissue\n20\tcore\twhite_matter\n30\trim\tgrey_matter\n40\tlump\ttumour\n")

@@ -1,6 +1,6 @@
 //! What cohorts say of people, from file to file, and as the prior of the next estimate.
 
-use crate::job::{contents, output};
+use crate::job::{contents, output, sample};
 use crate::made::prepared_pair;
 use hgm::experiment::population::{Moments, PopulationFile};
 use hgm::material::meta_model::MetaModel;
@@ -66,6 +66,22 @@ fn a_population_for_a_sweep_is_refused() {
     let result = output(&["run", "pre.nii.gz", "post.nii.gz", "--population", "p.toml"]);
     assert_eq!(result.status.code(), Some(3));
     assert!(said(&result).contains("add --estimate"), "{}", said(&result));
+}
+
+#[test]
+fn a_population_of_other_tissues_is_no_prior_of_an_estimate() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(at("p.toml"), of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45])).unwrap();
+    std::fs::write(at("s.toml"), "[resection]\ntissues = 2\n").unwrap();
+    let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|name| sample(name).to_str().unwrap().to_owned());
+    let (settings, population, case) = (at("s.toml"), at("p.toml"), at("case"));
+    let asked = ["--config", &settings, "run", &pre, &post, "--estimate", "--population", &population, "-o", &case];
+    let result = output(&asked);
+    assert_eq!(result.status.code(), Some(3), "{}", said(&result));
+    for words in ["teaches brain", "grey_matter and white_matter", "--tissues"] {
+        assert!(said(&result).contains(words), "{words}: {}", said(&result));
+    }
 }
 
 fn estimated(case: &Path, more: &[&str]) -> serde_json::Value {

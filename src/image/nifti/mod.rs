@@ -74,7 +74,8 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
 /// As [`decode`].
 pub fn decode_scan(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
     let mut image = decode(bytes, name, options)?;
-    floor::counted_from_their_floor(&mut image);
+    let floor = floor::counted_from_their_floor(&mut image.volume.data);
+    image.warnings.extend(floor.map(|floor| NiftiWarning::BelowZero { floor: f64::from(floor) }));
     Ok(image)
 }
 

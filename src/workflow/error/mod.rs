@@ -149,6 +149,11 @@ pub enum WorkflowError {
          estimated from what has moved; give one of them in the table [resection]"
     )]
     NoLoad,
+    #[error(
+        "`population` of the table [prior] teaches {taught}, and the estimate has {drawn}: set `tissues` of the table [resection] to \
+         what the cohort was estimated with, or leave the population out"
+    )]
+    OtherCohort { taught: String, drawn: String },
     #[error("table [estimate]: {0}")]
     EstimateLoads(&'static str),
     #[error(transparent)]
