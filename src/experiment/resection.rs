@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn beside_a_fluid_a_density_is_the_tissues_own() {
         let with = |csf: Option<CsfSettings>, density_kg_per_m3: f64| {
-            ResectionSettings { csf, density_kg_per_m3, ..ResectionSettings::default() }.check()
+            ResectionSettings { density_kg_per_m3, csf, ..ResectionSettings::default() }.check()
         };
         let fluid = || Some(CsfSettings::default());
         for effective in [33.0, 100.0, 300.0, 1006.0] {

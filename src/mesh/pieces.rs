@@ -45,7 +45,9 @@ impl TetMesh {
     pub fn without_crumbs(&self, sheet: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let (mut cut, whole) = parted(self, sheet);
         let mut root: Vec<u32> = (0..self.tets().len() as u32).collect();
-        whole.iter().for_each(|(_, sides)| join(&mut root, *sides));
+        for (_, sides) in &whole {
+            join(&mut root, *sides);
+        }
         loop {
             let kept = self.one_round_of_crumbs(&mut root, &cut);
             if kept.len() == cut.len() {
@@ -79,7 +81,9 @@ impl TetMesh {
         let before: Vec<[u32; 2]> = cut.iter().map(|(_, sides)| sides.map(|t| root_of(root, t))).collect();
         let joined =
             |[a, b]: [u32; 2]| [(a, b), (b, a)].iter().any(|(own, to)| nearest.get(own).is_some_and(|n| n.0 == *to));
-        nearest.iter().for_each(|(own, (other, _))| join(root, [*own, *other]));
+        for (own, (other, _)) in &nearest {
+            join(root, [*own, *other]);
+        }
         cut.iter().zip(before).filter(|(_, pair)| !joined(*pair)).map(|(facet, _)| *facet).collect()
     }
 }

@@ -27,11 +27,12 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let Some(first) = rows.first().cloned() else { return Err(damaged(name, "the table", "it holds no row")) };
     let is_number = |cell: &String| cell.parse::<f64>().is_ok();
     let numbers = first.iter().filter(|cell| is_number(cell)).count();
-    let (header, columns) = if numbers > 3 {
+    if numbers > 3 {
         let problem =
             format!("{numbers} columns of numbers and no header: say above them which are x, y and z (mm, RAS)");
         return Err(damaged(name, "the first row", problem));
-    } else if numbers == 3 {
+    }
+    let (header, columns) = if numbers == 3 {
         let places: Vec<usize> = (0..first.len()).filter(|&c| is_number(&first[c])).collect();
         (None, [places[0], places[1], places[2]])
     } else {

@@ -44,9 +44,8 @@ mod tests {
     fn folded() -> (LabelMap<Mni>, AtlasPriors) {
         let grid = Grid::<Mni>::axis_aligned([40, 48, 30], [1.0; 3], [0.0; 3]);
         let labels = Volume::from_fn(grid, |n| match grid.voxel(n)[1] {
-            10 | 11 | 20 => WHITE_MATTER,
             15 | 16 | 24 | 36..40 => CSF,
-            28..34 => WHITE_MATTER,
+            10 | 11 | 20 | 28..34 => WHITE_MATTER,
             _ => GREY_MATTER,
         });
         let nothing = Volume::filled(grid, 0f32);

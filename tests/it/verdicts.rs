@@ -75,10 +75,10 @@ fn in_conflict() -> ExperimentOutcome {
     outcome
 }
 
-fn eight() -> [(&'static str, ExperimentOutcome, Finding); 8] {
+fn eight() -> Vec<(&'static str, ExperimentOutcome, Finding)> {
     let spread = [(300.0, Some(1.2)), (500.0, Some(1.0)), (900.0, Some(1.3)), (2000.0, Some(2.4))];
     let none = ExperimentOutcome { answer: Some(Answer::NoOperation), ..ExperimentOutcome::default() };
-    [
+    vec![
         ("better", swept(3.0, &spread), Finding::Better),
         ("not distinguishable", swept(1.2, &spread), Finding::NotDistinguishable),
         ("worse", swept(0.5, &spread), Finding::Worse),

@@ -19,7 +19,9 @@ pub(super) fn counted_from_their_floor(data: &mut [f32]) -> Option<f32> {
     if floor >= -UNDERSHOOT * (top - floor) {
         return None;
     }
-    data.iter_mut().for_each(|x| *x = (*x - floor).max(0.0));
+    for x in data {
+        *x = (*x - floor).max(0.0);
+    }
     Some(floor)
 }
 

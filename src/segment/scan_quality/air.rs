@@ -106,7 +106,9 @@ fn above_the_base(p: Position<Mni>) -> bool {
 fn median_and_deviation(mut values: Vec<f32>) -> (f32, f32) {
     let middle = values.len() / 2;
     let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-    values.iter_mut().for_each(|x| *x = (*x - median).abs());
+    for x in &mut values {
+        *x = (*x - median).abs();
+    }
     (median, *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
