@@ -11,7 +11,7 @@ pub(crate) struct Before {
     case: Case,
     /// The bytes of its settings.
     settings: Option<Vec<u8>>,
-    /// No job had finished a stage in it.
+    /// Nothing of any command's had been finished in it: a patient made by `synth` is no case, and nobody's to clear away.
     empty: bool,
 }
 
@@ -19,7 +19,7 @@ impl Before {
     /// Remembers a folder.
     pub fn of(case: &Case) -> Self {
         let settings = std::fs::read(case.path(layout::SETTINGS)).ok();
-        Self { case: case.clone(), settings, empty: case.subject().is_none() }
+        Self { case: case.clone(), settings, empty: case.recorded().is_empty() }
     }
 
     /// After an error: the settings as they were, so that what is there is still of its settings; and where an input was refused
@@ -29,10 +29,14 @@ impl Before {
         // The job's own error is told, not the disk's.
         match &self.settings {
             Some(bytes) => write_whole(&settings, bytes).unwrap_or_default(),
-            None => std::fs::remove_file(settings).unwrap_or_default(),
-        }
-        if self.empty && error.kind() == ErrorKind::Rejected && self.settings.is_none() {
-            self.clear();
+            None if error.kind() == ErrorKind::Rejected => {
+                std::fs::remove_file(settings).unwrap_or_default();
+                if self.empty {
+                    self.clear();
+                }
+            }
+            // What was computed before the job failed is of these settings.
+            None => {}
         }
     }
 
@@ -80,6 +84,11 @@ mod tests {
         refused_in(&users);
         let left: Vec<_> = std::fs::read_dir(&users).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(left, ["notes.txt"]);
+        let made = all.path().join("made");
+        let patient = Produced { files: vec![("post.nii.gz".to_owned(), vec![1])], ..Produced::default() };
+        Stage::new("synth", 1, &made, &"own").run(false, || Ok::<_, PredictError>(patient)).unwrap();
+        refused_in(&made);
+        assert!(made.join("post.nii.gz").exists(), "what another command made is not the job's");
         let used = all.path().join("used");
         std::fs::create_dir_all(used.join(".stages")).unwrap();
         std::fs::write(used.join(".stages/pose.manifest.json"), "{}").unwrap();
