@@ -15,7 +15,7 @@ const AT_ONCE: usize = 1 << 16;
 /// when the mask is empty.
 #[must_use]
 pub fn distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
-    let mut volume = squared_distance_mm2(mask, true, f32::INFINITY);
+    let mut volume = squared_distance_mm2(mask, true);
     each_piece(&mut volume.data, AT_ONCE, &|_, piece| piece.iter_mut().for_each(|d| *d = d.sqrt()));
     volume
 }
@@ -27,7 +27,7 @@ pub fn distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
 pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     let spacing_mm = mask.grid.spacing_mm();
     let half = (0.5 * spacing_mm.iter().copied().fold(f64::INFINITY, f64::min)) as f32;
-    let mut signed = squared_distance_mm2(mask, true, f32::INFINITY);
+    let mut signed = squared_distance_mm2(mask, true);
     each_piece(&mut signed.data, AT_ONCE, &|_, piece| {
         for d in piece {
             *d = if *d > 0.0 { d.sqrt() - half } else { *d };
@@ -37,7 +37,7 @@ pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     // The nearest voxel outside lies in the box or in the layer around it.
     let around = around.grown(&mask.grid, 1e-3 * f64::from(half));
     let mut part = signed.cropped(&around);
-    let inward = squared_distance_mm2(&mask.cropped(&around), false, f32::INFINITY);
+    let inward = squared_distance_mm2(&mask.cropped(&around), false);
     each_piece(&mut part.data, AT_ONCE, &|first, out| {
         for (o, i) in out.iter_mut().zip(&inward.data[first..]) {
             *o = if *i > 0.0 { half - i.sqrt() } else { *o };
@@ -47,9 +47,8 @@ pub fn signed_distance_mm<F: Frame>(mask: &Mask<F>) -> Volume<f32, F> {
     signed
 }
 
-/// Squared distance in mm2 to the nearest voxel whose value is `seed`; infinite where it is more than `limit`. What lies
-/// farther along one axis is farther still along all: most lines then hold few parabolas or none.
-pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: f32) -> Volume<f32, F> {
+/// Squared distance in mm2 to the nearest voxel whose value is `seed`.
+pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool) -> Volume<f32, F> {
     let [nx, ny, nz] = mask.grid.dims;
     let h = mask.grid.spacing_mm();
     let mut data = vec![0f32; mask.data.len()];
@@ -59,7 +58,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
     each_piece(&mut data, nx * ny, &|first, plane| {
         let inside = &mask.data[first..][..nx * ny];
         for (row, inside) in plane.chunks_exact_mut(nx).zip(inside.chunks_exact(nx)) {
-            row_distance(row, inside, seed, h[0], limit);
+            row_distance(row, inside, seed, h[0]);
         }
         if ny > 1 {
             let mut envelope = Envelope::new(ny);
@@ -72,7 +71,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
                     }
                 }
                 for column in columns.chunks_exact_mut(ny).take(lanes) {
-                    envelope.transform(column, h[1], limit);
+                    envelope.transform(column, h[1]);
                 }
                 for j in 0..ny {
                     for l in 0..lanes {
@@ -97,7 +96,7 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
                     }
                 }
                 for line in lines[first * nz..].chunks_exact_mut(nz).take(lanes) {
-                    envelope.transform(line, h[2], limit);
+                    envelope.transform(line, h[2]);
                 }
             }
         });
@@ -116,7 +115,8 @@ pub(super) fn squared_distance_mm2<F: Frame>(mask: &Mask<F>, seed: bool, limit: 
 /// Neighbouring lines gathered together, so that a strided read uses the whole cache line.
 const LANES: usize = 16;
 
-fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64, limit: f32) {
+/// Squared distance along a row, mm2.
+pub(super) fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64) {
     let n = row.len();
     let mut last = None;
     for i in 0..n {
@@ -131,13 +131,8 @@ fn row_distance(row: &mut [f32], inside: &[bool], seed: bool, spacing_mm: f64, l
             next = Some(i);
         }
         let steps = next.map_or(row[i], |seed: usize| row[i].min((seed - i) as f32));
-        row[i] = within((f64::from(steps) * spacing_mm).powi(2) as f32, limit);
+        row[i] = (f64::from(steps) * spacing_mm).powi(2) as f32;
     }
-}
-
-#[inline(always)]
-fn within(squared: f32, limit: f32) -> f32 {
-    if squared <= limit { squared } else { f32::INFINITY }
 }
 
 /// Lower envelope of the parabolas `f(q) + h^2 (p - q)^2` along one line.
@@ -155,7 +150,7 @@ impl Envelope {
         Self { vertex: vec![0; n], height: vec![0.0; n], begin: vec![0.0; n] }
     }
 
-    fn transform(&mut self, line: &mut [f32], spacing_mm: f64, limit: f32) {
+    fn transform(&mut self, line: &mut [f32], spacing_mm: f64) {
         if line.iter().all(|&f| f == 0.0) {
             return;
         }
@@ -188,7 +183,7 @@ impl Envelope {
                 part += 1;
             }
             let step = p as f64 - self.vertex[part] as f64;
-            *out = within((h2 * (step * step + self.height[part])) as f32, limit);
+            *out = (h2 * (step * step + self.height[part])) as f32;
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod distance;
 pub mod gaussian;
 mod grid;
 pub mod morphology;
+mod near_distance;
 pub mod nifti;
 pub(crate) mod pieces;
 pub mod resample;

@@ -3,7 +3,7 @@
 //! The ball is exact (thresholds of the Euclidean distance). Beyond the grid nothing is known: the border is not a
 //! surface, so an erosion does not eat into a structure that the field of view cuts, and a closing never shrinks.
 
-use super::distance::squared_distance_mm2;
+use super::near_distance::squared_distance_within_mm2;
 use super::volume::Mask;
 use crate::geometry::Frame;
 
@@ -21,7 +21,7 @@ pub fn dilations<const N: usize, F: Frame>(mask: &Mask<F>, radii_mm: [f64; N]) -
     let largest_mm = radii_mm.into_iter().fold(0.0, f64::max);
     // Outside this box the mask and the results are empty.
     let around = around.grown(&mask.grid, largest_mm);
-    let squared = squared_distance_mm2(&mask.cropped(&around), true, squared_limit(largest_mm));
+    let squared = squared_distance_within_mm2(&mask.cropped(&around), true, squared_limit(largest_mm));
     radii_mm.map(|radius_mm| {
         let limit = squared_limit(radius_mm);
         squared.map(|d2| d2 <= limit).within(&mask.grid, false)
@@ -37,7 +37,7 @@ pub fn erode<F: Frame>(mask: &Mask<F>, radius_mm: f64) -> Mask<F> {
     let around = around.grown(&mask.grid, 1e-3 * smallest_mm);
     let part = mask.cropped(&around);
     let limit = squared_limit(radius_mm);
-    squared_distance_mm2(&part, false, limit).map(|d2| d2 > limit).within(&mask.grid, false)
+    squared_distance_within_mm2(&part, false, limit).map(|d2| d2 > limit).within(&mask.grid, false)
 }
 
 /// Erosion, then dilation: removes what is thinner than twice the radius.
