@@ -54,23 +54,23 @@ pub fn axis_along<F: Frame>(grid: &Grid<F>, direction: &Vector3<f64>) -> (usize,
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScanFaults {
-    /// Ghost: the share of the signal that appears half the field of view further along the phase direction, front to back.
+    /// Ghost: the share of the signal that appears half the field of view further along the phase direction, front to back (up to 0.5).
     pub ghost_fraction: f64,
-    /// Surface coil: how many times brighter the head is at the coil's side than at the other. 1 is an even coil.
+    /// Surface coil: how many times brighter the head is at the coil's side than at the other. 1 is an even coil (up to 8).
     pub coil_gain: f64,
     /// Where the surface coil lies.
     pub coil_side: HeadSide,
-    /// The share of white matter that is stored at the scan's largest value.
+    /// The share of white matter that is stored at the scan's largest value (up to 0.95).
     pub saturated_fraction: f64,
     /// Another weighting than T1: fluid bright, white matter dark.
     pub t2_like: bool,
-    /// Slices that are missing: zeros, at places that the seed chooses in the middle of the scan.
+    /// Slices that are missing: zeros, at places that the seed chooses in the middle of the scan (up to 20).
     pub missing_slices: usize,
     /// Zeros where face and eyes were.
     pub defaced: bool,
     /// Zeros everywhere outside the brain; the cavity stays in.
     pub stripped: bool,
-    /// How much of the field of view is cut off, in mm. Its edge lies 1 to 3 cm outside of the head.
+    /// How much of the field of view is cut off, in mm. Its edge lies 1 to 3 cm outside of the head (up to 120).
     pub cut_mm: f64,
     /// From which side.
     pub cut_side: HeadSide,

@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 pub struct Pathology {
     /// Scans with oedema: darker white matter around what is going to be resected, or around the cavity.
     pub oedema: Scans,
-    /// How far the oedema reaches, in mm.
+    /// How far the oedema reaches, in mm (1 to 40).
     pub oedema_mm: f64,
-    /// How much darker its white matter is at the resection, as a share of its intensity.
+    /// How much darker its white matter is at the resection, as a share of its intensity (up to 0.7).
     pub oedema_fraction: f64,
     /// Volume of an old lesion, in cubic centimetres: a stroke's cavity, full of fluid, in both scans, away from the resection. 0 is
-    /// none.
+    /// none; otherwise 1 to 80.
     pub old_lesion_cc: f64,
-    /// How many times as large the ventricles are as the head's own.
+    /// How many times as large the ventricles are as the head's own (1 to 4).
     pub ventricle_factor: f64,
 }
 
