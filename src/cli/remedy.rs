@@ -78,6 +78,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             "`hgm prep` takes a pose (--pose), a label map (--dseg) and masks of your own"
         }
         WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
+        WorkflowError::Synth(SynthError::NoRoomForLesion { .. }) => "see --old-lesion-cc, --resection-cc and --lobe",
         WorkflowError::Labels(_) => "see --labels",
         // A scan alone may have been given.
         WorkflowError::Pair(PairError::Head { .. }) => {

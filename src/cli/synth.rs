@@ -2,7 +2,7 @@
 
 use super::flags::word;
 use super::{Failure, Session};
-use crate::experiment::synth::{Contrast, Lobe, SagKind};
+use crate::experiment::synth::{Lobe, SagKind, Scans};
 use crate::segment::atlas::Side;
 use crate::workflow::{Layer, SyntheticFiles, results_in_words, synthetic_patient};
 use std::path::PathBuf;
@@ -56,8 +56,23 @@ pub struct Args {
     #[arg(long)]
     pub air: bool,
     /// Scans taken after gadolinium [default: none]
-    #[arg(long, value_parser = word::<Contrast>, value_name = "none|pre|post|both")]
-    pub contrast: Option<Contrast>,
+    #[arg(long, value_parser = word::<Scans>, value_name = "none|pre|post|both")]
+    pub contrast: Option<Scans>,
+    /// Scans with zeros where the face was [default: none]
+    #[arg(long, value_parser = word::<Scans>, value_name = "none|pre|post|both")]
+    pub deface: Option<Scans>,
+    /// Scans with zeros outside the brain [default: none]
+    #[arg(long, value_parser = word::<Scans>, value_name = "none|pre|post|both")]
+    pub strip: Option<Scans>,
+    /// Scans with oedema around the resection [default: none]
+    #[arg(long, value_parser = word::<Scans>, value_name = "none|pre|post|both")]
+    pub oedema: Option<Scans>,
+    /// Volume of an old lesion elsewhere, in both scans [default: 0]
+    #[arg(long, value_name = "CC")]
+    pub old_lesion_cc: Option<f64>,
+    /// How many times as large the ventricles are [default: 1]
+    #[arg(long, value_name = "FACTOR")]
+    pub ventricles: Option<f64>,
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -70,6 +85,13 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.switch("synth.blood", args.blood);
     flags.switch("synth.air", args.air);
     flags.set("synth.contrast", args.contrast);
+    for (name, scans) in [("defaced", args.deface), ("stripped", args.strip)] {
+        flags.set(&format!("synth.pre.{name}"), scans.map(Scans::in_pre));
+        flags.set(&format!("synth.post.{name}"), scans.map(Scans::in_post));
+    }
+    flags.set("synth.pathology.oedema", args.oedema);
+    flags.set("synth.pathology.old_lesion_cc", args.old_lesion_cc);
+    flags.set("synth.pathology.ventricle_factor", args.ventricles);
     flags.set("synth.spacing_mm", args.spacing_mm);
     let below = session.settings(Layer::default())?.synth;
     let slices = args.spacing_mm.map(|spacing| below.slices_of_voxels_mm(spacing));

@@ -41,6 +41,7 @@ mod settings;
 mod simulate;
 mod slicer_files;
 mod stale;
+mod synthetic;
 mod tasks;
 mod template_fit;
 mod transform_files;

@@ -194,7 +194,7 @@ fn mixed(intensity: f64, other: f64, depth_mm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::synth::{Contrast, SynthSettings, SyntheticPatient, synthesize};
+    use crate::experiment::synth::{Scans, SynthSettings, SyntheticPatient, synthesize};
     use crate::geometry::{Post, Pre, RigidTransform};
     use crate::register::{RigidMasks, RigidSettings, register_rigid};
     use crate::resect::{GivenMasks, PairSettings, take_pair_apart};
@@ -213,7 +213,7 @@ mod tests {
     }
 
     /// Error of the rigid fit in mm, and Dice of brain, ventricles and cavity.
-    fn figures(contrast: Contrast) -> (f64, [f64; 3]) {
+    fn figures(contrast: Scans) -> (f64, [f64; 3]) {
         let patient = synthesize(&SynthSettings { seed: 31, contrast, ..SynthSettings::default() }).unwrap();
         let (pre, post) = (patient.pre.map(f32::from), patient.post.map(f32::from));
         let settings = RigidSettings::default();
@@ -234,8 +234,8 @@ mod tests {
 
     #[test]
     fn slow_contrast_in_either_scan_or_both_costs_neither_pose_nor_masks() {
-        let (_, native) = figures(Contrast::None);
-        for contrast in [Contrast::Pre, Contrast::Post, Contrast::Both] {
+        let (_, native) = figures(Scans::None);
+        for contrast in [Scans::Pre, Scans::Post, Scans::Both] {
             let (error_mm, dice) = figures(contrast);
             assert!(error_mm <= 0.1, "{contrast:?}: {error_mm} mm");
             for (what, (with, without)) in ["brain", "ventricles", "cavity"].iter().zip(dice.iter().zip(&native)) {
@@ -256,7 +256,7 @@ mod tests {
             };
             synthesize(&settings).unwrap()
         };
-        let (native, pre) = (at(Contrast::None), at(Contrast::Pre));
+        let (native, pre) = (at(Scans::None), at(Scans::Pre));
         assert!(pre.post == native.post, "only the scan that was asked for");
         let near = crate::image::morphology::dilate(&native.resected_pre, 4.0);
         let (mut tissue, mut changed, mut brighter) = (0.0, 0.0, 0.0);

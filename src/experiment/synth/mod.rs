@@ -4,34 +4,48 @@
 //! brain sags. What is known exactly goes out beside the scans: the rigid transform, the masks, the displacement.
 
 mod enhancement;
+mod fault;
 mod field;
 mod files;
 mod frame;
+mod ghost;
 mod head;
 mod landmarks;
+#[cfg(test)]
+mod laws;
 mod lobe;
+mod old_lesion;
+mod pathology;
 mod resection;
 mod sag;
 mod sag_fem;
 mod scan;
 mod scanned_head;
+mod scans;
 mod settings;
+mod ventricles;
 
+pub use fault::{HeadSide, ScanFaults};
 pub use frame::Patient;
 pub use head::Head;
 pub use lobe::Lobe;
-pub use settings::{Contrast, SagKind, SynthError, SynthSettings};
+pub use pathology::Pathology;
+pub use scans::Scans;
+pub use settings::{SagKind, SynthError, SynthSettings};
 
 use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
-use crate::image::{Grid, LabelMap, Mask, Volume};
+
+use crate::image::{Grid, LabelMap, Mask, Volume, VoxelBox};
 use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
 use enhancement::Enhancement;
+use fault::Seen;
 use field::{Field, in_template};
 use frame::centre;
 use head::FLUID;
 use nalgebra::{Point3, Vector3};
+use pathology::Oedema;
 use rayon::prelude::*;
 use resection::Resection;
 use scan::{Bias, Storage};
@@ -60,6 +74,10 @@ pub struct SyntheticPatient {
     pub resected_pre: Mask<Pre>,
     /// Where it was, after the sag.
     pub cavity_post: Mask<Post>,
+    /// The old lesion before the operation, where there is one.
+    pub old_lesion_pre: Option<Mask<Pre>>,
+    /// The old lesion after the operation.
+    pub old_lesion_post: Option<Mask<Post>>,
     /// Displacement of the brain in mm along the axes of the pre-operative scan, without the pose; 0 outside.
     pub displacement_pre: Volume<[f32; 3], Pre>,
     /// The same in numbers.
@@ -87,6 +105,8 @@ pub struct Truth {
     pub resected_cc: f64,
     /// Volume of the cavity after the operation.
     pub cavity_cc: f64,
+    /// Volume of the old lesion before the operation; 0 without one.
+    pub old_lesion_cc: f64,
     /// Volume of the ventricles before the operation.
     pub ventricles_pre_cc: f64,
     /// Volume of the ventricles after the operation.
@@ -102,10 +122,12 @@ struct Anatomy {
     head: Head,
     warp: Field,
     resection: Resection,
+    old_lesion: Option<Resection>,
+    oedema: Option<Oedema>,
     sag: Option<Field>,
     content: Content,
     enhancement: Option<Enhancement>,
-    contrast: Contrast,
+    contrast: Scans,
 }
 
 /// What fills the cavity, by height against gravity in mm.
@@ -118,19 +140,41 @@ struct Content {
 
 impl Anatomy {
     fn label(&self, p: Point3<f64>) -> u8 {
-        self.head.labels.nearest(in_template(&self.warp, p)).unwrap_or(label::BACKGROUND)
+        let own = self.head.labels.nearest(in_template(&self.warp, p)).unwrap_or(label::BACKGROUND);
+        if own != label::BACKGROUND && own != label::VENTRICLE && self.in_old_lesion(p) { label::CSF } else { own }
     }
 
-    fn intensity(&self, p: Point3<f64>) -> f64 {
+    fn in_old_lesion(&self, p: Point3<f64>) -> bool {
+        self.old_lesion.as_ref().is_some_and(|lesion| lesion.distance_mm(p) < 0.0)
+    }
+
+    /// What the head shows, without an operation and what else is the matter.
+    fn healthy(&self, p: Point3<f64>) -> f64 {
         self.head.t1.trilinear(in_template(&self.warp, p)).map_or(0.0, f64::from)
     }
 
+    /// The intensity of tissue, `wall_mm` from the resection's wall, with old lesion and, in a scan that shows it, oedema.
+    fn intensity(&self, p: Point3<f64>, wall_mm: f64, shows: fn(Scans) -> bool) -> f64 {
+        let healthy = self.healthy(p);
+        let tissue = match &self.oedema {
+            Some(oedema) if shows(oedema.scans) && self.label(p) == label::WHITE_MATTER => {
+                oedema.of_white_matter(healthy, p, wall_mm)
+            }
+            _ => healthy,
+        };
+        match self.old_lesion.as_ref().map_or(0.0, |lesion| (0.5 - lesion.distance_mm(p)).clamp(0.0, 1.0)) {
+            0.0 => tissue,
+            part => part * f64::from(FLUID) + (1.0 - part) * tissue,
+        }
+    }
+
     fn intensity_before(&self, p: Point3<f64>) -> f64 {
-        let native = self.intensity(p);
+        let wall_mm = self.resection.distance_mm(p);
+        let native = self.intensity(p, wall_mm, Scans::in_pre);
         let Some(enhancement) = self.enhancement.as_ref().filter(|_| self.contrast.in_pre()) else { return native };
         let q = in_template(&self.warp, p);
         let tissue = match self.label(p) {
-            label::GREY_MATTER | label::WHITE_MATTER => enhancement.rim(native, p, self.resection.distance_mm(p)),
+            label::GREY_MATTER | label::WHITE_MATTER => enhancement.rim(native, p, wall_mm),
             _ => native,
         };
         enhancement.at_skull(enhancement.in_brain(tissue, q), q)
@@ -140,6 +184,13 @@ impl Anatomy {
         self.head.skull_mm.trilinear(in_template(&self.warp, p)).is_some_and(|d| d < 0.0)
     }
 
+    /// Whether defacing takes what is here; the skull does not sag.
+    fn is_face(&self, x: Point3<f64>) -> bool {
+        let q = in_template(&self.warp, x);
+        let skull_mm = self.head.skull_mm.trilinear(q).map_or(100.0, f64::from);
+        fault::is_face(self.head.in_template(q).mm.into(), skull_mm)
+    }
+
     /// Where the point of the operated patient was before.
     fn before(&self, x: Point3<f64>) -> Point3<f64> {
         self.sag.as_ref().map_or(x, |sag| sag.origin_of(x))
@@ -147,7 +198,7 @@ impl Anatomy {
 
     fn intensity_after(&self, x: Point3<f64>) -> f64 {
         let enhancement = self.enhancement.as_ref().filter(|_| self.contrast.in_post());
-        let native = if self.in_skull(x) { self.inside_skull_after(x, enhancement) } else { self.intensity(x) };
+        let native = if self.in_skull(x) { self.inside_skull_after(x, enhancement) } else { self.healthy(x) };
         enhancement.map_or(native, |e| e.at_skull(native, in_template(&self.warp, x)))
     }
 
@@ -157,7 +208,7 @@ impl Anatomy {
         let cavity = (0.5 - wall_mm).clamp(0.0, 1.0);
         // Where brain has left the skull's wall, fluid takes its place.
         let tissue = |()| {
-            let native = if self.in_skull(p) { self.intensity(p) } else { f64::from(FLUID) };
+            let native = if self.in_skull(p) { self.intensity(p, wall_mm, Scans::in_post) } else { f64::from(FLUID) };
             let Some(enhancement) = enhancement else { return native };
             let tissue = match self.label(p) {
                 label::GREY_MATTER | label::WHITE_MATTER => enhancement.bed(native, p, wall_mm),
@@ -224,8 +275,11 @@ pub fn synthesize_on(
 
     let bias = |rng| Bias::new(rng, settings.bias_fraction);
     let noise = |n| (stream(n), settings.noise_fraction);
-    let pre = scan::scan(pre_grid, &patient_from_pre, |p| anatomy.intensity_before(p), &bias(pre_rng), noise(403));
-    let post = scan::scan(post_grid, &patient_from_post, |x| anatomy.intensity_after(x), &bias(post_rng), noise(404));
+    let before = |p| settings.pre.weighted(anatomy.intensity_before(p));
+    let after = |x| settings.post.weighted(anatomy.intensity_after(x));
+    let pre = settings.pre.on_signal(scan::signal(pre_grid, &patient_from_pre, before, &bias(pre_rng)));
+    let post = settings.post.on_signal(scan::signal(post_grid, &patient_from_post, after, &bias(post_rng)));
+    let (mut pre, mut post) = (scan::stored(&pre, noise(403)), scan::stored(&post, noise(404)));
 
     // Label and displacement of what was at a voxel before the operation.
     let at_pre = |n: usize| patient_from_pre.apply(Position::from_point(centre(&pre_grid, n))).mm;
@@ -241,8 +295,9 @@ pub fn synthesize_on(
     });
     // What is at a voxel after it: 255 for the cavity.
     const CAVITY: u8 = 255;
+    let at_post = |n: usize| patient_from_post.apply(Position::from_point(centre(&post_grid, n))).mm;
     let after: LabelMap<Post> = per_voxel(post_grid, |n| {
-        let x = patient_from_post.apply(Position::from_point(centre(&post_grid, n))).mm;
+        let x = at_post(n);
         if !anatomy.in_skull(x) {
             return label::BACKGROUND;
         }
@@ -256,6 +311,28 @@ pub fn synthesize_on(
     let brain_post = after.map(|l| l > 0 && l != CAVITY);
     let ventricles_post = after.map(|l| l == label::VENTRICLE);
     let cavity_post = after.map(|l| l == CAVITY);
+    let lesion = anatomy.old_lesion.is_some();
+    let old_lesion_pre = lesion.then(|| {
+        Mask::from_fn(pre_grid, |n| {
+            tissue_pre.data[n] == label::CSF && !resected_pre.data[n] && anatomy.in_old_lesion(at_pre(n))
+        })
+    });
+    let old_lesion_post = lesion.then(|| {
+        Mask::from_fn(post_grid, |n| after.data[n] == label::CSF && anatomy.in_old_lesion(anatomy.before(at_post(n))))
+    });
+    let face = |defaced: bool, inside: bool, x: Point3<f64>| defaced && !inside && anatomy.is_face(x);
+    let seen_pre = Seen {
+        brain: brain_pre.clone(),
+        white: tissue_pre.map(|l| l == label::WHITE_MATTER),
+        face: Mask::from_fn(pre_grid, |n| face(settings.pre.defaced, brain_pre.data[n], at_pre(n))),
+    };
+    let seen_post = Seen {
+        brain: after.map(|l| l > 0),
+        white: after.map(|l| l == label::WHITE_MATTER),
+        face: Mask::from_fn(post_grid, |n| face(settings.post.defaced, after.data[n] > 0, at_post(n))),
+    };
+    settings.pre.on_stored(&mut pre, &seen_pre, stream(721));
+    settings.post.on_stored(&mut post, &seen_post, stream(722));
     let lengths = (0..pre_grid.len())
         .filter(|&n| stays(n))
         .map(|n| displacement_pre.data[n].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt());
@@ -274,12 +351,13 @@ pub fn synthesize_on(
         brain_cc: rounded(brain_pre.volume_cc()),
         resected_cc: rounded(resected_pre.volume_cc()),
         cavity_cc: rounded(cavity_post.volume_cc()),
+        old_lesion_cc: rounded(old_lesion_pre.as_ref().map_or(0.0, Mask::volume_cc)),
         ventricles_pre_cc: rounded(ventricles_pre.volume_cc()),
         ventricles_post_cc: rounded(ventricles_post.volume_cc()),
         largest_displacement_mm: rounded(largest),
         mean_displacement_mm: rounded(sum / f64::max(count, 1.0)),
     };
-    Ok(SyntheticPatient {
+    let whole = SyntheticPatient {
         pre,
         post,
         post_from_pre,
@@ -290,9 +368,42 @@ pub fn synthesize_on(
         ventricles_post,
         resected_pre,
         cavity_post,
+        old_lesion_pre,
+        old_lesion_post,
         displacement_pre,
         truth,
-    })
+    };
+    Ok(whole.within_field_of_view())
+}
+
+impl SyntheticPatient {
+    /// What the scans' fields of view hold; the truth's numbers stay those of the whole patient.
+    fn within_field_of_view(self) -> Self {
+        let (pre, post) = (&self.truth.settings.pre, &self.truth.settings.post);
+        let (pre, post) = (pre.field_of_view(&self.pre.grid), post.field_of_view(&self.post.grid));
+        fn cut<T: Copy, F: Frame>(whole: Volume<T, F>, to: Option<&VoxelBox>) -> Volume<T, F> {
+            match to {
+                Some(to) => whole.cropped(to),
+                None => whole,
+            }
+        }
+        let (pre, post) = (pre.as_ref(), post.as_ref());
+        Self {
+            pre: cut(self.pre, pre),
+            brain_pre: cut(self.brain_pre, pre),
+            tissue_pre: cut(self.tissue_pre, pre),
+            ventricles_pre: cut(self.ventricles_pre, pre),
+            resected_pre: cut(self.resected_pre, pre),
+            old_lesion_pre: self.old_lesion_pre.map(|mask| cut(mask, pre)),
+            displacement_pre: cut(self.displacement_pre, pre),
+            post: cut(self.post, post),
+            brain_post: cut(self.brain_post, post),
+            ventricles_post: cut(self.ventricles_post, post),
+            cavity_post: cut(self.cavity_post, post),
+            old_lesion_post: self.old_lesion_post.map(|mask| cut(mask, post)),
+            ..self
+        }
+    }
 }
 
 /// Nine decimals: more than any use needs, fewer than machines differ in.
@@ -308,8 +419,12 @@ fn per_voxel<T: Copy + Send, F: Frame>(grid: Grid<F>, value: impl Fn(usize) -> T
 fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> Result<Anatomy, SynthError> {
     let wide = Grid::<Patient>::axis_aligned([64, 72, 68], [4.0; 3], [-126.0, -160.0, -140.0]);
     let warp = field::random_anatomy(wide, settings.seed, settings.anatomy_mm);
+    let warp = match settings.pathology.ventricle_factor {
+        1.0 => warp,
+        factor => ventricles::widened(&warp, &head, factor),
+    };
     let brain_grid = Grid::<Patient>::axis_aligned([186, 234, 192], [1.0; 3], [-92.5, -134.5, -88.5]);
-    let labels: LabelMap<Patient> = per_voxel(brain_grid, |n| {
+    let mut labels: LabelMap<Patient> = per_voxel(brain_grid, |n| {
         head.labels.nearest(in_template(&warp, centre(&brain_grid, n))).unwrap_or(label::BACKGROUND)
     });
     let in_head = |p: Point3<f64>| in_template(&warp, p);
@@ -317,6 +432,17 @@ fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> R
         Some(mask) => resection::resect_mask(&labels, in_head, mask)?,
         None => resection::resect(&labels, |p| head.in_template(in_head(p)), settings)?,
     };
+    let old_lesion = match settings.pathology.old_lesion_cc {
+        0.0 => None,
+        _ => Some(old_lesion::old_lesion(&labels, |p| head.in_template(in_head(p)), &resection, settings)?),
+    };
+    if let Some(lesion) = &old_lesion {
+        for (label, &wall_mm) in labels.data.iter_mut().zip(&lesion.wall_mm.data) {
+            if wall_mm < 0.0 && *label != label::BACKGROUND && *label != label::VENTRICLE {
+                *label = label::CSF;
+            }
+        }
+    }
     let sag = match settings.sag {
         SagKind::None => None,
         SagKind::Smooth => Some(sag::smooth(&head, &warp, &resection, settings)),
@@ -325,8 +451,9 @@ fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> R
         }
     };
     let content = content(&resection, sag.as_ref(), settings);
-    let enhancement = (settings.contrast != Contrast::None).then(|| Enhancement::new(&head, settings.seed));
-    Ok(Anatomy { head, warp, resection, sag, content, enhancement, contrast: settings.contrast })
+    let enhancement = (settings.contrast != Scans::None).then(|| Enhancement::new(&head, settings.seed));
+    let oedema = settings.pathology.oedema(settings.seed);
+    Ok(Anatomy { head, warp, resection, old_lesion, oedema, sag, content, enhancement, contrast: settings.contrast })
 }
 
 /// Levels of air and blood: a fifth of the cavity each.

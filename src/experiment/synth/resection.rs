@@ -104,7 +104,8 @@ pub fn resect_mask(
     Ok(walled(labels, &taken))
 }
 
-fn walled(labels: &LabelMap<Patient>, smooth: &Mask<Patient>) -> Resection {
+/// The region with a smooth wall; never the ventricle.
+pub(super) fn walled(labels: &LabelMap<Patient>, smooth: &Mask<Patient>) -> Resection {
     let grid = labels.grid;
     let ventricle = labels.map(|l| l == label::VENTRICLE);
     let head = labels.map(|l| l != label::BACKGROUND);

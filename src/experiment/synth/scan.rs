@@ -90,16 +90,15 @@ impl Bias {
     }
 }
 
-/// Scans: at every voxel the mean of `value` over the voxel, shaded, with Rician noise, rounded to whole numbers.
+/// The signal without noise: at every voxel the mean of `value` over the voxel, shaded.
 ///
-/// `value` is the head's intensity at a point of the patient. The noise of a voxel depends on its number only.
-pub fn scan<F: Frame>(
+/// `value` is the head's intensity at a point of the patient.
+pub fn signal<F: Frame>(
     grid: Grid<F>,
     patient_from_scan: &RigidTransform<F, Patient>,
     value: impl Fn(Point3<f64>) -> f64 + Sync,
     bias: &Bias,
-    noise: (CounterRng, f64),
-) -> Volume<i16, F> {
+) -> Volume<f64, F> {
     // The head is known to 1 mm: larger voxels average it.
     let samples = grid.spacing_mm().map(|s| (s.round() as usize).max(1));
     let offsets: Vec<Vector3<f64>> = (0..samples.iter().product::<usize>())
@@ -109,7 +108,6 @@ pub fn scan<F: Frame>(
         })
         .collect();
     let middle = grid.position(Point3::from(grid.dims.map(|n| 0.5 * (n as f64 - 1.0)))).mm;
-    let (rng, sigma) = (noise.0, noise.1 * f64::from(head::WHITE));
     let data = (0..grid.len())
         .into_par_iter()
         .map(|n| {
@@ -119,11 +117,18 @@ pub fn scan<F: Frame>(
                 .map(|offset| value(patient_from_scan.apply(grid.position(Point3::from(voxel + offset))).mm))
                 .sum::<f64>()
                 / offsets.len() as f64;
-            let signal = mean * bias.at(grid.position(Point3::from(voxel)).mm - middle);
-            // Magnitude of a complex signal with Gaussian noise in both channels.
-            let [real, imaginary] = rng.normal_pair(n as u64);
-            ((signal + sigma * real).hypot(sigma * imaginary)).round().clamp(0.0, 32767.0) as i16
+            mean * bias.at(grid.position(Point3::from(voxel)).mm - middle)
         })
         .collect();
     Volume::from_data(grid, data)
+}
+
+/// The scan of a signal: with Rician noise, rounded to whole numbers. The noise of a voxel depends on its number only.
+pub fn stored<F: Frame>(signal: &Volume<f64, F>, noise: (CounterRng, f64)) -> Volume<i16, F> {
+    let (rng, sigma) = (noise.0, noise.1 * f64::from(head::WHITE));
+    Volume::from_fn(signal.grid, |n| {
+        // Magnitude of a complex signal with Gaussian noise in both channels.
+        let [real, imaginary] = rng.normal_pair(n as u64);
+        ((signal.data[n] + sigma * real).hypot(sigma * imaginary)).round().clamp(0.0, 32767.0) as i16
+    })
 }

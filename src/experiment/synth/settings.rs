@@ -1,10 +1,14 @@
 //! What a synthetic patient is made of.
 
+use super::fault::ScanFaults;
 use super::lobe::Lobe;
+use super::pathology::Pathology;
+use super::scans::Scans;
 use crate::fem::Support;
 use crate::segment::atlas::Side;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// How the brain's sag after the resection is made.
@@ -17,33 +21,6 @@ pub enum SagKind {
     Smooth,
     /// Finite elements under gravity with the materials of [`SynthSettings`].
     Fem,
-}
-
-/// Which scans were taken after gadolinium.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Contrast {
-    /// Neither.
-    #[default]
-    None,
-    /// The pre-operative one.
-    Pre,
-    /// The post-operative one.
-    Post,
-    /// Both.
-    Both,
-}
-
-impl Contrast {
-    /// Whether the pre-operative scan is enhanced.
-    pub fn in_pre(self) -> bool {
-        matches!(self, Self::Pre | Self::Both)
-    }
-
-    /// Whether the post-operative scan is enhanced.
-    pub fn in_post(self) -> bool {
-        matches!(self, Self::Post | Self::Both)
-    }
 }
 
 /// Everything that decides the bytes of a synthetic patient.
@@ -99,7 +76,13 @@ pub struct SynthSettings {
     /// An air pocket in the cavity's highest part.
     pub air: bool,
     /// Scans with gadolinium: bright vessels, sinuses, dura and plexus, a lesion's rim before and its bed after.
-    pub contrast: Contrast,
+    pub contrast: Scans,
+    /// What else than the operation is the matter.
+    pub pathology: Pathology,
+    /// What is wrong with the pre-operative scan.
+    pub pre: ScanFaults,
+    /// What is wrong with the post-operative scan.
+    pub post: ScanFaults,
 }
 
 impl Default for SynthSettings {
@@ -128,7 +111,10 @@ impl Default for SynthSettings {
             cells: 85_000,
             blood: false,
             air: false,
-            contrast: Contrast::None,
+            contrast: Scans::None,
+            pathology: Pathology::default(),
+            pre: ScanFaults::default(),
+            post: ScanFaults::default(),
         }
     }
 }
@@ -140,11 +126,11 @@ pub enum SynthError {
     #[error(
         "`{name}` is {value}; it must lie between {low} and {high}{}: change its option or the table [synth] of the \
          settings file",
-        if *name == "post_slice_mm" { " (no thinner than the voxels)" } else { "" }
+        if name == "post_slice_mm" { " (no thinner than the voxels)" } else { "" }
     )]
     Setting {
         /// The field of [`SynthSettings`].
-        name: &'static str,
+        name: Cow<'static, str>,
         /// Its value.
         value: f64,
         /// The least allowed.
@@ -168,6 +154,15 @@ pub enum SynthError {
         side: Side,
         /// Which lobe.
         lobe: Lobe,
+    },
+    /// No part of the brain far enough from the resection has the old lesion's size.
+    #[error(
+        "an old lesion of {wanted_cc:.1} cc: no part of this brain away from the resection has that size; ask for a smaller \
+         pathology.old_lesion_cc, or a smaller resection"
+    )]
+    NoRoomForLesion {
+        /// What was asked for.
+        wanted_cc: f64,
     },
     /// What is to be taken out holds no brain.
     #[error("the mask of what is to be taken out holds no brain of this head; draw it on the scan of the head")]
@@ -236,7 +231,13 @@ impl SynthSettings {
             ("cells", self.cells as f64, 5_000.0, 2_000_000.0),
             ("effective_density_kg_per_m3", self.effective_density_kg_per_m3, 0.0, 1100.0),
         ];
-        match ranges.into_iter().find(|&(_, value, low, high)| !(low..=high).contains(&value)) {
+        let of_scan = |scan: &'static str, faults: &ScanFaults| {
+            faults.ranges().map(|(name, value, low, high)| (Cow::Owned(format!("{scan}.{name}")), value, low, high))
+        };
+        let named = |(name, value, low, high)| (Cow::Borrowed(name), value, low, high);
+        let all = ranges.into_iter().chain(self.pathology.ranges()).map(named);
+        let mut all = all.chain(of_scan("pre", &self.pre)).chain(of_scan("post", &self.post));
+        match all.find(|&(_, value, low, high)| !(low..=high).contains(&value)) {
             Some((name, value, low, high)) => Err(SynthError::Setting { name, value, low, high }),
             None => Ok(()),
         }
@@ -246,6 +247,23 @@ impl SynthSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_fault_or_pathology_out_of_range_is_refused_by_its_full_name() {
+        let own = SynthSettings::default;
+        let refused = |settings: SynthSettings| settings.check().unwrap_err().to_string();
+        let ghost = ScanFaults { ghost_fraction: 0.7, ..ScanFaults::default() };
+        let gain = ScanFaults { coil_gain: f64::NAN, ..ScanFaults::default() };
+        let lesion = Pathology { old_lesion_cc: 0.2, ..Pathology::default() };
+        for (settings, name) in [
+            (SynthSettings { pre: ghost, ..own() }, "`pre.ghost_fraction` is 0.7"),
+            (SynthSettings { post: gain, ..own() }, "`post.coil_gain` is NaN"),
+            (SynthSettings { pathology: lesion, ..own() }, "`pathology.old_lesion_cc` is 0.2"),
+        ] {
+            let said = refused(settings);
+            assert!(said.starts_with(name) && said.contains("[synth]"), "{said}");
+        }
+    }
 
     #[test]
     fn slices_of_other_voxels_are_never_thinner_than_they_and_thick_ones_stay() {
