@@ -100,6 +100,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
+            every_fluid: None,
             stuck: None,
             shift: None,
             noise_mm: self.work.settings.estimate.phantom_noise_mm,
