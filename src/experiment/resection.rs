@@ -176,9 +176,7 @@ impl ResectionSettings {
     pub fn in_fluid(&self) -> Self {
         match self.csf {
             Some(_) => self.clone(),
-            None => {
-                Self { csf: Some(CsfSettings::default()), density_kg_per_m3: TISSUE_KG_PER_M3, ..self.clone() }
-            }
+            None => Self { csf: Some(CsfSettings::default()), density_kg_per_m3: TISSUE_KG_PER_M3, ..self.clone() },
         }
     }
 

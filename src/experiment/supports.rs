@@ -49,8 +49,10 @@ pub enum SupportsError {
     )]
     NoSkull,
     /// No fluid to drain.
-    #[error("the labels show no cerebrospinal fluid whose level could fall: take the table [resection.csf] away, and \
-         `fluid` of [estimate]")]
+    #[error(
+        "the labels show no cerebrospinal fluid whose level could fall: take the table [resection.csf] away, and \
+         `fluid` of [estimate]"
+    )]
     NoFluid,
     /// A set that cannot be cut along.
     #[error(transparent)]

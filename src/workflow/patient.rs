@@ -16,9 +16,9 @@ use super::stages::{
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
 use crate::experiment::compare::Comparison;
+use crate::experiment::estimate::FluidLevels;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
-use crate::experiment::estimate::FluidLevels;
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
 use crate::experiment::supports::{SupportsError, levels_when_drained};
@@ -379,7 +379,9 @@ impl<'w, 'a> Patient<'w, 'a> {
         let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
         let (held, supports) = (self.scenario.fixed.join(" and "), settings.supports_in_words());
         let on = |kg_per_m3: f64| {
-            format!("gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}")
+            format!(
+                "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}"
+            )
         };
         let in_fluid = || {
             let in_fluid = ResectionSettings { csf: None, ..settings.in_fluid() };

@@ -108,7 +108,8 @@ fn suits_fluid(settings: &Settings) -> Result<(), String> {
         return Ok(());
     }
     if settings.prior.population.is_some() {
-        let why = "a population's moduli are in proportion to one effective density; leave `fluid` or the population out";
+        let why =
+            "a population's moduli are in proportion to one effective density; leave `fluid` or the population out";
         return Err(format!("`fluid` asks for a level that nobody knows, and {why}"));
     }
     if estimate.observed == Observed::Surfaces {

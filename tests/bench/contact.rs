@@ -179,7 +179,8 @@ fn sphere(bars: &mut Vec<Bar>) {
             found.edge_mm
         );
         let finest = cells == REFINEMENTS[REFINEMENTS.len() - 1];
-        let asked = format!("nearer than before{}, radius within an element", if finest { " and within 2 %" } else { "" });
+        let asked =
+            format!("nearer than before{}, radius within an element", if finest { " and within 2 %" } else { "" });
         let met = off.abs() < last && radius_off < found.edge_mm && (!finest || off.abs() < 0.02);
         bars.push(Bar::new(&format!("contact Hertz, {cells} elements over the radius"), &asked, text, met));
         last = off.abs();

@@ -105,7 +105,11 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let posed = Posed {
         prior: &prior,
         tissues: &tissues,
-        assumed: (only_weight && load_known).then_some(if in_fluid { Reason::LevelAssumed } else { Reason::LoadAssumed }),
+        assumed: (only_weight && load_known).then_some(if in_fluid {
+            Reason::LevelAssumed
+        } else {
+            Reason::LoadAssumed
+        }),
         body_known: problem.body_known,
     };
     let verdict = verdict_of_fit(&fitted, settings, &posterior, &posed);

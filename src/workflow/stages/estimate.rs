@@ -4,8 +4,8 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, MovedNode, Observation, Problem,
-    FluidLevels, SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, FluidLevels, Instrument, LogPrior, MovedNode, Observation,
+    Problem, SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
