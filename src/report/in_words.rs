@@ -136,6 +136,9 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
     if let Some(fluid) = &estimate.fluid {
         text += &format!("fluid: {}\n", fluid.sentence());
     }
+    if let Some(ventricles) = &estimate.ventricles {
+        text += &format!("check: {}\n", ventricles.sentence());
+    }
     text += &format!(
         "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {}\n",
         condition_in_words(posterior.identifiability.condition)

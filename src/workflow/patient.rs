@@ -319,6 +319,12 @@ impl<'w, 'a> Patient<'w, 'a> {
         Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, levels })
     }
 
+    /// The ventricles' volume on the scans, before and after, where both were segmented.
+    fn ventricles_cc(&self) -> Option<[f64; 2]> {
+        let volumes = &self.prepared.anat.volumes;
+        Some([volumes.ventricle_before_cc?, volumes.ventricle_after_cc?])
+    }
+
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
         let settings = self.work.settings;
         EstimateInput {
@@ -330,6 +336,7 @@ impl<'w, 'a> Patient<'w, 'a> {
             coarser: None,
             held: None,
             every_fluid: None,
+            ventricles_cc: self.ventricles_cc(),
             stuck: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),

@@ -101,6 +101,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
             coarser: None,
             held: None,
             every_fluid: None,
+            ventricles_cc: None,
             stuck: None,
             shift: None,
             noise_mm: self.work.settings.estimate.phantom_noise_mm,

@@ -125,6 +125,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let outcome = EstimateOutcome {
         taught_by: None,
         fluid,
+        ventricles: None,
         limits: verdict.because(),
         verdict,
         observations: fitted.observations,

@@ -52,6 +52,9 @@ pub fn section(
         @if let Some(fluid) = &estimate.fluid {
             p { "Fluid: " (fluid.sentence()) ". Tissue above its level has its own weight, tissue below it is buoyant." }
         }
+        @if let Some(ventricles) = &estimate.ventricles {
+            p { "A check on load and pressure: " (ventricles.sentence()) "." }
+        }
         (figures(estimate, truth))
         @if let Some(models) = models { (table_of_models(models)) }
         p {

@@ -279,6 +279,7 @@ mod tests {
             },
             taught_by: None,
             fluid: None,
+            ventricles: None,
             model_log_sd: 0.0,
             mesh_log_sd: Vec::new(),
             body_log_sd: 0.0,

@@ -13,6 +13,7 @@ use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::stuck_cortex::{with_stuck_cortex, with_stuck_set};
 use crate::experiment::sweep::Reference;
+use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
@@ -174,6 +175,8 @@ pub(crate) struct EstimateInput<'a> {
     pub noise_mm: f64,
     /// Expected error of the rigid registration, mm.
     pub rigid_error_mm: f64,
+    /// The ventricles' volume on the scans, before and after, cm3.
+    pub ventricles_cc: Option<[f64; 2]>,
 }
 
 /// The settings of what holds a patient: supports that are tried stand in no scenario.
@@ -448,6 +451,19 @@ impl Bodies {
     }
 }
 
+/// With the ventricles' change beside what the scans show of it; a change that contradicts them is among what limits the figures.
+fn with_ventricles(body: &HeldBody, input: &EstimateInput<'_>, mut found: Estimate) -> Estimate {
+    let Some(seen_cc) = input.ventricles_cc.filter(|_| found.outcome.verdict.finding.has_stiffness()) else {
+        return found;
+    };
+    let log_sd = found.outcome.posterior.log_sd.iter().zip(&found.outcome.posterior.names);
+    let log_sd = log_sd.filter(|(_, name)| name.starts_with("shear_modulus_pa")).map(|(sd, _)| *sd).fold(0.0, f64::max);
+    let change = VentricleChange::of(&body.mesh, &found.state.displacement_mm, seen_cc, log_sd);
+    found.outcome.limits.extend(change.filter(|change| !change.agrees()).map(|change| change.sentence()));
+    found.outcome.ventricles = change;
+    found
+}
+
 fn produced(
     body: &HeldBody,
     input: &EstimateInput<'_>,
@@ -456,6 +472,7 @@ fn produced(
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
     let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
+    let found = with_ventricles(body, input, found);
     let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, seen, materials, numbers: _ } = found;
     let errors = body.reference.errors(mesh, &state.displacement_mm);
     let tissue = |t: &Tissue| {
