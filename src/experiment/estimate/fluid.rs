@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn sensitivities_to_the_part_drained_are_the_slopes_of_solutions() {
-        let mesh = block(4);
+        let mesh = block(5);
         let (scenario, unknowns) = (scenario(IN_FLUID), [moduli(), vec![drained()]].concat());
         for number in [-2.0, -0.847, 0.6] {
             let at = |by: f64| [1370f64.ln(), 990f64.ln(), number + by];
