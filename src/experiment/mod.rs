@@ -25,5 +25,6 @@ pub mod stuck_cortex;
 pub mod supports;
 pub mod sweep;
 pub mod synth;
+pub mod ventricles;
 pub mod verdict;
 pub mod verdict_of_samples;

@@ -37,6 +37,9 @@ pub struct CsfSettings {
     pub drained: f64,
 }
 
+/// Density of brain tissue itself (33 more than that of the fluid that it displaces).
+pub const TISSUE_KG_PER_M3: f64 = 1040.0;
+
 impl Default for CsfSettings {
     fn default() -> Self {
         Self { density_kg_per_m3: 1007.0, drained: 0.3 }
@@ -166,6 +169,15 @@ impl ResectionSettings {
     pub fn is_loaded(&self) -> bool {
         let weight = self.gravity_m_per_s2 != [0.0; 3] && self.density_kg_per_m3 > 0.0;
         weight || self.pressure.iter().any(|load| load.pressure_pa != 0.0)
+    }
+
+    /// The same brain in fluid: as these settings have it, or as most are.
+    #[must_use]
+    pub fn in_fluid(&self) -> Self {
+        match self.csf {
+            Some(_) => self.clone(),
+            None => Self { csf: Some(CsfSettings::default()), density_kg_per_m3: TISSUE_KG_PER_M3, ..self.clone() },
+        }
     }
 
     /// Refuses what no simulation can be posed with.

@@ -126,6 +126,20 @@ pub fn smooth_distance<F: Frame>(inside: &Mask<F>) -> Option<SmoothField> {
 /// The level (mm against gravity, from the origin) to which fluid of `labels` is left when this part of it has drained: what
 /// lies highest goes first.
 pub fn level_when_drained<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3], drained: f64) -> Option<f64> {
+    heights_of_fluid(labels, gravity).map(|heights| level_of(&heights, drained))
+}
+
+/// Steps of the table of levels.
+const LEVELS: usize = 32;
+
+/// The same when 0, 1/n, 2/n ... 1 of it has drained.
+pub fn levels_when_drained<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3]) -> Option<Vec<f64>> {
+    let heights = heights_of_fluid(labels, gravity)?;
+    Some((0..=LEVELS).map(|n| level_of(&heights, n as f64 / LEVELS as f64)).collect())
+}
+
+/// Heights of the fluid's voxels against gravity, the lowest first, mm; `None` without fluid or gravity.
+fn heights_of_fluid<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3]) -> Option<Vec<f64>> {
     let strength = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     let fluid = |l: u8| l == label::CSF || l == label::VENTRICLE;
     let mut heights: Vec<f64> = (0..labels.data.len())
@@ -139,9 +153,13 @@ pub fn level_when_drained<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3], dra
         return None;
     }
     heights.sort_unstable_by(f64::total_cmp);
+    Some(heights)
+}
+
+fn level_of(heights: &[f64], drained: f64) -> f64 {
     let place = (1.0 - drained.clamp(0.0, 1.0)) * (heights.len() - 1) as f64;
     let (low, part) = (place.floor() as usize, place.fract());
-    Some(heights[low] + part * (heights[(low + 1).min(heights.len() - 1)] - heights[low]))
+    heights[low] + part * (heights[(low + 1).min(heights.len() - 1)] - heights[low])
 }
 
 #[cfg(test)]
@@ -183,6 +201,8 @@ mod tests {
         labels.data.iter_mut().filter(|l| **l != label::BACKGROUND).for_each(|l| *l = label::CSF);
         let level = |drained| level_when_drained(&labels, [0.0, -9.81, 0.0], drained).unwrap();
         assert_eq!([level(0.0), level(1.0)], [20.0, -20.0]);
+        let table = levels_when_drained(&labels, [0.0, -9.81, 0.0]).unwrap();
+        assert_eq!([table[0], table[8], table[32]], [0.0, 0.25, 1.0].map(level));
         // Half of a ball lies above its middle; the part above a height falls smoothly.
         assert!(level(0.5).abs() <= 0.5 && level(0.1) > level(0.2));
         assert_eq!(level_when_drained(&ball(20.0), [0.0, 0.0, -9.81], 0.5), None);

@@ -1,6 +1,6 @@
 //! What holds a patient's brain where nothing sticks: the cut brainstem, the falx, and the skull around it.
 
-pub use super::skull::{SkullFrom, SkullSettings, level_when_drained, smooth_distance};
+pub use super::skull::{SkullFrom, SkullSettings, level_when_drained, levels_when_drained, smooth_distance};
 
 use super::resection::{ResectionSettings, Supports};
 use crate::fem::{Contact, FemError, Scenario, Support, Wall};
@@ -49,7 +49,10 @@ pub enum SupportsError {
     )]
     NoSkull,
     /// No fluid to drain.
-    #[error("the labels show no cerebrospinal fluid whose level could fall: take the table [resection.csf] away")]
+    #[error(
+        "the labels show no cerebrospinal fluid whose level could fall: take the table [resection.csf] away, and \
+         `fluid` of [estimate]"
+    )]
     NoFluid,
     /// A set that cannot be cut along.
     #[error(transparent)]

@@ -173,6 +173,8 @@ pub enum Reason {
     },
     /// Gravity fixes only a quotient.
     LoadAssumed,
+    /// The same where tissue stands in fluid up to a level.
+    LevelAssumed,
     /// The descent was not finished.
     NotConverged,
 }
@@ -249,6 +251,9 @@ impl Reason {
             Self::LoadAssumed => {
                 "gravity alone fixes only modulus / (density x g): the moduli are as good as the effective density assumed"
                     .to_owned()
+            }
+            Self::LevelAssumed => {
+                "gravity alone fixes only modulus / weight: the moduli are as good as the fluid's level assumed".to_owned()
             }
             Self::NotConverged => "the iterations ran out before the minimum was reached".to_owned(),
         }

@@ -3,7 +3,7 @@
 use super::html::INFINITE;
 use super::page::expected_in_a_sentence;
 use crate::experiment::compare::Comparison;
-use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::estimate::{EstimateOutcome, Scale};
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, TargetPlace};
@@ -130,7 +130,14 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
     }
     for (n, name) in posterior.names.iter().enumerate().filter(|_| shown) {
         let [low, high] = posterior.interval_95[n];
-        text += &format!("{name:<32} {:>8.1}   {low:.1} to {high:.1}\n", posterior.mode[n]);
+        let digits = if estimate.prior[n].scale == Scale::Share { 3 } else { 1 };
+        text += &format!("{name:<32} {:>8.digits$}   {low:.digits$} to {high:.digits$}\n", posterior.mode[n]);
+    }
+    if let Some(fluid) = &estimate.fluid {
+        text += &format!("fluid: {}\n", fluid.sentence());
+    }
+    if let Some(ventricles) = &estimate.ventricles {
+        text += &format!("check: {}\n", ventricles.sentence());
     }
     text += &format!(
         "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {}\n",

@@ -16,6 +16,31 @@ pub enum Observed {
     Surfaces,
 }
 
+/// What carries a patient's brain in an estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fluid {
+    /// What `[resection]` says: an effective density, or the part of the fluid that `[resection.csf]` has drained.
+    #[default]
+    AsGiven,
+    /// Fluid of which an unknown part has drained: that part is estimated with the moduli.
+    Unknown,
+    /// Both are tried and weighed by their evidence.
+    Evidence,
+}
+
+impl Fluid {
+    /// Whether an estimate tries a fluid of unknown level.
+    pub fn may_be_unknown(self) -> bool {
+        self != Self::AsGiven
+    }
+
+    /// Whether an estimate tries what is given.
+    pub fn may_be_given(self) -> bool {
+        self != Self::Unknown
+    }
+}
+
 /// How the estimate is posed; the table `[estimate]` of the settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -53,6 +78,13 @@ pub struct EstimateOptions {
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
     pub density_log_sd: f64,
+    /// What carries the brain: `as-given` in `[resection]`, fluid of `unknown` level (tissue of 1040 kg/m3 above it has its whole
+    /// weight and is buoyant below it; `[resection.csf]` says what is thought of the part drained and of the fluid, `[resection]`
+    /// then of the tissue), or `evidence` for both.
+    pub fluid: Fluid,
+    /// Standard deviation of ln(part of the fluid drained) where that is not known: a factor of 1.5 to either side, as before a
+    /// prediction; around `drained` of `[resection.csf]`, or 0.3.
+    pub drained_log_sd: f64,
     /// Also estimate the direction of gravity, around the one given.
     pub gravity_direction: bool,
     /// Standard deviation of either angle, degrees: how differently a head lies on its pillow.
@@ -80,6 +112,8 @@ impl Default for EstimateOptions {
             outline_mm: 0.5,
             density: false,
             density_log_sd: 0.56,
+            fluid: Fluid::default(),
+            drained_log_sd: 0.4,
             gravity_direction: false,
             gravity_direction_sd_deg: 15.0,
             pressure: false,
@@ -100,6 +134,7 @@ impl EstimateOptions {
         let above_zero = [
             ("correlation_mm", self.correlation_mm),
             ("density_log_sd", self.density_log_sd),
+            ("drained_log_sd", self.drained_log_sd),
             ("gravity_direction_sd_deg", self.gravity_direction_sd_deg),
             ("pressure_log_sd", self.pressure_log_sd),
             ("phantom_noise_mm", self.phantom_noise_mm),

@@ -2,6 +2,7 @@
 
 use super::earlier_prediction::earlier_prediction;
 use super::error::{CaseError, WorkflowError};
+use super::estimate_options::Fluid;
 use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
@@ -15,10 +16,12 @@ use super::stages::{
 use super::work::{Made, Work};
 use crate::artefact::{Manifest, Stage};
 use crate::experiment::compare::Comparison;
+use crate::experiment::estimate::FluidLevels;
 use crate::experiment::observed::ObservedSurfaces;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome, NoiseFloor};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Tissue, shard};
+use crate::experiment::supports::{SupportsError, levels_when_drained};
 use crate::experiment::sweep::{Reference, best_sample};
 use crate::fem::Scenario;
 use crate::layout::REST_MESH;
@@ -26,6 +29,7 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::vtu;
 use std::collections::BTreeMap;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// A part of a sweep's samples (see [`shard`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -265,23 +269,43 @@ impl<'w, 'a> Patient<'w, 'a> {
         then: impl FnOnce(&mut Made, &EstimateInput<'_>) -> Result<T, WorkflowError>,
     ) -> Result<T, WorkflowError> {
         let Self { work, prepared, .. } = self;
-        let settings = &work.settings.resection;
         let coarser = || stages::coarser_mesh(work, &prepared.made, &Anatomy::read(&work.case)?);
-        let held = || -> Result<Vec<HeldBody>, WorkflowError> {
-            settings.supports.family().into_iter().map(|supports| self.held(supports)).collect()
+        let held = || {
+            let fluid = work.settings.estimate.fluid;
+            let given = fluid.may_be_given().then_some(false);
+            self.family(&given.into_iter().chain(fluid.may_be_unknown().then_some(true)).collect::<Vec<_>>())
         };
+        let every_fluid = || self.family(&[false, true]);
         let shift = SeenShift::read(&work.case, Anatomy::read(&work.case)?, work.settings)?;
         let tissues = plan::tissues(work.settings, work.subject);
-        let stuck = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed)?.stuck()) };
+        let given = work.settings.estimate.fluid.may_be_given();
+        let stuck = || -> Result<HeldBody, WorkflowError> { Ok(self.held(Supports::Fixed, !given)?.stuck()) };
         let (shift, coarser, held, stuck) = (Some(&shift), Some(&coarser as _), Some(&held as _), Some(&stuck as _));
-        let input = EstimateInput { coarser, held, stuck, shift, ..self.asked(&tissues) };
+        let every_fluid = Some(&every_fluid as _);
+        let input = EstimateInput { coarser, held, every_fluid, stuck, shift, ..self.asked(&tissues) };
         then(&mut prepared.made.clone(), &input)
     }
 
-    /// The body as these supports hold it.
-    fn held(&self, supports: Supports) -> Result<HeldBody, WorkflowError> {
+    /// The bodies that are tried: each way of supporting the brain with what carries it as given, with fluid of unknown level, or
+    /// both. Where both are asked for and the labels show no fluid there is only the first.
+    fn family(&self, unknown_fluid: &[bool]) -> Result<Vec<HeldBody>, WorkflowError> {
+        let mut family = Vec::new();
+        for supports in self.work.settings.resection.supports.family() {
+            for &unknown in unknown_fluid {
+                match self.held(supports, unknown) {
+                    Err(WorkflowError::Supports(SupportsError::NoFluid)) if unknown_fluid.len() > 1 && unknown => {}
+                    body => family.push(body?),
+                }
+            }
+        }
+        Ok(family)
+    }
+
+    /// The body as these supports hold it, in fluid of unknown level or with what `[resection]` says of that.
+    fn held(&self, supports: Supports, unknown_fluid: bool) -> Result<HeldBody, WorkflowError> {
         let work = self.work;
         let settings = ResectionSettings { supports, ..work.settings.resection.clone() };
+        let settings = if unknown_fluid { settings.in_fluid() } else { settings };
         let anatomy = Anatomy::read(&work.case)?;
         let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
         let scenario = settings.supported(&template, &anatomy.labels)?;
@@ -289,7 +313,16 @@ impl<'w, 'a> Patient<'w, 'a> {
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
-        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference })
+        let gravity = scenario.loads.gravity_m_per_s2;
+        let levels = || levels_when_drained(&anatomy.labels, gravity).and_then(FluidLevels::new).map(Arc::new);
+        let levels = unknown_fluid.then(levels).flatten();
+        Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, levels })
+    }
+
+    /// The ventricles' volume on the scans, before and after, where both were segmented.
+    fn ventricles_cc(&self) -> Option<[f64; 2]> {
+        let volumes = &self.prepared.anat.volumes;
+        Some([volumes.ventricle_before_cc?, volumes.ventricle_after_cc?])
     }
 
     fn asked<'s>(&'s self, tissues: &'s [Tissue]) -> EstimateInput<'s> {
@@ -302,6 +335,8 @@ impl<'w, 'a> Patient<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
+            every_fluid: None,
+            ventricles_cc: self.ventricles_cc(),
             stuck: None,
             shift: None,
             noise_mm: self.floor().combined_mm().unwrap_or(settings.estimate.descent.noise_mm),
@@ -349,12 +384,26 @@ impl<'w, 'a> Patient<'w, 'a> {
         let settings = &self.work.settings.resection;
         let rest = self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]);
         let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
-        let loads = format!(
-            "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {} kg/m3, with {} held{}",
-            settings.density_kg_per_m3,
-            self.scenario.fixed.join(" and "),
-            settings.supports_in_words()
-        );
+        let (held, supports) = (self.scenario.fixed.join(" and "), settings.supports_in_words());
+        let on = |kg_per_m3: f64| {
+            format!(
+                "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}"
+            )
+        };
+        let in_fluid = || {
+            let in_fluid = ResectionSettings { csf: None, ..settings.in_fluid() };
+            let supports = in_fluid.supports_in_words();
+            let kg_per_m3 = in_fluid.density_kg_per_m3;
+            format!(
+                "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}, an unknown part of \
+                 the fluid drained"
+            )
+        };
+        let loads = match self.work.settings.estimate.fluid {
+            Fluid::AsGiven => on(settings.density_kg_per_m3),
+            Fluid::Unknown => in_fluid(),
+            Fluid::Evidence => format!("{}; or {}", on(settings.density_kg_per_m3), in_fluid()),
+        };
         ExperimentOutcome {
             reference: "ventricle wall and cavity surface of the post-operative scan (closest points)".to_owned(),
             rest_rmse_mm: rest.rmse_mm,

@@ -100,6 +100,8 @@ impl<'w, 'a> Phantom<'w, 'a> {
             reference: &self.reference,
             coarser: None,
             held: None,
+            every_fluid: None,
+            ventricles_cc: None,
             stuck: None,
             shift: None,
             noise_mm: self.work.settings.estimate.phantom_noise_mm,

@@ -111,7 +111,12 @@ pub fn posed_case(
     let (mut scenario, ratio) = match subject.ok_or_else(none)? {
         Subject::Phantom { .. } => (settings.phantom.scenario(), settings.phantom.poisson_ratio),
         Subject::Patient => {
-            let own = ResectionSettings { supports: Supports::Fixed, ..settings.resection.clone() };
+            let mut own = ResectionSettings { supports: Supports::Fixed, ..settings.resection.clone() };
+            // Moduli that were found in fluid of unknown level belong to the level found with them.
+            if let Some(fluid) = estimate.as_ref().and_then(|facts| facts.estimate.fluid.as_ref()) {
+                own = own.in_fluid();
+                own.csf.iter_mut().for_each(|csf| csf.drained = fluid.drained);
+            }
             let mut scenario = own.scenario(&stages::mni_from_gravity_frame(&case, own.gravity_frame)?);
             if own.needs_labels() {
                 scenario = own.supported(&scenario, &stages::Anatomy::read(&case)?.labels)?;

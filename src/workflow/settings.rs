@@ -1,7 +1,7 @@
 //! Every setting of the program, a table for each room, resolved once: the defaults, over them the case's own, over those
 //! a settings file, over that the command line.
 
-use super::estimate_options::EstimateOptions;
+use super::estimate_options::{EstimateOptions, Observed};
 use crate::experiment::field::FieldSettings;
 use crate::experiment::phantom::PhantomSettings;
 use crate::experiment::predict::PredictSettings;
@@ -101,10 +101,28 @@ fn kept<E: Display>(checked: Result<(), E>) -> Checked {
     checked.map_err(|e| e.to_string())
 }
 
+/// Refuses a fluid of unknown level where other settings take the load as known, or do not look at it.
+fn suits_fluid(settings: &Settings) -> Result<(), String> {
+    let estimate = &settings.estimate;
+    if !estimate.fluid.may_be_unknown() {
+        return Ok(());
+    }
+    if settings.prior.population.is_some() {
+        let why =
+            "a population's moduli are in proportion to one effective density; leave `fluid` or the population out";
+        return Err(format!("`fluid` asks for a level that nobody knows, and {why}"));
+    }
+    if estimate.observed == Observed::Surfaces {
+        let why = "`observed = \"surfaces\"` tries one body only; leave one of them out";
+        return Err(format!("`fluid` asks for a level that nobody knows, and {why}"));
+    }
+    Ok(())
+}
+
 const ROOMS: [Room; 16] = [
     ("anat", read::<PairSettings>, |s| s.anat.check()),
     ("deformable", read::<DeformableSettings>, |s| kept(s.deformable.check())),
-    ("estimate", read::<EstimateOptions>, |s| s.estimate.check()),
+    ("estimate", read::<EstimateOptions>, |s| s.estimate.check().and_then(|()| suits_fluid(s))),
     ("fields", read::<FieldSettings>, |s| kept(s.fields.check())),
     ("gp", read::<FitSettings>, |_| Ok(())),
     ("image", read::<ReadOptions>, |_| Ok(())),

@@ -1,7 +1,11 @@
-//! Bars of walls without friction: cost, depth, robustness and bytes on the brain meshes of `HGM_BENCH_DATA`, in the skull
-//! that the template's labels give.
+//! Bars of walls without friction: what is known of simple bodies (the tests' own cases, their figures written down), and cost,
+//! depth, robustness and bytes on the brain meshes of `HGM_BENCH_DATA`, in the skull that the template's labels give.
 
 use super::bar::{Bar, cpu_seconds, data};
+use super::hertz::{self, CONTACT_MM, REFINEMENTS};
+use super::walls::{
+    ROOMS, energy_kept_in_a_bounce, even_pressure, sensitivities_off, slid_apart_along_a_sheet, slid_down_a_slope,
+};
 use hgm::experiment::resection::{ResectionSettings, Supports};
 use hgm::experiment::supports::{SkullSettings, with_sliding_sets};
 use hgm::fem::{FemError, Outcome, Scenario, simulate};
@@ -148,14 +152,98 @@ fn bytes(small: &TetMesh, settings: &ResectionSettings, field: &Arc<SmoothField>
     bars.push(Bar::new("contact brain5k on 1, 2 and 8 threads", "the same bytes", text, same));
 }
 
-/// Every bar of contact on brain meshes.
+/// An even pressure through a wall that knows nothing of the body's facets.
+fn patch(bars: &mut Vec<Bar>) {
+    for element in ["tet4", "tet4-nodal", "tet10"] {
+        let found = even_pressure(element);
+        let [along, across] = found.force_off_n;
+        let text = format!(
+            "pressure and displacement within {:.1e} of even, force within {along:.1e} N, {across:.1e} N across, depth within {:.1e} mm",
+            found.deviation, found.depth_off_mm
+        );
+        let met = found.deviation < 1e-8 && along < 1e-9 && across < 1e-12 && found.depth_off_mm < 1e-6;
+        bars.push(Bar::new(&format!("contact patch test, {element}"), "even to 1e-8", text, met));
+    }
+}
+
+/// A sphere on a plane, at three refinements.
+fn sphere(bars: &mut Vec<Bar>) {
+    let mut last = f64::INFINITY;
+    for cells in REFINEMENTS {
+        let (found, force) = hertz::pressed(cells);
+        let (off, radius_off) = (found.force_n / force - 1.0, (found.radius_mm - CONTACT_MM).abs());
+        let text = format!(
+            "force {:+.2} % of {force:.3e} N, radius {:.3} mm of {CONTACT_MM} mm (an element is {:.3} mm)",
+            100.0 * off,
+            found.radius_mm,
+            found.edge_mm
+        );
+        let finest = cells == REFINEMENTS[REFINEMENTS.len() - 1];
+        let asked =
+            format!("nearer than before{}, radius within an element", if finest { " and within 2 %" } else { "" });
+        let met = off.abs() < last && radius_off < found.edge_mm && (!finest || off.abs() < 0.02);
+        bars.push(Bar::new(&format!("contact Hertz, {cells} elements over the radius"), &asked, text, met));
+        last = off.abs();
+    }
+}
+
+fn sliding(bars: &mut Vec<Bar>) {
+    let slid = slid_down_a_slope();
+    let text = format!(
+        "{:.1e} of the way along it, {:.1e} mm off it, {:.1e} mm across",
+        slid.along_off.abs(),
+        slid.off_mm.abs(),
+        slid.across_mm.abs()
+    );
+    let met = slid.along_off.abs() < 1e-8 && slid.off_mm.abs() < 0.1 && slid.across_mm.abs() < 1e-9;
+    bars.push(Bar::new("contact block down a slope of 20 degrees", "as if it fell, to 1e-8", text, met));
+    let apart = slid_apart_along_a_sheet();
+    let text = format!(
+        "normal way within {:.1e} mm of the pressure's, way along it within {:.1e} mm, {:.1e} N held back, {} and {} nodes",
+        apart.across_off_mm, apart.along_off_mm, apart.carried_n, apart.sides[0], apart.sides[1]
+    );
+    let met = apart.across_off_mm < 1e-3 && apart.along_off_mm < 1e-6 && apart.carried_n < 1e-8;
+    bars.push(Bar::new("contact two blocks along a falx", "no gap to 1e-3 mm, nothing held back", text, met));
+}
+
+fn bounce(bars: &mut Vec<Bar>) {
+    let kept = [4e-5, 2e-5, 1e-5].map(energy_kept_in_a_bounce);
+    let [coarse, fine, finest] = kept;
+    let limit = 2.0 * finest - fine;
+    let text = format!("{coarse:.5}, {fine:.5}, {finest:.5} by steps of 40, 20, 10 us; {limit:.5} at no step");
+    let met = coarse < fine && fine < finest && finest > 0.99 && (limit - 1.0).abs() < 1e-3;
+    bars.push(Bar::new("contact energy kept in a bounce", "1 to 1e-3 but for the step", text, met));
+}
+
+fn sensitivities(bars: &mut Vec<Bar>) {
+    for ((room, touches), state) in ROOMS.into_iter().zip(["away from the wall", "just within its layer", "pressed"]) {
+        let (off, touched) = sensitivities_off(room);
+        let name = format!("contact sensitivities, {state}");
+        let text = format!("within {off:.1e} of the largest (by stiffness, weight, gap, all loads; room {room} mm)");
+        bars.push(Bar::new(&name, "slopes of solutions to 1e-5", text, off < 1e-5 && touched == touches));
+    }
+}
+
+/// Every bar of contact.
 pub fn bars() -> Vec<Bar> {
+    let mut bars = Vec::new();
+    patch(&mut bars);
+    sphere(&mut bars);
+    sliding(&mut bars);
+    bounce(&mut bars);
+    sensitivities(&mut bars);
+    bars.extend(on_brains());
+    bars
+}
+
+/// Every bar of contact on brain meshes.
+fn on_brains() -> Vec<Bar> {
     let mut settings =
         ResectionSettings { supports: Supports::Sliding, density_kg_per_m3: 1000.0, ..Default::default() };
     settings.skull.gap_mm = 0.8;
     let Some(folder) = data().map(|folder| folder.join("meshes")) else {
         println!(
-            "contact: all bars need HGM_BENCH_DATA with brain5k.vtu, brain30k.vtu and template_labels.nii.gz; skipped"
+            "contact: the bars on brains need HGM_BENCH_DATA with brain5k.vtu, brain30k.vtu and template_labels.nii.gz; skipped"
         );
         return Vec::new();
     };

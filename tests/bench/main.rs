@@ -13,12 +13,17 @@ mod experiment;
 mod fem;
 mod fields;
 mod heads;
+#[path = "../it/fem/hertz.rs"]
+mod hertz;
 mod imaging;
 mod job;
 mod kills;
 mod live;
 mod material;
 mod mesh;
+#[path = "../it/fem/meshes.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod meshes;
 mod pairs;
 mod patients;
 mod predict;
@@ -29,6 +34,8 @@ mod python;
 mod sequences;
 mod stale;
 mod study_level;
+#[path = "../it/fem/walls.rs"]
+mod walls;
 
 use bar::Bar;
 

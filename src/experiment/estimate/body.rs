@@ -1,5 +1,6 @@
 //! The solver as a forward model: log-moduli in, distances to what was observed out.
 
+use super::fluid::FluidLevels;
 use super::levenberg_marquardt::{Forward, Linearisation};
 use super::{LogPrior, Scale};
 use crate::experiment::observed::ObservedSurfaces;
@@ -9,7 +10,11 @@ use crate::material::law::{Material, Parameter, Shape};
 use crate::mesh::TetMesh;
 use nalgebra::{DMatrix, DVector, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
+use std::sync::Arc;
 use thiserror::Error;
+
+/// Name of the part of the fluid that has drained.
+const DRAINED: &str = "part of the fluid that has drained";
 
 /// Something the estimate may change.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +31,8 @@ pub enum Unknown {
     Gap(usize),
     /// Level of the fluid of `loads.csf`, mm; the number is the level itself.
     CsfLevel,
+    /// Part of the fluid of `loads.csf` that has drained, by these levels: the logarithm of its odds.
+    Drained(Arc<FluidLevels>),
     /// Turn of gravity (an angle, not a logarithm) about one of the two axes across the direction given.
     GravityTurn(Turn),
 }
@@ -54,6 +61,7 @@ impl Unknown {
             Self::GravityTurn(_) => Scale::Angle,
             Self::Shape(_, shape) => shape.scale.into(),
             Self::CsfLevel => Scale::Plain,
+            Self::Drained(_) => Scale::Share,
             Self::ShearModulus(_) | Self::Density | Self::Pressure(_) | Self::Gap(_) => Scale::Logarithm,
         }
     }
@@ -79,6 +87,7 @@ impl Unknown {
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
             Self::CsfLevel => "level_mm of the fluid".to_owned(),
+            Self::Drained(_) => DRAINED.to_owned(),
             Self::Gap(_) => "gap_mm between cortex and skull".to_owned(),
             Self::GravityTurn(Turn::Nodding) => "turn of gravity about left-right, degrees".to_owned(),
             Self::GravityTurn(Turn::Rolling) => "turn of gravity across that, degrees".to_owned(),
@@ -244,6 +253,11 @@ impl<'a> Body<'a> {
                         csf.level_mm = value;
                     }
                 }
+                Unknown::Drained(levels) => {
+                    if let Some(csf) = &mut loads.csf {
+                        [csf.level_mm, _] = levels.at_number(value);
+                    }
+                }
                 Unknown::Pressure(n) => {
                     let pressure = &mut loads.pressure[*n].pressure_pa;
                     *pressure = value.exp().copysign(*pressure);
@@ -371,6 +385,8 @@ impl<'a> Body<'a> {
                 }
                 Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
                 Unknown::CsfLevel => by.push((By::CsfLevel, n, 1.0)),
+                // By the level itself.
+                Unknown::Drained(levels) => by.push((By::CsfLevel, n, levels.at_number(log_parameters[n])[1])),
                 Unknown::Pressure(number) => by.push((By::Load(Load::Pressure(*number)), n, 1.0)),
                 // By the gap itself, not by its logarithm.
                 Unknown::Gap(wall) => by.push((By::Gap(*wall), n, log_parameters[n].exp())),

@@ -9,6 +9,7 @@ mod correlated;
 mod displacement;
 mod evidence;
 mod findings;
+mod fluid;
 mod independent;
 mod levenberg_marquardt;
 mod mesh_error;
@@ -30,6 +31,7 @@ pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
 pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, STRONG, Unexplained, weights};
 pub use findings::{Odds, ProblemError, Shift};
+pub use fluid::{FluidLevels, FluidOutcome, prior_of_drained};
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };

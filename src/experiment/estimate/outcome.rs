@@ -2,9 +2,11 @@
 
 use super::evidence::Unexplained;
 use super::findings::{Odds, Shift};
+use super::fluid::FluidOutcome;
 use super::outline::OutlineAmounts;
 use super::re_registration::MovedNode;
 use super::{Convergence, LogPrior, Posterior, Process, Z_95};
+use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::Verdict;
 use crate::fem::Outcome;
 use crate::material::law::Material;
@@ -28,6 +30,12 @@ pub struct EstimateOutcome {
     /// Patients of the cohort that the prior was learnt from; absent where it is the literature's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taught_by: Option<usize>,
+    /// How much of the fluid has drained, where that was estimated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fluid: Option<FluidOutcome>,
+    /// The ventricles' change in the model and on the scans; absent where no stiffness is claimed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ventricles: Option<VentricleChange>,
     /// Largest standard deviation of ln(modulus) that the mesh itself adds to the intervals.
     #[serde(default)]
     pub model_log_sd: f64,

@@ -3,6 +3,7 @@
 use super::body::{Body, Observation, Solved, Unknown};
 use super::correlated;
 use super::findings::ProblemError;
+use super::fluid::FluidOutcome;
 use super::independent::fit_independent;
 use super::mesh_error::{at_places, left_of_difference};
 use super::outcome::{Estimate, EstimateOutcome};
@@ -12,7 +13,7 @@ use super::spread::spread;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{EstimateSettings, LogPrior, laplace};
 use crate::experiment::sample::Tissue;
-use crate::experiment::verdict::Finding;
+use crate::experiment::verdict::{Finding, Reason};
 use crate::fem::Within;
 use crate::material::law::Material;
 use std::collections::BTreeMap;
@@ -32,7 +33,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let (unknowns, prior): (Vec<Unknown>, Vec<LogPrior>) = problem.unknowns.into_iter().unzip();
     let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
     let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
-    let density_known = !unknowns.contains(&Unknown::Density);
+    let load_known = !unknowns.iter().any(|u| matches!(u, Unknown::Density | Unknown::Drained(_)));
+    let in_fluid = problem.template.loads.csf.is_some();
     let mut model_error: Vec<f64> = unknowns
         .iter()
         .map(|u| if matches!(u, Unknown::ShearModulus(_)) { problem.model_log_sd } else { 0.0 })
@@ -103,7 +105,11 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let posed = Posed {
         prior: &prior,
         tissues: &tissues,
-        weight_alone: only_weight && density_known,
+        assumed: (only_weight && load_known).then_some(if in_fluid {
+            Reason::LevelAssumed
+        } else {
+            Reason::LoadAssumed
+        }),
         body_known: problem.body_known,
     };
     let verdict = verdict_of_fit(&fitted, settings, &posterior, &posed);
@@ -113,9 +119,13 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         finding if finding.has_stiffness() => posterior,
         _ => posterior.withheld(),
     };
+    let fluid = FluidOutcome::of(&unknown, &prior, &fitted.descent.log_parameters, &posterior)
+        .filter(|_| verdict.finding.has_stiffness());
     let correlated = fitted.correlated;
     let outcome = EstimateOutcome {
         taught_by: None,
+        fluid,
+        ventricles: None,
         limits: verdict.because(),
         verdict,
         observations: fitted.observations,
@@ -170,7 +180,7 @@ mod tests {
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
-    use crate::experiment::verdict::{Claim, Reason};
+    use crate::experiment::verdict::Claim;
     use crate::fem::{Scenario, simulate};
     use crate::material::law::{gent, mooney_rivlin, ogden};
     use crate::material::meta_model::MetaModel;

@@ -15,8 +15,8 @@ pub(super) struct Posed<'a> {
     pub prior: &'a [LogPrior],
     /// The tissue whose shear modulus a parameter is.
     pub tissues: &'a [Option<String>],
-    /// Nothing but weight loads the body, and the density is given.
-    pub weight_alone: bool,
+    /// What is told of the load where nothing but a weight that is given pulls at the body.
+    pub assumed: Option<Reason>,
     /// Whether load and supports are known, as a phantom's are: then nothing contradicts them.
     pub body_known: bool,
 }
@@ -28,7 +28,7 @@ pub(super) fn verdict_of_fit(
     posterior: &Posterior,
     posed: &Posed<'_>,
 ) -> Verdict {
-    let Posed { prior, tissues, weight_alone, body_known } = *posed;
+    let Posed { prior, tissues, ref assumed, body_known } = *posed;
     let mut unexplained = Vec::new();
     let mut still = None;
     let mut share = None;
@@ -110,8 +110,8 @@ pub(super) fn verdict_of_fit(
         let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != Knowledge::Identified);
         reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
     }
-    if weight_alone && finding.has_stiffness() {
-        reasons.push(Reason::LoadAssumed);
+    if finding.has_stiffness() {
+        reasons.extend(assumed.clone());
     }
     Verdict::new(finding, share, moduli, reasons)
 }

@@ -24,7 +24,7 @@ impl Kind {
             Unknown::ShearModulus(_) => Self::Modulus(share),
             Unknown::Density => Self::Density,
             Unknown::Gap(_) => Self::Room,
-            Unknown::CsfLevel => Self::Other { curved: true },
+            Unknown::CsfLevel | Unknown::Drained(_) => Self::Other { curved: true },
             Unknown::GravityTurn(_) => Self::Turn,
             Unknown::Shape(..) | Unknown::Pressure(_) => Self::Other { curved: false },
         }

@@ -7,15 +7,12 @@ use crate::experiment::estimate::{LogPrior, Scale, Turn, Unknown, Z_95};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
 use crate::experiment::resection::{CsfSettings, ResectionSettings, Supports};
 use crate::experiment::sample::Tissue;
-use crate::experiment::skull::level_when_drained;
+use crate::experiment::skull::levels_when_drained;
 use crate::geometry::Frame;
 use crate::image::LabelMap;
 
 /// Name of the state of the first head; the others' follow it.
 pub const PREDICTED: &str = "predicted";
-
-/// Steps of the table of levels.
-const LEVELS: usize = 32;
 
 impl PredictSettings {
     /// The tissues whose stiffness is not known.
@@ -78,8 +75,7 @@ impl PredictSettings {
             add(Unknown::Gap(0), prior, Cause::Room);
         }
         if let Some(csf) = &own.csf {
-            let level = |n: usize| level_when_drained(labels, own.gravity_m_per_s2, n as f64 / LEVELS as f64);
-            let levels_mm: Option<Vec<f64>> = (0..=LEVELS).map(level).collect();
+            let levels_mm = levels_when_drained(labels, own.gravity_m_per_s2);
             let prior = LogPrior {
                 name: "part of the fluid that has drained".to_owned(),
                 scale: Scale::Logarithm,

@@ -1,7 +1,7 @@
 //! How a prediction is made; the table `[predict]` of the settings.
 
 use super::head::Head;
-use crate::experiment::resection::CsfSettings;
+use crate::experiment::resection::{CsfSettings, TISSUE_KG_PER_M3};
 use crate::experiment::setting::{SettingError, first_broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ impl Default for PredictSettings {
             density_log_sd: 0.56,
             drained: None,
             drained_log_sd: 0.4,
-            tissue_density_kg_per_m3: 1040.0,
+            tissue_density_kg_per_m3: TISSUE_KG_PER_M3,
             direction_sd_deg: 10.0,
             fixed_weight: 0.5,
             sliding_weight: 0.5,

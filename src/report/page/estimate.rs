@@ -49,6 +49,12 @@ pub fn section(
     let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
     html! {
         (table("Estimate", &head, &rows))
+        @if let Some(fluid) = &estimate.fluid {
+            p { "Fluid: " (fluid.sentence()) ". Tissue above its level has its own weight, tissue below it is buoyant." }
+        }
+        @if let Some(ventricles) = &estimate.ventricles {
+            p { "A check on load and pressure: " (ventricles.sentence()) "." }
+        }
         (figures(estimate, truth))
         @if let Some(models) = models { (table_of_models(models)) }
         p {

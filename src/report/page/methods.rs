@@ -202,6 +202,10 @@ fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &
         @if estimate.taken_out_rms_mm.is_some() {
             "The registration's own error was measured on the estimate's state and taken out of what it saw. "
         }
+        @if let Some(fluid) = &estimate.fluid {
+            "How much of the fluid around the brain had drained was estimated along with the moduli, tissue above its level with its own \
+             weight and buoyant below: " (fluid.sentence()) ". "
+        }
         @if let Some(models) = &outcome.comparison {
             (models.candidates.len()) " models were held against each other by their evidence. "
         }

@@ -278,6 +278,8 @@ mod tests {
                 names: names.to_vec(),
             },
             taught_by: None,
+            fluid: None,
+            ventricles: None,
             model_log_sd: 0.0,
             mesh_log_sd: Vec::new(),
             body_log_sd: 0.0,

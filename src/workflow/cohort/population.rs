@@ -33,6 +33,8 @@ enum LeftOut {
     Status(Status),
     #[error("another law or density than most")]
     OtherKind,
+    #[error("moduli under a fluid of unknown level")]
+    UnknownFluid,
     #[error("figures that are no Gaussian")]
     NoGaussian,
 }
@@ -67,6 +69,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
         estimated += 1;
         let finding = outcome.verdict.finding;
         match member.status {
+            Status::Done if estimate.fluid.is_some() => leave(LeftOut::UnknownFluid),
             Status::Done if matches!(finding, Finding::Identified | Finding::Widened) => {
                 let own = Case::at(&case_folder(cases, &member.participant_id)).settings()?;
                 teachers.push(Teacher { id: &member.participant_id, estimate, settings: Settings::resolve([&own])? });

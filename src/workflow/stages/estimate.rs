@@ -4,8 +4,8 @@ use super::brain_shift::SeenShift;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, MovedNode, Observation, Problem,
-    SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, FluidLevels, Instrument, LogPrior, MovedNode, Observation,
+    Problem, SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
@@ -13,6 +13,7 @@ use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
 use crate::experiment::stuck_cortex::{with_stuck_cortex, with_stuck_set};
 use crate::experiment::sweep::Reference;
+use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::{Loads, Scenario};
 use crate::geometry::{Frame, Mni};
@@ -26,9 +27,10 @@ use crate::workflow::facts::EstimateFacts;
 use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
+use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 25;
+const VERSION: u32 = 26;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -45,6 +47,11 @@ impl EstimateOptions {
                         pushed by a force); take them away",
             );
         }
+        if self.fluid.may_be_unknown() && loads.gravity_m_per_s2 == [0.0; 3] {
+            return Err(
+                "`fluid` needs gravity, and this body is loaded without it (a phantom is pushed by a force); take it away",
+            );
+        }
         if self.pressure && loads.pressure.is_empty() {
             return Err(
                 "`pressure` needs a pressure to begin with: give one in [[resection.pressure]], or take it away",
@@ -54,13 +61,14 @@ impl EstimateOptions {
     }
 
     /// The loads that are estimated, with what is known of them beforehand.
-    fn unknown_loads(&self, loads: &Loads) -> Vec<(Unknown, LogPrior)> {
+    fn unknown_loads(&self, loads: &Loads, in_fluid: bool) -> Vec<(Unknown, LogPrior)> {
         let mut unknowns = Vec::new();
         let mut add = |unknown: Unknown, mean: f64, sd: f64| {
             let prior = unknown.prior(mean, sd);
             unknowns.push((unknown, prior));
         };
-        if self.density {
+        // Beside a fluid the density is the tissue's own, which is known.
+        if self.density && !in_fluid {
             add(Unknown::Density, loads.density_kg_per_m3.ln(), self.density_log_sd);
         }
         if self.gravity_direction {
@@ -87,9 +95,19 @@ pub(crate) struct HeldBody {
     pub mesh: TetMesh,
     /// What its state is compared with.
     pub reference: Reference,
+    /// The levels of the fluid around it, where nobody knows how much has drained.
+    pub levels: Option<Arc<FluidLevels>>,
 }
 
 impl HeldBody {
+    /// The part of the fluid that has drained, where nobody knows it.
+    fn unknown_fluid(&self, options: &EstimateOptions) -> Option<(Unknown, LogPrior)> {
+        let unknown = Unknown::Drained(self.levels.clone()?);
+        let drained = self.settings.as_ref()?.csf.as_ref()?.drained;
+        let prior = prior_of_drained(&unknown, drained, options.drained_log_sd);
+        Some((unknown, prior))
+    }
+
     /// The room between cortex and skull, which no scan shows well enough to be given, where the body slides.
     fn unknown_room(&self) -> Option<(Unknown, LogPrior)> {
         let skull = &self.settings.as_ref().filter(|s| s.supports == Supports::Sliding)?.skull;
@@ -114,13 +132,20 @@ impl HeldBody {
             settings: self.settings.clone(),
             mesh: with_stuck_set(self.mesh.clone(), &skull, gravity),
             reference: self.reference.clone(),
+            levels: self.levels.clone(),
             scenario: with_stuck_cortex(&self.scenario),
         }
     }
 
     /// What it assumes, in words.
     pub fn name(&self) -> String {
-        self.settings.as_ref().map_or_else(String::new, |s| format!("supports {}", s.supports.name()))
+        let Some(settings) = &self.settings else { return String::new() };
+        let fluid = match (&self.levels, &settings.csf) {
+            (Some(_), _) => ", fluid of unknown level".to_owned(),
+            (None, Some(csf)) => format!(", {:.0} % of the fluid drained", 100.0 * csf.drained),
+            (None, None) => String::new(),
+        };
+        format!("supports {}{fluid}", settings.supports.name())
     }
 }
 
@@ -140,6 +165,8 @@ pub(crate) struct EstimateInput<'a> {
     pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
     /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
     pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
+    /// The same with every fluid that a comparison crosses them with.
+    pub every_fluid: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
     /// The body with its cortex stuck to the skull, which is not believed of it, made when it is asked for.
     pub stuck: Option<&'a dyn Fn() -> Result<HeldBody, WorkflowError>>,
     /// What the images show of the displacement, where there are images.
@@ -148,6 +175,8 @@ pub(crate) struct EstimateInput<'a> {
     pub noise_mm: f64,
     /// Expected error of the rigid registration, mm.
     pub rigid_error_mm: f64,
+    /// The ventricles' volume on the scans, before and after, cm3.
+    pub ventricles_cc: Option<[f64; 2]>,
 }
 
 /// The settings of what holds a patient: supports that are tried stand in no scenario.
@@ -265,6 +294,7 @@ impl Bodies {
             scenario: input.scenario.clone(),
             mesh: input.mesh.0.clone(),
             reference: input.reference.clone(),
+            levels: None,
         };
         let list = if list.is_empty() { vec![as_posed()] } else { list };
         let coarser = match input.coarser {
@@ -285,9 +315,10 @@ impl Bodies {
     ) -> Result<(Vec<(Unknown, LogPrior)>, Scenario), WorkflowError> {
         let options = &work.settings.estimate;
         let mut unknowns = law_priors(tissues, prior)?;
-        let loads = options.unknown_loads(&body.scenario.loads);
+        let loads = options.unknown_loads(&body.scenario.loads, body.levels.is_some());
         unknowns.extend(loads.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))));
         unknowns.extend(body.unknown_room());
+        unknowns.extend(body.unknown_fluid(options));
         let mut scenario = body.scenario.clone();
         if matches!(body.reference, Reference::Surfaces(_)) {
             scenario.solver.element = options.element;
@@ -420,6 +451,19 @@ impl Bodies {
     }
 }
 
+/// With the ventricles' change beside what the scans show of it; a change that contradicts them is among what limits the figures.
+fn with_ventricles(body: &HeldBody, input: &EstimateInput<'_>, mut found: Estimate) -> Estimate {
+    let Some(seen_cc) = input.ventricles_cc.filter(|_| found.outcome.verdict.finding.has_stiffness()) else {
+        return found;
+    };
+    let log_sd = found.outcome.posterior.log_sd.iter().zip(&found.outcome.posterior.names);
+    let log_sd = log_sd.filter(|(_, name)| name.starts_with("shear_modulus_pa")).map(|(sd, _)| *sd).fold(0.0, f64::max);
+    let change = VentricleChange::of(&body.mesh, &found.state.displacement_mm, seen_cc, log_sd);
+    found.outcome.limits.extend(change.filter(|change| !change.agrees()).map(|change| change.sentence()));
+    found.outcome.ventricles = change;
+    found
+}
+
 fn produced(
     body: &HeldBody,
     input: &EstimateInput<'_>,
@@ -428,6 +472,7 @@ fn produced(
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
     let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
+    let found = with_ventricles(body, input, found);
     let Estimate { outcome, state, displacement_sd_mm, displacement_95_mm, seen, materials, numbers: _ } = found;
     let errors = body.reference.errors(mesh, &state.displacement_mm);
     let tissue = |t: &Tissue| {

@@ -8,7 +8,10 @@ use hgm::mesh::TetMesh;
 const SHEAR_PA: f64 = 1000.0;
 const NU: f64 = 0.3;
 const SPHERE_MM: f64 = 250.0;
-const CONTACT_MM: f64 = 5.0;
+/// Hertz's radius of the contact.
+pub const CONTACT_MM: f64 = 5.0;
+/// Elements over it, from coarse to fine.
+pub const REFINEMENTS: [usize; 3] = [3, 6, 12];
 /// The body reaches this many contact radii.
 const REACH: f64 = 12.0;
 
@@ -33,14 +36,18 @@ fn far_field(force_n: f64, x: [f64; 3]) -> [f64; 3] {
     [out * x[0], out * x[1], along]
 }
 
-struct Pressed {
-    force_n: f64,
-    radius_mm: f64,
-    edge_mm: f64,
+/// What the wall carries of the sphere.
+pub struct Pressed {
+    /// Its force, N.
+    pub force_n: f64,
+    /// Radius of the pressed area, mm.
+    pub radius_mm: f64,
+    /// Edge of an element there, mm.
+    pub edge_mm: f64,
 }
 
-/// A quarter of the sphere, `cells` elements over the contact radius.
-fn pressed(cells: usize) -> (Pressed, f64) {
+/// A quarter of the sphere, `cells` elements over the contact radius; and Hertz's force, N.
+pub fn pressed(cells: usize) -> (Pressed, f64) {
     let approach = CONTACT_MM * CONTACT_MM / SPHERE_MM;
     let modulus = 2.0 * SHEAR_PA * 1e-6 * (1.0 + NU) / (1.0 - NU * NU);
     let force = 4.0 / 3.0 * modulus * SPHERE_MM.sqrt() * approach.powf(1.5);
@@ -89,7 +96,7 @@ fn pressed(cells: usize) -> (Pressed, f64) {
 #[test]
 fn slow_a_sphere_on_a_plane_carries_what_hertz_says() {
     let mut errors = Vec::new();
-    for cells in [3, 6, 12] {
+    for cells in REFINEMENTS {
         let (found, force) = pressed(cells);
         let error = found.force_n / force - 1.0;
         println!(

@@ -12,3 +12,4 @@ mod refusals;
 mod sensitivities;
 mod statics;
 mod stiffness;
+mod walls;
