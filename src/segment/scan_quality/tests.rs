@@ -62,7 +62,7 @@ fn measured(t1: &Volume<f32, Pre>, labels: &LabelMap<Pre>) -> ScanQuality {
 fn measured_on(t1: &Volume<f32, Pre>, labels: &LabelMap<Pre>, pose: &RigidTransform<Pre, Mni>) -> ScanQuality {
     let coarse = Grid::<Mni>::axis_aligned([8; 3], [30.0; 3], [-105.0; 3]);
     let same = DisplacementField::from_displacement(&Volume::filled(coarse, [0f32; 3]));
-    scan_quality(&PosedScan::new(t1, pose), labels, &same, None)
+    scan_quality(&PosedScan::new(t1, pose), (labels, &[]), &same, None)
 }
 
 /// What can be told of a scan with air, as numbers, the bad sides upwards.
