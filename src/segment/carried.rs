@@ -284,10 +284,10 @@ pub fn segment_head<F: Frame>(
     let known = &found.known.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
     let (near, in_scan) = (found.brain.grid, found.known.clone());
-    let (mut segmentation, contents) = labelled(scan, found, &priors, overrides, settings)?;
+    let (mut segmentation, seen) = labelled(scan, found, &priors, overrides, settings)?;
     let labels = segmentation.labels_mni.cropped(&segmentation.labels_mni.grid.box_of(&near));
     let on_template = |p| carried.fit.atlas_from_subject.apply(p);
-    segmentation.regions = evidence(&contents, &labels, &in_scan, &priors, on_template);
+    segmentation.regions = evidence(&seen, &labels, &in_scan, &priors, on_template);
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));

@@ -1,6 +1,8 @@
 //! A label map of another tool, carried to hgm's numbers once its anatomy makes sense.
 
-use crate::anatomy::{LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, label, recognise};
+use crate::anatomy::{
+    LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, built_in, label, recognise,
+};
 use crate::geometry::Frame;
 use crate::image::distance::distance_mm;
 use crate::image::{LabelMap, Volume};
@@ -98,7 +100,8 @@ pub fn import_labels<F: Frame>(
     {
         return Err(tumour);
     }
-    let Recognised { table, found } = recognise(&counts, chosen)?;
+    let Recognised { table, found } = recognise(&counts, chosen)
+        .map_err(|why| half_of_a_known_map(&counts, chosen, cc_of).unwrap_or_else(|| why.into()))?;
     let labels = codes.map(|code| table.structure(code).map_or(label::BACKGROUND, |s| s.tissue.label()));
     let name = || table.name.clone();
     if let Some(apart_mm) = sides_exchanged_mm(codes, table) {
@@ -136,6 +139,21 @@ fn tumour_alone(counts: &[LabelCount], cc_of: impl Fn(usize) -> f64) -> Option<I
 
 fn listed(codes: &[u32]) -> String {
     codes.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// A map of nothing but some tool's numbers, with those of one side missing.
+fn half_of_a_known_map(
+    counts: &[LabelCount],
+    chosen: Option<&[&LabelTable]>,
+    cc_of: impl Fn(usize) -> f64 + Copy,
+) -> Option<ImportError> {
+    let all: Vec<&LabelTable> = built_in().iter().collect();
+    chosen.unwrap_or(&all).iter().find_map(|table| {
+        let inside = counts.iter().filter(|c| c.code != 0);
+        let found: Vec<(&Structure, usize)> =
+            inside.map(|c| Some((table.structure(c.code)?, c.voxels))).collect::<Option<_>>()?;
+        one_sided(table, &found, cc_of)
+    })
 }
 
 /// Whether a map whose tool tells the sides apart has hardly anything on one of them. After a hemisphere was taken out the
@@ -350,8 +368,10 @@ mod tests {
             Volume::from_data(Grid::<Native>::axis_aligned([80; 3], [4.0; 3], [-158.0; 3]), tumour([1, 3, 2]).data);
         assert!(!matches!(import_labels(&large, None), Err(ImportError::Tumour { .. })));
 
-        let left_alone = aseg(1.0).map(|c| if (41..=43).contains(&c) && c != 43 { 0 } else { c });
-        assert!(refused(&left_alone, "freesurfer").contains("missing"));
+        let left_alone = aseg(1.0).map(|c| if (41..=43).contains(&c) { 0 } else { c });
+        for said in [refused(&left_alone, "freesurfer"), import_labels(&left_alone, None).unwrap_err().to_string()] {
+            assert!(said.contains("its right hemisphere is missing"), "{said}");
+        }
         let mut scrap = aseg(1.0);
         let mut kept = 0;
         for code in &mut scrap.data {

@@ -3,7 +3,7 @@
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
 use super::coil::{evened, strong_gain};
-use super::confidence::{Contents, RegionEvidence, contents};
+use super::confidence::{RegionEvidence, Seen, seen};
 use super::folia::with_whole_folia;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
@@ -344,7 +344,7 @@ pub(super) fn find_brain<F: Frame>(
     Ok(FoundBrain { gain, raw, known, brain, warnings })
 }
 
-/// What is inside the brain, and how much of its label each looked-at voxel holds.
+/// What is inside the brain, and what its labels are judged by.
 ///
 /// # Errors
 /// As [`segment_with_priors`].
@@ -354,7 +354,7 @@ pub(super) fn labelled<F: Frame>(
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
-) -> Result<(Segmentation<F>, Contents), SegmentError> {
+) -> Result<(Segmentation<F>, Vec<Seen>), SegmentError> {
     let FoundBrain { gain, raw, known, brain, mut warnings } = found;
     let PosedScan { t1, mni_from_t1, .. } = scan;
     let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
@@ -391,7 +391,7 @@ pub(super) fn labelled<F: Frame>(
     }
     with_white_walls(&mut labels_mni, &ventricle, &priors.deep_grey);
     with_whole_folia(&mut labels_mni, priors);
-    let contents = contents(&model, &labels_mni, priors);
+    let seen = seen(&model, &labels_mni, &even, priors);
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let volumes = TissueVolumes {
         brain_cc: found_cc,
@@ -433,7 +433,7 @@ pub(super) fn labelled<F: Frame>(
         regions: Vec::new(),
         warnings,
     };
-    Ok((segmentation, contents))
+    Ok((segmentation, seen))
 }
 
 impl SegmentWarning {
