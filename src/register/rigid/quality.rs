@@ -27,6 +27,7 @@ pub struct FitQuality {
     /// Evaluations of mutual information with gradient.
     pub evaluations: usize,
     /// How much longer the head is in one of two scans of it; `None` where none or only parts of them were compared so.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<RelativeSize>,
 }
 
