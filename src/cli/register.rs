@@ -30,7 +30,7 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let Args { moving, fixed, output, moving_mask, fixed_mask } = args.clone();
     let files = RegisterFiles { moving, onto: Onto::named(fixed, moving_mask, fixed_mask)?, output };
-    let found = register_files(&files, &session.settings(Layer::default())?)?;
+    let found = register_files(&files, &session.settings(Layer::default())?, &mut *session.listener())?;
     warn(&found.warnings);
     session.emit(&found, &format!("{}\n{}", found.transform.display(), found.itk_transform.display()))?;
     if found.refused.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(found.refused).into()) }

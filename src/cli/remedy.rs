@@ -7,6 +7,7 @@ use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
 use crate::live::ReplayError;
 use crate::mesh::engine::EngineError;
+use crate::register::RegisterError;
 use crate::resect::PairError;
 use crate::segment::{HeadError, ImportError};
 use crate::tag::TagError;
@@ -71,6 +72,10 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Labels(LabelMapError::Import {
             source: ImportError::Numbers(LabelError::Mask { .. }), ..
         }) => "see --brain-mask",
+        WorkflowError::Registration { source: RegisterError::OtherSize { .. }, .. }
+        | WorkflowError::Rigid { source: RegisterError::OtherSize { .. }, .. } => {
+            "where both are right `[register] largest_size_difference_percent` in a settings file (--config) takes more"
+        }
         WorkflowError::Registration { .. } => {
             "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
         }

@@ -20,6 +20,8 @@ mod whole_head;
 
 pub use affine::subject_from_mean_head;
 pub use gain::without_gain;
-pub use rigid::{FitQuality, FitWarning, RegisterError, RigidFit, RigidMasks, RigidSettings, register_rigid};
+pub use rigid::{
+    FitQuality, FitWarning, RegisterError, RelativeSize, RigidFit, RigidMasks, RigidSettings, register_rigid,
+};
 pub use two_scans::{register_two_scans, register_two_scans_near};
 pub use whole_head::{MeanHead, register_to_mean_head};

@@ -15,13 +15,14 @@ use crate::image::Volume;
 /// head, then [`register_two_scans_near`] from there. Quality and warnings are those of the scans as they come.
 ///
 /// # Errors
-/// As [`register_rigid`].
+/// As [`register_rigid`]; [`RegisterError::OtherSize`] for scans in which the head has two sizes.
 pub fn register_two_scans<M: Frame, F: Frame>(
     moving: &Volume<f32, M>,
     fixed: &Volume<f32, F>,
     settings: &RigidSettings,
 ) -> Result<RigidFit<M, F>, RegisterError> {
     let found = register_rigid(moving, fixed, RigidMasks::default(), settings)?;
+    found.quality.check_size(settings.largest_size_difference_percent)?;
     let fixed_from_moving = register_two_scans_near(moving, fixed, &found.fixed_from_moving, settings)?;
     Ok(RigidFit { fixed_from_moving, ..found })
 }

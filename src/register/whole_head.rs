@@ -241,6 +241,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
         distinctness,
         mirrored_ratio: None,
         evaluations: optimum.evaluations,
+        size: None,
     };
     let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&finished.linear));
     let moving_from_head: RigidTransform<Native, Native> =

@@ -202,6 +202,7 @@ mod tests {
             voxel_mm: [1.0; 3],
             anisotropy: 1.0,
             template_correlation: Some(0.7),
+            regions: Vec::new(),
         }
     }
 

@@ -46,7 +46,7 @@ pub struct ScanMeasure {
 }
 
 /// Every measure, in the order of tables.
-pub const SCAN_MEASURES: [ScanMeasure; 9] = [
+pub const SCAN_MEASURES: [ScanMeasure; 11] = [
     ScanMeasure {
         column: "contrast_to_noise",
         name: "contrast to noise",
@@ -136,6 +136,26 @@ pub const SCAN_MEASURES: [ScanMeasure; 9] = [
         step: 0.02,
         decimals: 2,
         of: |scan| scan.template_correlation,
+    },
+    ScanMeasure {
+        column: "least_sure_part_percent",
+        name: "labels of the least sure part of the brain",
+        unit: "%",
+        good: Good::High,
+        hint: "higher is better: how many of them are expected to be right",
+        step: 1.0,
+        decimals: 0,
+        of: ScanQuality::least_confidence_percent,
+    },
+    ScanMeasure {
+        column: "most_outside_part_percent",
+        name: "most of any part of the brain outside",
+        unit: "%",
+        good: Good::Low,
+        hint: "0 is good: nothing is said of what lies outside the field of view",
+        step: 2.0,
+        decimals: 0,
+        of: ScanQuality::most_outside_percent,
     },
 ];
 

@@ -396,6 +396,7 @@ mod tests {
                 white_matter_cc: 0.5,
                 ventricle_cc: 0.0,
             },
+            regions: Vec::new(),
             warnings: Vec::new(),
         };
         let cavity = Mask::from_fn(grid, |n| grid.voxel(n).iter().all(|v| (6..18).contains(v)));

@@ -148,10 +148,19 @@ pub fn deep_grey() -> Mask<Mni> {
 /// tentorium, lateral of the brainstem. Rough: for naming and ranking, not for measuring.
 pub fn temporal_lobe(p: Position<Mni>) -> Option<Side> {
     let [x, y, z] = [p.mm.x, p.mm.y, p.mm.z];
-    let sylvian_mm = -2.0 - 0.35 * (y - 10.0);
     let tentorium_mm = if y < -30.0 { -22.0 + 0.35 * (-30.0 - y) } else { -50.0 };
-    let inside = x.abs() > 17.0 && (-64.0..26.0).contains(&y) && z < sylvian_mm && z > tentorium_mm;
+    let inside = x.abs() > 17.0 && (-64.0..26.0).contains(&y) && !above_sylvian(y, z) && z > tentorium_mm;
     inside.then_some(if x < 0.0 { Side::Left } else { Side::Right })
+}
+
+/// Whether a place lies above the plane of the Sylvian fissure.
+pub fn above_sylvian(y: f64, z: f64) -> bool {
+    z > -2.0 - 0.35 * (y - 10.0)
+}
+
+/// How far in front the central sulcus lies at a height: from the Sylvian fissure up and back to the vertex.
+pub fn central_mm(z: f64) -> f64 {
+    -5.0 - 0.45 * (z - 15.0).max(0.0)
 }
 
 /// One embedded map. All of them are little-endian unsigned bytes in NIfTI-1 with an sform and no scaling, which the

@@ -1,5 +1,6 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
+use super::confidence::evidence;
 use super::overhang::{beyond, onto_the_brain, short};
 use super::posed_scan::PosedScan;
 use super::segmentation::{FoundBrain, find_brain, labelled};
@@ -282,7 +283,11 @@ pub fn segment_head<F: Frame>(
     let (outside, short) = (beyond(&found.brain, &found.known, &priors), short(&found.brain, &found.known, &priors));
     let known = &found.known.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
-    let mut segmentation = labelled(scan, found, &priors, overrides, settings)?;
+    let (near, in_scan) = (found.brain.grid, found.known.clone());
+    let (mut segmentation, seen) = labelled(scan, found, &priors, overrides, settings)?;
+    let labels = segmentation.labels_mni.cropped(&segmentation.labels_mni.grid.box_of(&near));
+    let on_template = |p| carried.fit.atlas_from_subject.apply(p);
+    segmentation.regions = evidence(&seen, &labels, &in_scan, &priors, on_template);
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));

@@ -1,7 +1,7 @@
 //! Where the template has its cerebellum.
 
 use super::atlas;
-use crate::geometry::Mni;
+use crate::geometry::{Mni, Position};
 use crate::image::Mask;
 
 /// The template's cerebellum: below its upper surface and behind the brain stem, both by places read off by eye. Rough in
@@ -10,8 +10,14 @@ pub(super) fn cerebellum() -> Mask<Mni> {
     let t1 = &atlas::template().t1;
     Mask::from_fn(t1.grid, |n| {
         let p = t1.grid.centre(t1.grid.voxel(n)).mm;
-        t1.data[n] > 0 && p.y < behind_mm(p.x.abs(), p.z) && p.z < below_mm(p.x.abs(), p.y)
+        t1.data[n] > 0 && holds(Position::from_point(p))
     })
+}
+
+/// Whether a point of the template lies in it.
+pub(super) fn holds(p: Position<Mni>) -> bool {
+    let p = p.mm;
+    p.y < behind_mm(p.x.abs(), p.z) && p.z < below_mm(p.x.abs(), p.y)
 }
 
 /// Height of the upper surface, mm, at distances from the middle (rows) and from back to front (columns).
@@ -55,7 +61,6 @@ fn place(knots: &[f64], x: f64) -> (usize, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Position;
     use crate::segment::atlas::head_from_template;
 
     #[test]

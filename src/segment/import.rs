@@ -1,6 +1,8 @@
 //! A label map of another tool, carried to hgm's numbers once its anatomy makes sense.
 
-use crate::anatomy::{LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, label, recognise};
+use crate::anatomy::{
+    LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, built_in, label, recognise,
+};
 use crate::geometry::Frame;
 use crate::image::distance::distance_mm;
 use crate::image::{LabelMap, Volume};
@@ -21,6 +23,8 @@ pub struct ImportedLabels<F: Frame> {
     pub volumes_cc: Vec<(Tissue, f64)>,
     /// Numbers that occur.
     pub structures: usize,
+    /// The map's tool labels the cerebellum by itself, and this map has none.
+    pub without_cerebellum: bool,
 }
 
 /// Why a label map is not believed.
@@ -39,6 +43,34 @@ pub enum ImportError {
         table: String,
         /// Distance between the two centres along left-right.
         apart_mm: f64,
+    },
+    /// A tumour's map, not a brain's.
+    #[error(
+        "it labels {cc:.0} cc with {} alone: that is a map of a tumour (BraTS: 1 core, 2 oedema, 3 or 4 enhancing tumour), where a \
+         map of the whole brain is asked for; give the brain's labels (of FreeSurfer, SynthSeg or `hgm segment`) with the tumour \
+         drawn into them under numbers of its own (in hgm's table 6 is tumour, 7 oedema)",
+        listed(codes)
+    )]
+    Tumour {
+        /// Its numbers.
+        codes: Vec<u32>,
+        /// All it labels.
+        cc: f64,
+    },
+    /// One hemisphere is not there.
+    #[error(
+        "read as {table}, its {missing} hemisphere is missing: {missing_cc:.0} cc of tissue to {other_cc:.0} cc on the other side; \
+         give the map of the whole brain, as the tool wrote it"
+    )]
+    OneSided {
+        /// The table.
+        table: String,
+        /// `left` or `right`.
+        missing: &'static str,
+        /// Tissue of that side.
+        missing_cc: f64,
+        /// Tissue of the other.
+        other_cc: f64,
     },
     /// The tissues do not lie as in a brain.
     #[error(
@@ -61,22 +93,84 @@ pub fn import_labels<F: Frame>(
     chosen: Option<&[&LabelTable]>,
 ) -> Result<ImportedLabels<F>, ImportError> {
     let counts = counts(codes);
-    let Recognised { table, found } = recognise(&counts, chosen)?;
+    let cc_of = |voxels: usize| voxels as f64 * codes.grid.voxel_volume_mm3() / 1000.0;
+    // What a table of the user's own says of such numbers counts.
+    if chosen.is_none_or(|tables| tables.iter().all(|table| table.name == "hgm"))
+        && let Some(tumour) = tumour_alone(&counts, cc_of)
+    {
+        return Err(tumour);
+    }
+    let Recognised { table, found } = recognise(&counts, chosen)
+        .map_err(|why| half_of_a_known_map(&counts, chosen, cc_of).unwrap_or_else(|| why.into()))?;
     let labels = codes.map(|code| table.structure(code).map_or(label::BACKGROUND, |s| s.tissue.label()));
     let name = || table.name.clone();
     if let Some(apart_mm) = sides_exchanged_mm(codes, table) {
         return Err(ImportError::Mirrored { table: name(), apart_mm });
+    }
+    if let Some(one_sided) = one_sided(table, &found, cc_of) {
+        return Err(one_sided);
     }
     if let Some(what) = no_brain(&labels) {
         return Err(ImportError::NoBrain { table: name(), what });
     }
     let mut volumes: BTreeMap<Tissue, f64> = BTreeMap::new();
     for &(structure, voxels) in &found {
-        *volumes.entry(structure.tissue).or_default() += voxels as f64 * codes.grid.voxel_volume_mm3() / 1000.0;
+        *volumes.entry(structure.tissue).or_default() += cc_of(voxels);
     }
     volumes.remove(&Tissue::Outside);
     let volumes_cc = volumes.into_iter().collect();
-    Ok(ImportedLabels { labels, table: name(), files: table.files, volumes_cc, structures: found.len() })
+    let cerebellum = |s: &Structure| s.tissue != Tissue::Outside && s.name.to_ascii_lowercase().contains("cerebell");
+    let without_cerebellum =
+        table.structures.iter().any(cerebellum) && !found.iter().any(|(structure, _)| cerebellum(structure));
+    let structures = found.len();
+    Ok(ImportedLabels { labels, table: name(), files: table.files, volumes_cc, structures, without_cerebellum })
+}
+
+/// Less tissue than this is no brain's, cc; the largest tumours with their oedema stay below.
+const LEAST_TISSUE_CC: f64 = 300.0;
+
+/// A map of a few small numbers and too little for a brain: as BraTS numbers the parts of a tumour.
+fn tumour_alone(counts: &[LabelCount], cc_of: impl Fn(usize) -> f64) -> Option<ImportError> {
+    let inside: Vec<&LabelCount> = counts.iter().filter(|c| c.code != 0 && c.voxels > 0).collect();
+    let cc = cc_of(inside.iter().map(|c| c.voxels).sum());
+    let of_tumour = inside.len() > 1 && inside.iter().all(|c| c.code <= 4) && cc < LEAST_TISSUE_CC;
+    of_tumour.then(|| ImportError::Tumour { codes: inside.iter().map(|c| c.code).collect(), cc })
+}
+
+fn listed(codes: &[u32]) -> String {
+    codes.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// A map of nothing but some tool's numbers, with those of one side missing.
+fn half_of_a_known_map(
+    counts: &[LabelCount],
+    chosen: Option<&[&LabelTable]>,
+    cc_of: impl Fn(usize) -> f64 + Copy,
+) -> Option<ImportError> {
+    let all: Vec<&LabelTable> = built_in().iter().collect();
+    chosen.unwrap_or(&all).iter().find_map(|table| {
+        let inside = counts.iter().filter(|c| c.code != 0);
+        let found: Vec<(&Structure, usize)> =
+            inside.map(|c| Some((table.structure(c.code)?, c.voxels))).collect::<Option<_>>()?;
+        one_sided(table, &found, cc_of)
+    })
+}
+
+/// Whether a map whose tool tells the sides apart has hardly anything on one of them. After a hemisphere was taken out the
+/// brainstem, the cerebellum and what was left of the nuclei are still labelled on that side.
+fn one_sided(table: &LabelTable, found: &[(&Structure, usize)], cc_of: impl Fn(usize) -> f64) -> Option<ImportError> {
+    /// Of the other side's tissue: half of what a lesion of a whole lobe leaves.
+    const LEAST: f64 = 0.4;
+    let tissue = |s: &Structure| matches!(s.tissue, Tissue::Grey | Tissue::White | Tissue::Tumour | Tissue::Oedema);
+    let of_side = |side: Side| {
+        let own = found.iter().filter(|(s, _)| tissue(s) && s.side() == Some(side));
+        cc_of(own.map(|(_, voxels)| voxels).sum())
+    };
+    let (left, right) = (of_side(Side::Left), of_side(Side::Right));
+    let (missing, missing_cc, other_cc) = if left < right { ("left", left, right) } else { ("right", right, left) };
+    // A map that tells the sides of a few structures alone says nothing.
+    let told = other_cc >= LEAST_TISSUE_CC / 2.0 && missing_cc < LEAST * other_cc;
+    told.then(|| ImportError::OneSided { table: table.name.clone(), missing, missing_cc, other_cc })
 }
 
 fn counts<F: Frame>(codes: &Volume<u32, F>) -> Vec<LabelCount> {
@@ -128,7 +222,7 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
     let cc = |l: u8| labels.data.iter().filter(|&&x| x == l).count() as f64 * labels.grid.voxel_volume_mm3() / 1000.0;
     let (grey, white, ventricle) = (cc(label::GREY_MATTER), cc(label::WHITE_MATTER), cc(label::VENTRICLE));
     let tissue = grey + white + cc(label::TUMOUR) + cc(label::OEDEMA) + cc(label::RESECTED);
-    if !(300.0..=2200.0).contains(&tissue) {
+    if !(LEAST_TISSUE_CC..=2200.0).contains(&tissue) {
         return Some(format!("grey and white matter are {tissue:.0} cc together, a brain has 300 to 2200"));
     }
     if !(0.4..=4.0).contains(&(grey / white)) {
@@ -250,6 +344,66 @@ mod tests {
         assert!(refused(&inside_out, "freesurfer").contains("ventricles lie at the surface"));
         let half = aseg(1.0).map(|c| if c == 2 || c == 41 { 0 } else { c });
         assert!(refused(&half, "freesurfer").contains("missing"));
+    }
+
+    #[test]
+    fn a_tumours_map_is_called_one_and_so_is_half_a_brain_or_one_without_its_cerebellum() {
+        let grid = Grid::axis_aligned([80; 3], [2.0; 3], [-79.0; 3]);
+        let tumour = |codes: [u32; 3]| -> Volume<u32, Native> {
+            Volume::from_fn(grid, |n| {
+                let r = grid.voxel(n).map(|v| (2.0 * v as f64 - 79.0).powi(2)).iter().sum::<f64>().sqrt();
+                [(12.0, codes[0]), (16.0, codes[1]), (28.0, codes[2])]
+                    .iter()
+                    .find(|(end, _)| r < *end)
+                    .map_or(0, |p| p.1)
+            })
+        };
+        for codes in [[1, 4, 2], [1, 3, 2], [4, 1, 1]] {
+            let said = import_labels(&tumour(codes), None).unwrap_err().to_string();
+            assert!(said.contains("map of a tumour") && said.contains("92 cc"), "{said}");
+            assert!(refused(&tumour(codes), "hgm").contains("map of a tumour"));
+        }
+        // Enough tissue for a brain is one, or refused as what it is.
+        let large =
+            Volume::from_data(Grid::<Native>::axis_aligned([80; 3], [4.0; 3], [-158.0; 3]), tumour([1, 3, 2]).data);
+        assert!(!matches!(import_labels(&large, None), Err(ImportError::Tumour { .. })));
+
+        let left_alone = aseg(1.0).map(|c| if (41..=43).contains(&c) { 0 } else { c });
+        for said in [refused(&left_alone, "freesurfer"), import_labels(&left_alone, None).unwrap_err().to_string()] {
+            assert!(said.contains("its right hemisphere is missing"), "{said}");
+        }
+        let mut scrap = aseg(1.0);
+        let mut kept = 0;
+        for code in &mut scrap.data {
+            if [41, 42].contains(code) {
+                kept += 1;
+                if kept > 3000 * if *code == 41 { 1 } else { 2 } {
+                    *code = 0;
+                }
+            }
+        }
+        assert!(
+            refused(&scrap, "freesurfer").contains("its right hemisphere is missing"),
+            "{}",
+            refused(&scrap, "freesurfer")
+        );
+
+        assert!(import_labels(&aseg(1.0), None).unwrap().without_cerebellum);
+        let whole = aseg(1.0);
+        let low = Volume::from_fn(whole.grid, |n| {
+            let [i, _, k] = whole.grid.voxel(n);
+            match whole.data[n] {
+                3 | 42 if k < 20 => {
+                    if i < 40 {
+                        8
+                    } else {
+                        47
+                    }
+                }
+                own => own,
+            }
+        });
+        assert!(!import_labels(&low, None).unwrap().without_cerebellum);
     }
 
     #[test]

@@ -81,6 +81,7 @@ pub fn segment_by_labels<F: Frame>(scan: &PosedScan<'_, F>, given: &LabelMap<F>)
             ventricle_cc: volume(label::VENTRICLE),
         },
         brain_mni: brain,
+        regions: Vec::new(),
         warnings: if labels_mni.data.contains(&label::VENTRICLE) {
             Vec::new()
         } else {

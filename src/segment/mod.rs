@@ -10,6 +10,7 @@ mod brain;
 mod carried;
 mod cerebellum;
 mod coil;
+mod confidence;
 mod folia;
 mod import;
 mod labelled;
@@ -19,6 +20,7 @@ mod noise;
 mod overhang;
 mod posed_scan;
 mod priors;
+mod region;
 mod scan_quality;
 mod segmentation;
 mod sulci;
@@ -29,12 +31,14 @@ pub use agreement::{Disagreement, disagreement};
 pub use bias::LogBias;
 pub use brain::BrainSettings;
 pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};
+pub use confidence::RegionEvidence;
 pub use import::{ImportError, ImportedLabels, import_labels};
 pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
 pub use overhang::VaultPart;
 pub use posed_scan::PosedScan;
 pub use priors::AtlasPriors;
-pub use scan_quality::{Air, ScanQualities, ScanQuality, scan_quality};
+pub use region::Region;
+pub use scan_quality::{Air, RegionQuality, ScanQualities, ScanQuality, scan_quality};
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
     segment_with_priors,

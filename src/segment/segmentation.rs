@@ -3,6 +3,7 @@
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
 use super::coil::{evened, strong_gain};
+use super::confidence::{RegionEvidence, Seen, seen};
 use super::folia::with_whole_folia;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
@@ -11,6 +12,7 @@ use super::noise::calmed;
 use super::overhang::VaultPart;
 use super::posed_scan::PosedScan;
 use super::priors::AtlasPriors;
+use super::region::Region;
 use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
 use crate::geometry::{Frame, Mni};
 use crate::image::blocks::{coarser, on_finer_grid};
@@ -94,6 +96,8 @@ pub struct Segmentation<F: Frame> {
     pub csf_grey_border: f64,
     /// Volumes on the template's grid.
     pub volumes: TissueVolumes,
+    /// What speaks for the labels, by parts of the brain; empty where nothing was fitted to tell by.
+    pub regions: Vec<RegionEvidence>,
     /// What a reader should know.
     pub warnings: Vec<SegmentWarning>,
 }
@@ -122,6 +126,21 @@ pub enum SegmentWarning {
     CroppedBrain {
         /// Share of the template's brain outside the image, in percent.
         percent: f64,
+    },
+    /// The field of view cuts parts of the brain.
+    #[error("{}: nothing is said about that", in_words(parts, "lies outside the scan"))]
+    RegionsOutside {
+        /// The parts and how much of each lies outside, percent.
+        parts: Vec<(Region, f64)>,
+    },
+    /// What is known of the labels speaks less for them than elsewhere.
+    #[error(
+        "{}: look at the labels there before relying on them, and give a brain mask or a label map where they are wrong",
+        in_words(parts, "of the labels are expected to be right")
+    )]
+    UnsureRegions {
+        /// The parts and how much of each is expected to be right, percent.
+        parts: Vec<(Region, f64)>,
     },
     /// A surface coil saw parts of the brain much brighter than others.
     #[error(
@@ -188,6 +207,14 @@ pub enum SegmentWarning {
         /// Difference of the means over the mean of the deviations.
         ratio: f64,
     },
+}
+
+/// "left temporal lobe: 18 % lies outside the scan (cerebellum: 7 %)".
+fn in_words(parts: &[(Region, f64)], what: &str) -> String {
+    let of = |(region, percent): &(Region, f64)| format!("{region}: {percent:.0} %");
+    let others: Vec<String> = parts.iter().skip(1).map(of).collect();
+    let first = parts.first().map(|first| format!("{} {what}", of(first))).unwrap_or_default();
+    if others.is_empty() { first } else { format!("{first} ({})", others.join(", ")) }
 }
 
 /// Why an image could not be segmented.
@@ -260,7 +287,7 @@ pub fn segment_with_priors<F: Frame>(
 ) -> Result<Segmentation<F>, SegmentError> {
     settings.check()?;
     let found = find_brain(scan, priors, overrides.brain, settings)?;
-    labelled(scan, found, priors, overrides, settings)
+    Ok(labelled(scan, found, priors, overrides, settings)?.0)
 }
 
 /// A brain found or given, and nothing looked at inside it; the volumes lie on the priors' grid.
@@ -317,7 +344,7 @@ pub(super) fn find_brain<F: Frame>(
     Ok(FoundBrain { gain, raw, known, brain, warnings })
 }
 
-/// What is inside the brain.
+/// What is inside the brain, and what its labels are judged by.
 ///
 /// # Errors
 /// As [`segment_with_priors`].
@@ -327,7 +354,7 @@ pub(super) fn labelled<F: Frame>(
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
-) -> Result<Segmentation<F>, SegmentError> {
+) -> Result<(Segmentation<F>, Vec<Seen>), SegmentError> {
     let FoundBrain { gain, raw, known, brain, mut warnings } = found;
     let PosedScan { t1, mni_from_t1, .. } = scan;
     let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
@@ -364,6 +391,7 @@ pub(super) fn labelled<F: Frame>(
     }
     with_white_walls(&mut labels_mni, &ventricle, &priors.deep_grey);
     with_whole_folia(&mut labels_mni, priors);
+    let seen = seen(&model, &labels_mni, &even, priors);
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let volumes = TissueVolumes {
         brain_cc: found_cc,
@@ -388,7 +416,7 @@ pub(super) fn labelled<F: Frame>(
             };
         }
     }
-    Ok(Segmentation {
+    let segmentation = Segmentation {
         brain: overrides
             .brain
             .filter(|m| m.grid.coincides(&t1.grid, 1e-3))
@@ -402,8 +430,10 @@ pub(super) fn labelled<F: Frame>(
         tissue_means: model.means,
         csf_grey_border: model.csf_grey_border(),
         volumes,
+        regions: Vec::new(),
         warnings,
-    })
+    };
+    Ok((segmentation, seen))
 }
 
 impl SegmentWarning {

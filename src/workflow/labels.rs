@@ -55,6 +55,14 @@ fn imported(
         found.structures,
         volumes.join(", ")
     ));
+    if found.without_cerebellum {
+        let what = format!(
+            "no cerebellum is labelled, where a map of {} has one: it will count as outside the brain, and what stands on the \
+             tentorium will hang free; give the whole map",
+            found.table
+        );
+        progress.odd(name, &what);
+    }
     Ok(found.labels)
 }
 

@@ -3,12 +3,26 @@
 use super::error::WorkflowError;
 use super::inputs::Scans;
 use super::outcome;
+use super::progress::Progress;
 use super::stages;
 use super::work::Work;
 use crate::artefact::{Manifest, write_whole};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::layout;
-use crate::report::refusal::{as_scanned, picture, posed};
+use crate::report::refusal::{Row, as_scanned, picture, posed};
+use std::path::{Path, PathBuf};
+
+/// A picture for whoever wrote `output`, beside it: `labels_refused.png` of `labels.nii.gz`. What goes wrong with it is not worth
+/// a second message.
+pub(super) fn show(rows: &[Row], output: &Path, what: &str, progress: &mut dyn Progress) {
+    let Some((png, _)) = picture(rows) else { return };
+    let name = output.to_string_lossy();
+    let stem = name.strip_suffix(".nii.gz").map_or_else(|| output.with_extension(""), PathBuf::from);
+    let path = PathBuf::from(format!("{}_refused.png", stem.display()));
+    if write_whole(&path, &png).is_ok() {
+        progress.odd(&path.display().to_string(), &format!("look here first: {what}"));
+    }
+}
 
 /// Keeps what can be known of a refusal in the case folder. `step` is where it ended; `before` are the stages that are there.
 ///

@@ -2,6 +2,8 @@
 
 use super::error::{AskedError, InputError, WorkflowError};
 use super::inputs::read_mask_of;
+use super::progress::Progress;
+use super::refusal::show;
 use super::settings::Settings;
 use super::user_file::read_input;
 use super::warning::{Warning, all_of};
@@ -11,6 +13,7 @@ use crate::image::Volume;
 use crate::image::nifti::{self, NiftiImage};
 use crate::register::transform_text::{to_itk_text, to_matrix_text};
 use crate::register::{FitQuality, FitWarning, RigidFit, RigidMasks, register_rigid, register_two_scans};
+use crate::report::refusal::{Row, as_scanned};
 use crate::segment::pose_of_head;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -82,7 +85,11 @@ pub struct Registered {
 ///
 /// # Errors
 /// An image or mask that cannot be used, images that cannot be registered, the disk's.
-pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Registered, WorkflowError> {
+pub fn register_files(
+    files: &RegisterFiles,
+    settings: &Settings,
+    progress: &mut dyn Progress,
+) -> Result<Registered, WorkflowError> {
     if files.output.is_dir() {
         return Err(InputError::Folder { path: files.output.clone() }.into());
     }
@@ -99,9 +106,18 @@ pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Regi
         Onto::Image { fixed, .. } => fixed.display().to_string(),
     };
     let images = format!("{} onto {onto}", files.moving.display());
-    let refused = |source| WorkflowError::Rigid { images: images.clone(), source };
+    let look = |seen: &[&Volume<f32, Native>], progress: &mut dyn Progress| {
+        let rows: Vec<Row> = seen.iter().map(|image| as_scanned(image)).collect();
+        show(&rows, &transform, "what was to be registered, as it was given (above what was to be moved)", progress);
+    };
+    let refused = |seen: &[&Volume<f32, Native>], progress: &mut dyn Progress, source| {
+        look(seen, progress);
+        WorkflowError::Rigid { images: images.clone(), source }
+    };
+    let fixed_image;
+    let mut seen = vec![&moving];
     let (found, quality, doubts) = match &files.onto {
-        Onto::Template => parts(pose_of_head(&moving).map_err(refused)?),
+        Onto::Template => parts(pose_of_head(&moving).map_err(|source| refused(&seen, progress, source))?),
         Onto::Image { fixed, moving_mask, fixed_mask } => {
             let mask = |path: &Option<PathBuf>, of: &Volume<f32, Native>, warnings: &mut Vec<Warning>| {
                 path.as_deref().map(|path| read_mask_of(path, &of.grid, &settings.image, warnings)).transpose()
@@ -118,7 +134,9 @@ pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Regi
             } else {
                 register_rigid(&moving, &fixed, masks, &settings.register)
             };
-            parts(found.map_err(refused)?)
+            fixed_image = fixed;
+            seen.push(&fixed_image);
+            parts(found.map_err(|source| refused(&seen, progress, source))?)
         }
     };
     warnings.extend(doubts.iter().cloned().map(Warning::from));
@@ -128,6 +146,9 @@ pub fn register_files(files: &RegisterFiles, settings: &Settings) -> Result<Regi
         std::fs::remove_file(&transform).ok();
     })?;
     let doubtful = doubts.iter().find(|doubt| matches!(doubt, FitWarning::LowSimilarity { .. }));
+    if doubtful.is_some() {
+        look(&seen, progress);
+    }
     let refused = doubtful.map(|doubt| format!("{images}: {doubt}")).into_iter().collect();
     Ok(Registered { transform, itk_transform, quality, warnings, refused })
 }

@@ -3,12 +3,13 @@
 use super::error::{AskedError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::progress::Progress;
+use super::refusal::show;
 use super::settings::Settings;
 use super::user_file::read_input;
 use super::warning::Warning;
 use crate::artefact::{check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
-use crate::report::refusal::{Row, as_scanned, picture, posed};
+use crate::report::refusal::{as_scanned, posed};
 use crate::segment::{
     PosedScan, ScanQuality, SegmentOverrides, TissueVolumes, pose_of_head, scan_quality, segment_head,
 };
@@ -70,7 +71,8 @@ pub fn segment_file(
     progress.begin("segment", 2);
     progress.doing("to MNI");
     let unposed = |source| {
-        show(as_scanned(&t1), files, ("as it was given", "to MNI"), progress);
+        let what = "the scan as it was given, when the step `to MNI` ended";
+        show(&[as_scanned(&t1)], &files.output, what, progress);
         WorkflowError::Rigid { images: name.clone(), source }
     };
     let fit = pose_of_head(&t1).map_err(unposed)?;
@@ -79,13 +81,14 @@ pub fn segment_file(
     let overrides = SegmentOverrides { brain: own.as_ref(), ..SegmentOverrides::default() };
     let scan = PosedScan::new(&t1, &fit.fixed_from_moving);
     let unlabelled = |source| {
-        show(posed(&t1, &fit.fixed_from_moving), files, ("in the pose that was found", "labels"), progress);
+        let what = "the scan in the pose that was found, when the step `labels` ended";
+        show(&[posed(&t1, &fit.fixed_from_moving)], &files.output, what, progress);
         WorkflowError::Head { scan: name, source }
     };
     let (found, template) =
         segment_head(&scan, &overrides, &settings.deformable, &settings.segment).map_err(unlabelled)?;
     let correlation = Some(template.quality.correlation[1]);
-    let quality = scan_quality(&scan, &found.labels, &template.atlas_from_subject, correlation);
+    let quality = scan_quality(&scan, (&found.labels, &found.regions), &template.atlas_from_subject, correlation);
     progress.end();
 
     let (labels, brain) = if files.in_mni {
@@ -98,18 +101,7 @@ pub fn segment_file(
         write_whole(path, &brain)?;
     }
     warnings.extend(fit.warnings.into_iter().map(Warning::from));
-    warnings.extend(found.warnings.into_iter().map(Warning::from));
+    warnings.extend(found.warnings.into_iter().chain(quality.of_regions()).map(Warning::from));
     let labels = files.output.clone();
     Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, quality, warnings })
-}
-
-/// A picture of the scan beside the labels that could not be made; what goes wrong with it is not worth a second message.
-fn show(row: Row, files: &SegmentFiles, (how, step): (&str, &str), progress: &mut dyn Progress) {
-    let Some((png, _)) = picture(&[row]) else { return };
-    let labels = files.output.to_string_lossy();
-    let path = PathBuf::from(format!("{}_refused.png", labels.strip_suffix(".nii.gz").unwrap_or(&labels)));
-    if write_whole(&path, &png).is_ok() {
-        let what = format!("look here first: the scan {how}, when the step `{step}` ended");
-        progress.odd(&path.display().to_string(), &what);
-    }
 }

@@ -42,7 +42,7 @@ pub fn bars() -> Vec<Bar> {
             continue;
         };
         for &seed in seeds {
-            let mishap = Mishap::drawn(&t1, seed);
+            let mishap = Mishap::drawn(&t1, seed, 1.0);
             let name = if kept.is_some() { format!("{head}_{seed}") } else { "hurt".to_owned() };
             let file = folder.join(format!("{name}.nii.gz"));
             std::fs::write(&file, encode_f32(&mishap.scan)).unwrap();
@@ -86,21 +86,22 @@ fn wanted() -> Vec<(String, Vec<u64>)> {
     words.split_whitespace().map(of_head).collect()
 }
 
-fn scan(path: &Path) -> Volume<f32, Native> {
+pub fn scan(path: &Path) -> Volume<f32, Native> {
     let name = path.display().to_string();
     decode(&std::fs::read(path).unwrap(), &name, &ReadOptions::default()).unwrap().volume
 }
 
 /// A hurt scan and the way back.
-struct Mishap {
-    scan: Volume<f32, Native>,
+pub struct Mishap {
+    pub scan: Volume<f32, Native>,
     unhurt_from_hurt: RigidTransform<Native, Native>,
     zoom: f64,
-    words: String,
+    pub words: String,
 }
 
 impl Mishap {
-    fn drawn(t1: &Volume<f32, Native>, seed: u64) -> Self {
+    /// Noise and shading are `severity` times what they are in the usual mishap.
+    pub fn drawn(t1: &Volume<f32, Native>, seed: u64, severity: f64) -> Self {
         let rng = CounterRng::new(seed, 77);
         let draw = |n: u64| 2.0 * rng.uniform(n) - 1.0;
         let happens = |n: u64, share: f64| rng.uniform(n) < share;
@@ -123,8 +124,8 @@ impl Mishap {
         let mut scan = resample(t1, &grid, &unhurt_from_hurt.to_affine(), Interpolation::Linear, 0.0).volume;
         let brightest = scan.data.iter().copied().fold(0.0f32, f32::max);
         let inverted = happens(26, 0.1);
-        let (shade, gain) = (direction(6), 0.7 * rng.uniform(27));
-        let noise_sd = 0.04 * rng.uniform(28) * f64::from(brightest);
+        let (shade, gain) = (direction(6), severity * 0.7 * rng.uniform(27));
+        let noise_sd = severity * 0.04 * rng.uniform(28) * f64::from(brightest);
         let missing = if happens(29, 0.2) { 1 + (5.0 * rng.uniform(30)) as usize } else { 0 };
         let first_missing = dims[2] / 4 + (rng.uniform(31) * dims[2] as f64 / 2.0) as usize;
         for n in 0..scan.data.len() {
@@ -150,9 +151,21 @@ impl Mishap {
     /// Dice of the brains, on the hurt scan.
     fn agreement(&self, found: &LabelMap<Native>, unhurt: &LabelMap<Native>) -> f64 {
         let grid = self.scan.grid;
-        let true_size = Grid::new(grid.dims, Matrix4::new_scaling(1.0 / self.zoom) * grid.mm_from_voxel);
-        let expected = labels_on(unhurt, &true_size.expect("a grid"), &self.unhurt_from_hurt);
+        let expected = self.on_hurt(unhurt);
         let brain = |l: &LabelMap<Native>| Mask::from_data(grid, l.data.iter().map(|&l| l > 0).collect());
         brain(found).dice(&brain(&expected))
+    }
+
+    /// Labels of the unhurt head, on the hurt scan.
+    pub fn on_hurt(&self, unhurt: &LabelMap<Native>) -> LabelMap<Native> {
+        let grid = self.scan.grid;
+        let true_size = Grid::new(grid.dims, Matrix4::new_scaling(1.0 / self.zoom) * grid.mm_from_voxel);
+        let labels = labels_on(unhurt, &true_size.expect("a grid"), &self.unhurt_from_hurt);
+        Volume::from_data(grid, labels.data)
+    }
+
+    /// Where a place of the hurt scan lies on the unhurt head.
+    pub fn unhurt_place(&self, p: Position<Native>) -> Position<Native> {
+        self.unhurt_from_hurt.apply(Position::from_point(p.mm / self.zoom))
     }
 }

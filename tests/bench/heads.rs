@@ -125,7 +125,7 @@ fn against_freesurfer(heads: &Path, folder: &Path) -> Vec<Bar> {
 }
 
 /// A volume of bytes or 32-bit integers in FreeSurfer's MGH format (big endian; a header of 284 bytes), gzipped.
-fn mgz(path: &Path) -> Option<Volume<f32, Native>> {
+pub fn mgz(path: &Path) -> Option<Volume<f32, Native>> {
     let mut bytes = Vec::new();
     flate2::read::GzDecoder::new(std::fs::File::open(path).ok()?).read_to_end(&mut bytes).ok()?;
     let whole = |at: usize| i32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());

@@ -6,6 +6,7 @@ mod bytes;
 #[path = "../it/cluster.rs"]
 mod cluster;
 mod cohort;
+mod confidence;
 mod contact;
 mod corruptions;
 mod evidence;
@@ -46,6 +47,7 @@ fn main() {
         ("imaging", imaging::bars),
         ("heads", heads::bars),
         ("corruptions", corruptions::bars),
+        ("confidence", confidence::bars),
         ("mesh", mesh::bars),
         ("material", material::bars),
         ("study-level", study_level::bars),

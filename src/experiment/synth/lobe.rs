@@ -2,7 +2,7 @@
 //! measuring.
 
 use crate::geometry::{Mni, Position};
-use crate::segment::atlas::{Side, temporal_lobe};
+use crate::segment::atlas::{Side, above_sylvian, central_mm, temporal_lobe};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,9 +42,7 @@ impl Lobe {
     pub(super) fn holds(self, side: Side, p: Position<Mni>) -> bool {
         let own_side = if side == Side::Left { p.mm.x < -2.0 } else { p.mm.x > 2.0 };
         let [x, y, z] = [p.mm.x.abs(), p.mm.y, p.mm.z];
-        // The Sylvian fissure, and the central sulcus from there up and back to the vertex.
-        let above_sylvian = z > -2.0 - 0.35 * (y - 10.0);
-        let central_mm = -5.0 - 0.45 * (z - 15.0).max(0.0);
+        let (above_sylvian, central_mm) = (above_sylvian(y, z), central_mm(z));
         own_side
             && match self {
                 Self::Temporal => temporal_lobe(p) == Some(side),

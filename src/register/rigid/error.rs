@@ -56,10 +56,30 @@ pub enum RegisterError {
     /// The images do not overlap at any pose tried.
     #[error("no pose was found at which the images share information: are both T1 images of a head?")]
     NoOverlap,
+    /// The head has another size in the two scans.
+    #[error(
+        "the head is {percent:.1} % {} in the fixed image than in the moving one from {along} (voxel axis {axis} of the moving \
+         image; up to {most} % are taken for one head): the voxel size or slice spacing in one of the headers is wrong (slices with a gap between them lie \
+         their thickness and the gap apart); compare both headers with the scanner's protocol and convert that scan again",
+        if *longer { "longer" } else { "shorter" }
+    )]
+    OtherSize {
+        /// How much longer or shorter, percent.
+        percent: f64,
+        /// The fixed image's head is the longer one.
+        longer: bool,
+        /// Where the axis runs in the head.
+        along: &'static str,
+        /// The moving image's voxel axis along which they differ most: i, j or k.
+        axis: char,
+        /// What is taken for one head, percent.
+        most: f64,
+    },
     /// No pose makes a head of it.
     #[error(
         "no pose was found at which the image looks like a head (likeness {likeness:.2}, at least {least:.2} is needed): it must \
-         be a T1-weighted scan that shows most of the brain; check its orientation in a viewer"
+         be a T1-weighted scan that shows most of the brain; where it is one its header has it upside down, or its voxel size is \
+         wrong: check both in a viewer"
     )]
     NoHead {
         /// Mean local correlation with the mean head at the best pose.

@@ -10,7 +10,9 @@ use crate::register::head;
 use crate::register::mutual_information::{Bins, Interpolated, Pose};
 use crate::register::pyramid::{on_grid_of, reduced_to};
 use crate::register::sample::{Draw, draw};
-use crate::register::search::{Freedom, Level, Measure, Optimum, Reach, coarse, optimise, rank, turns_about_axes};
+use crate::register::search::{
+    Freedom, Level, Measure, Optimum, Reach, TETHER, coarse, optimise, rank, turns_about_axes,
+};
 use nalgebra::Matrix3;
 
 /// Resolution at which a head is told from air, mm.
@@ -121,8 +123,13 @@ pub(super) fn fit_near(
     Ok(optimise(&level, &start, Freedom::Rigid, None, pair.finest()).pose)
 }
 
-/// The pose that takes the sampled image onto the other one, and how far it can be trusted.
-pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Result<(Pose, FitQuality), RegisterError> {
+/// The pose that takes the sampled image onto the other one, how far it can be trusted, and the linear map near it that would
+/// do so best.
+pub(super) fn fit(
+    sampled: &Side,
+    other: &Side,
+    settings: &RigidSettings,
+) -> Result<(Pose, FitQuality, Matrix3<f64>), RegisterError> {
     let mut levels_mm = vec![settings.start_level_mm];
     levels_mm.extend(&settings.levels_mm);
     let pair = Pair::new(sampled, other, &levels_mm, settings);
@@ -197,8 +204,15 @@ pub(super) fn fit(sampled: &Side, other: &Side, settings: &RigidSettings) -> Res
         distinctness,
         mirrored_ratio,
         evaluations,
+        size: None,
     };
-    Ok((pose, quality))
+    let stopping = Stopping {
+        longest_step_mm: 0.5 * first.spacing_mm,
+        shortest_step_mm: 0.01 * first.spacing_mm,
+        evaluations: 60,
+    };
+    let linear = optimise(&first, &pose, Freedom::Affine(TETHER), None, stopping).pose.linear;
+    Ok((pose, quality, linear))
 }
 
 fn refine_all(level: &Level<'_>, poses: &[Pose]) -> Vec<Pose> {

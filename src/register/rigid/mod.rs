@@ -5,12 +5,14 @@ mod fit;
 mod quality;
 mod settings;
 mod side;
+mod size;
 #[cfg(test)]
 mod tests;
 
 pub use error::RegisterError;
 pub use quality::{FitQuality, FitWarning};
 pub use settings::RigidSettings;
+pub use size::RelativeSize;
 
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::{Mask, Volume};
@@ -70,7 +72,12 @@ pub fn register_rigid<M: Frame, F: Frame>(
     let fixed = side("fixed", fixed, masks.fixed)?;
     let sample_moving = is_moving_sampled(&moving, &fixed);
     let (sampled, other) = if sample_moving { (&moving, &fixed) } else { (&fixed, &moving) };
-    let (pose, quality) = fit(sampled, other, settings)?;
+    let (pose, mut quality, linear) = fit(sampled, other, settings)?;
+    // The part that a mask names may change its size; the head does not.
+    if moving.mask.is_none() && fixed.mask.is_none() {
+        let linear = if sample_moving { Some(linear) } else { linear.try_inverse() };
+        quality.size = linear.map(|linear| RelativeSize::of(&linear, &moving));
+    }
     let other_from_sampled = transform_of(&pose);
     let fixed_from_moving = if sample_moving { other_from_sampled } else { other_from_sampled.inverse() };
     Ok(RigidFit { fixed_from_moving: fixed_from_moving.relabelled(), quality, warnings: quality.warnings() })

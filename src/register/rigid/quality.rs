@@ -1,7 +1,14 @@
 //! How far a fit can be trusted.
 
+use super::{RegisterError, RelativeSize};
 use serde::Serialize;
 use thiserror::Error;
+
+/// Two scans of one head differ less in size than this, percent, whatever was taken out, has sunk, or was scanned how
+/// (docs/evidence/choices.md).
+const NOTED_PERCENT: f64 = 2.0;
+/// The mirror image has less than this of the information where both scans are of one head, in whatever size.
+const ONE_HEAD: f64 = 0.9;
 
 /// Figures that describe a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -19,9 +26,28 @@ pub struct FitQuality {
     pub mirrored_ratio: Option<f64>,
     /// Evaluations of mutual information with gradient.
     pub evaluations: usize,
+    /// How much longer the head is in one of two scans of it; `None` where none or only parts of them were compared so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<RelativeSize>,
 }
 
 impl FitQuality {
+    /// Where one head differs in length by more than this, percent: along, the moving image's voxel axis, and by how much the
+    /// fixed image's is longer. Two heads have two sizes by right.
+    fn other_size(&self, most: f64) -> Option<(&'static str, char, f64)> {
+        let size = self.size.filter(|_| self.mirrored_ratio.is_none_or(|ratio| ratio < ONE_HEAD))?;
+        let worst = size.worst();
+        let percent = size.longer_percent[worst];
+        (percent.abs() > most).then_some((size.along[worst], ['i', 'j', 'k'][worst], percent))
+    }
+
+    /// Refuses scans of one head that no motion takes onto each other.
+    pub(in crate::register) fn check_size(&self, most: f64) -> Result<(), RegisterError> {
+        self.other_size(most).map_or(Ok(()), |(along, axis, percent)| {
+            Err(RegisterError::OtherSize { percent: percent.abs(), longer: percent > 0.0, along, axis, most })
+        })
+    }
+
     /// What the figures give reason to look at.
     pub(in crate::register) fn warnings(&self) -> Vec<FitWarning> {
         let mut warnings = Vec::new();
@@ -31,6 +57,9 @@ impl FitQuality {
         }
         if overlap < 0.5 {
             warnings.push(FitWarning::LittleOverlap { overlap });
+        }
+        if let Some((along, _, percent)) = self.other_size(NOTED_PERCENT) {
+            warnings.push(FitWarning::OtherSize { along, percent });
         }
         if let Some(mirrored_ratio) = mirrored_ratio.filter(|&r| r > 1.0) {
             warnings.push(FitWarning::MirrorFitsBetter { mirrored_ratio });
@@ -58,6 +87,19 @@ pub enum FitWarning {
     LittleOverlap {
         /// See [`FitQuality::overlap`].
         overlap: f64,
+    },
+    /// One head in two sizes.
+    #[error(
+        "from {along} the head is {:.1} % {} in the fixed image than in the moving one: check the voxel size and the slice spacing \
+         in both headers, lengths may be off by as much",
+        percent.abs(),
+        if *percent > 0.0 { "longer" } else { "shorter" }
+    )]
+    OtherSize {
+        /// Where the axis runs in the head.
+        along: &'static str,
+        /// How much longer, percent.
+        percent: f64,
     },
     /// Left and right may be exchanged.
     #[error(

@@ -20,6 +20,9 @@ pub struct RigidSettings {
     pub tolerance_mm: f64,
     /// Whether the mirror image is tried too, to warn of exchanged sides; useless against a symmetric template.
     pub try_mirror: bool,
+    /// How much longer along an axis a head may be in one of two scans of it than in the other, percent: more is a wrong voxel
+    /// size in one header, and no motion takes one scan onto the other.
+    pub largest_size_difference_percent: f64,
     /// Seed of the sampling pattern.
     pub seed: u64,
 }
@@ -33,6 +36,7 @@ impl Default for RigidSettings {
             samples: 250_000,
             tolerance_mm: 1e-3,
             try_mirror: true,
+            largest_size_difference_percent: 3.5,
             seed: 1,
         }
     }
@@ -59,6 +63,10 @@ impl RigidSettings {
         }
         if self.samples < 1000 {
             return refuse("samples", self.samples as f64, "at least 1000");
+        }
+        if !(self.largest_size_difference_percent > 0.0 && self.largest_size_difference_percent <= 100.0) {
+            let value = self.largest_size_difference_percent;
+            return refuse("largest_size_difference_percent", value, "above 0 and at most 100 percent");
         }
         if !(self.tolerance_mm > 0.0 && self.tolerance_mm <= 1.0) {
             return refuse("tolerance_mm", self.tolerance_mm, "above 0 and at most 1 mm");

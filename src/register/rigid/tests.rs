@@ -227,3 +227,29 @@ fn images_without_information_and_wrong_settings_are_refused() {
     let few = RigidSettings { histogram_bins: 2, ..usual };
     assert!(try_with(&ramp, None, &few).contains("histogram_bins"));
 }
+
+#[test]
+fn a_wrong_slice_spacing_in_one_header_is_refused_with_axis_and_amount_and_a_right_one_is_not() {
+    let (head_from_pre, head_from_post) = known_motion();
+    let pre = scan(&ras(3.0, [105.0, 125.0, 112.0]), &head_from_pre, 1.0, 5);
+    let post = scan(&ras::<Post>(3.0, [110.0, 128.0, 115.0]), &head_from_post, 0.8, 6);
+    // The model head is nearly its own mirror image, which says nothing of whose it is.
+    let settings = RigidSettings { levels_mm: vec![4.0, 3.0], try_mirror: false, ..RigidSettings::default() };
+    let sizes = register_two_scans(&post, &pre, &settings).unwrap().quality.size.unwrap().longer_percent;
+    assert!(sizes.iter().all(|percent| percent.abs() < 1.0), "{sizes:?}");
+    for (axis, times) in [(2, 1.06), (0, 0.95)] {
+        let mut affine = post.grid.mm_from_voxel;
+        for row in 0..3 {
+            affine[(row, axis)] *= times;
+        }
+        let wrong = Volume::from_data(Grid::<Post>::new(post.grid.dims, affine).unwrap(), post.data.clone());
+        let Err(RegisterError::OtherSize { percent, longer, axis: told, .. }) =
+            register_two_scans(&wrong, &pre, &settings)
+        else {
+            panic!("{axis} {times}")
+        };
+        let made = 100.0 * (1.0 / times - 1.0);
+        assert_eq!((told, longer), (['i', 'j', 'k'][axis], made > 0.0));
+        assert!((percent - f64::abs(made)).abs() < 1.0, "{percent} for {made}");
+    }
+}

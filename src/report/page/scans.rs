@@ -3,7 +3,7 @@
 use super::super::look_first::{LookFirst, SubjectRisk, scan_measures};
 use super::super::scan_measure::{SCAN_MEASURES, ScanMeasure, WhichScan};
 use super::results::{Row, table, words};
-use crate::segment::ScanQualities;
+use crate::segment::{Region, ScanQualities};
 use maud::{Markup, html};
 
 /// A line for each measure; nothing where no scan was measured.
@@ -22,11 +22,40 @@ pub fn of_case(scans: &ScanQualities) -> Option<Markup> {
     let rows: Vec<Row> = SCAN_MEASURES.iter().map(row).collect();
     Some(html! {
         (table("Quality of the scans", &head, &rows))
+        (by_regions(scans, &shown))
         p {
             "Measured on the scans as they are, with the labels that were found. None of these numbers is a verdict: they are for \
              comparing scans of one protocol, and hgm warns by itself of what it cannot work with."
         } "\n"
     })
+}
+
+/// A line for each part of the brain that is cut or less sure than the others would be; nothing where none was told apart.
+fn by_regions(scans: &ScanQualities, shown: &[WhichScan]) -> Markup {
+    let of = |which: WhichScan| which.of(Some(scans)).map_or(&[][..], |scan| &scan.regions[..]);
+    let sure = |which: WhichScan| of(which).iter().any(|part| part.confidence_percent.is_some());
+    if shown.iter().all(|which| of(*which).is_empty()) {
+        return html! {};
+    }
+    let columns: Vec<(WhichScan, bool)> = shown
+        .iter()
+        .flat_map(|&which| [(which, false)].into_iter().chain(sure(which).then_some((which, true))))
+        .collect();
+    let name = |&(which, labels): &(WhichScan, bool)| {
+        let what = if labels { "labels expected to be right" } else { "outside the scan" };
+        format!("{what}, {}", which.in_words())
+    };
+    let head: Vec<String> = std::iter::once("part of the brain".to_owned()).chain(columns.iter().map(name)).collect();
+    let row = |region: Region| -> Row {
+        let cell = |&(which, labels): &(WhichScan, bool)| {
+            let part = of(which).iter().find(|part| part.region == region);
+            let value = part.and_then(|p| if labels { p.confidence_percent } else { Some(p.outside_percent) });
+            value.map_or_else(|| "–".to_owned(), |value| format!("{value:.0} %"))
+        };
+        (false, words(std::iter::once(region.name().to_owned()).chain(columns.iter().map(cell))))
+    };
+    let rows: Vec<Row> = Region::ALL.into_iter().map(row).collect();
+    html! { (table("Parts of the brain", &head, &rows)) }
 }
 
 /// The order with its reasons: cells of a row, after the subject's own.

@@ -256,6 +256,7 @@ fn scan(contrast_to_noise: f64, air: Air) -> ScanQuality {
         voxel_mm: [1.0, 1.0, 1.2],
         anisotropy: 1.2,
         template_correlation: None,
+        regions: Vec::new(),
     }
 }
 

@@ -13,7 +13,10 @@ mod gain;
 
 pub use air::Air;
 
+use super::confidence::{RegionEvidence, UNSURE_PERCENT};
 use super::posed_scan::PosedScan;
+use super::region::Region;
+use super::segmentation::SegmentWarning;
 use crate::geometry::{Frame, Mni};
 use crate::image::LabelMap;
 use crate::register::deformable::DisplacementField;
@@ -54,6 +57,52 @@ pub struct ScanQuality {
     /// Mean local correlation of the fitted template with the scan over the brain, -1 to 1, where the template was fitted to it.
     #[serde(default)]
     pub template_correlation: Option<f64>,
+    /// The parts of the brain by name.
+    #[serde(default)]
+    pub regions: Vec<RegionQuality>,
+}
+
+/// How far a part of the brain can be relied on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionQuality {
+    /// The part.
+    pub region: Region,
+    /// Share of it that lies outside the field of view, percent; lost slices count as outside.
+    pub outside_percent: f64,
+    /// Share of its labelled voxels that are expected to be right, percent, by what such evidence came with on heads with known
+    /// labels. Absent where labels were given, nothing was fitted to the scan, or hardly any of the part is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confidence_percent: Option<f64>,
+}
+
+/// A part with as much of it outside is told of, percent: a slice of 3 mm off a lobe's end.
+const OUTSIDE_PERCENT: f64 = 5.0;
+
+impl ScanQuality {
+    /// What a reader should know of single parts of the brain.
+    pub fn of_regions(&self) -> Vec<SegmentWarning> {
+        let outside = self.regions.iter().filter(|r| r.outside_percent >= OUTSIDE_PERCENT);
+        let mut parts: Vec<(Region, f64)> = outside.map(|r| (r.region, r.outside_percent)).collect();
+        let unsure = |r: &RegionQuality| Some((r.region, r.confidence_percent.filter(|c| *c < UNSURE_PERCENT)?));
+        let mut doubtful: Vec<(Region, f64)> = self.regions.iter().filter_map(unsure).collect();
+        // The worst first.
+        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let outside = (!parts.is_empty()).then_some(SegmentWarning::RegionsOutside { parts });
+        let unsure = (!doubtful.is_empty()).then_some(SegmentWarning::UnsureRegions { parts: doubtful });
+        outside.into_iter().chain(unsure).collect()
+    }
+
+    /// The largest share of any part that lies outside, percent.
+    pub fn most_outside_percent(&self) -> Option<f64> {
+        self.regions.iter().map(|r| r.outside_percent).reduce(f64::max)
+    }
+
+    /// The confidence of the least sure part, percent.
+    pub fn least_confidence_percent(&self) -> Option<f64> {
+        self.regions.iter().filter_map(|r| r.confidence_percent).reduce(f64::min)
+    }
 }
 
 /// The measures of a case's scans; a prediction has none after the operation.
@@ -68,10 +117,10 @@ pub struct ScanQualities {
     pub post: Option<ScanQuality>,
 }
 
-/// Measures a scan with its labels (on its own grid); `template_from_patient` maps the MNI frame reached rigidly to the template.
+/// Measures a scan with its labels (on its own grid) and what speaks for them (nothing, where they were given); `template_from_patient` maps the MNI frame reached rigidly to the template.
 pub fn scan_quality<F: Frame>(
     scan: &PosedScan<'_, F>,
-    labels: &LabelMap<F>,
+    (labels, evidence): (&LabelMap<F>, &[RegionEvidence]),
     template_from_patient: &DisplacementField<Mni>,
     template_correlation: Option<f64>,
 ) -> ScanQuality {
@@ -85,17 +134,23 @@ pub fn scan_quality<F: Frame>(
     let voxel_mm = t1.grid.spacing_mm();
     let [shortest, longest] =
         [voxel_mm.iter().fold(f64::INFINITY, |a, b| a.min(*b)), voxel_mm.iter().fold(0.0, |a, b| b.max(a))];
+    let covered = coverage::coverage(scan, template_from_patient);
+    let regions = Region::ALL.into_iter().zip(covered.outside_percent).map(|(region, outside_percent)| {
+        let own = evidence.iter().find(|own| own.region == region);
+        RegionQuality { region, outside_percent, confidence_percent: own.map(|own| 100.0 * own.confidence()) }
+    });
     ScanQuality {
         contrast_to_noise: tissue.as_ref().and_then(|t| t.contrast_to_noise(air_deviation)),
         white_signal_to_noise: tissue.as_ref().and_then(contrast::Tissues::white_signal_to_noise),
         entropy_focus: told.then(|| focus::entropy_focus(t1)).flatten(),
         air_artefact_percent: seen.noise.map(|noise| noise.artefact_percent),
         air: seen.air,
-        coverage_percent: coverage::percent(scan, template_from_patient),
+        coverage_percent: covered.percent,
         gain_times: gain.map(|gain| gain.times),
         voxel_mm,
         anisotropy: longest / shortest,
         template_correlation,
+        regions: regions.collect(),
     }
 }
 

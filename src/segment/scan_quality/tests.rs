@@ -62,7 +62,7 @@ fn measured(t1: &Volume<f32, Pre>, labels: &LabelMap<Pre>) -> ScanQuality {
 fn measured_on(t1: &Volume<f32, Pre>, labels: &LabelMap<Pre>, pose: &RigidTransform<Pre, Mni>) -> ScanQuality {
     let coarse = Grid::<Mni>::axis_aligned([8; 3], [30.0; 3], [-105.0; 3]);
     let same = DisplacementField::from_displacement(&Volume::filled(coarse, [0f32; 3]));
-    scan_quality(&PosedScan::new(t1, pose), labels, &same, None)
+    scan_quality(&PosedScan::new(t1, pose), (labels, &[]), &same, None)
 }
 
 /// What can be told of a scan with air, as numbers, the bad sides upwards.
@@ -201,4 +201,22 @@ fn voxels_are_told_and_a_scan_without_tissue_has_no_contrast() {
     let found = measured(&t1, &labels);
     assert_eq!((found.voxel_mm, found.anisotropy), ([1.0, 1.0, 5.0], 5.0));
     assert_eq!((found.contrast_to_noise, found.white_signal_to_noise, found.gain_times), (None, None, None));
+}
+
+#[test]
+fn a_field_of_view_that_ends_in_a_lobe_names_it_with_its_side() {
+    let Phantom { t1, labels } = clean();
+    let whole = measured(&t1, &labels);
+    assert!(whole.regions.iter().all(|part| part.outside_percent < 0.5), "{:?}", whole.regions);
+    assert_eq!(whole.of_regions(), []);
+    // The patient's left is low x.
+    let cut = VoxelBox { first: [28, 0, 0], end: t1.grid.dims };
+    let cut = measured(&t1.cropped(&cut), &labels.cropped(&cut));
+    let outside = |region: Region| cut.regions.iter().find(|part| part.region == region).unwrap().outside_percent;
+    assert!(outside(Region::LeftTemporal) > 20.0 && outside(Region::RightTemporal) < 0.5, "{:?}", cut.regions);
+    let said = cut.of_regions()[0].to_string();
+    assert!(said.contains("left temporal lobe: ") && said.contains("lies outside the scan"), "{said}");
+    assert!(!said.contains("right"), "{said}");
+    let labels_alone = cut.regions.iter().all(|part| part.confidence_percent.is_none());
+    assert!(labels_alone, "nothing was fitted: nothing is stated");
 }

@@ -16,7 +16,7 @@ use crate::layout::{
 use crate::register::deformable::DisplacementField;
 use crate::resect::{GivenMasks, OperatedBrain, Side, midline_shift_mm, take_pair_apart};
 use crate::segment::native::mask_on;
-use crate::segment::{PosedScan, ScanQualities, atlas, label, scan_quality};
+use crate::segment::{PosedScan, ScanQualities, ScanQuality, atlas, label, scan_quality};
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::inputs::{GivenMask, OwnMasks, ScanSums, Scans};
@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 18;
+const VERSION: u32 = 19;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -155,9 +155,14 @@ pub(crate) fn anat(
         } = take_pair_apart(&pre, &post, &given, &work.settings.anat, step)?;
 
         let quality = ScanQualities {
-            pre: Some(scan_quality(&pre, &before.labels, &template_from_patient, template_correlation)),
+            pre: Some(scan_quality(
+                &pre,
+                (&before.labels, &before.regions),
+                &template_from_patient,
+                template_correlation,
+            )),
             // Nothing was fitted to the scan after the operation but the brain of the one before.
-            post: Some(scan_quality(&post, &after.labels, &template_from_patient, None)),
+            post: Some(scan_quality(&post, (&after.labels, &[]), &template_from_patient, None)),
         };
         work.tell(|p| p.doing("writing"));
         let mut produced = Produced::default();
@@ -189,7 +194,12 @@ pub(crate) fn anat(
         write(NATIVE_RESECTED, encode_mask(&native_resected));
         work.tell(|p| p.end());
 
-        produced.warn(all_of("pre", &before.warnings).chain(all_of("post", &after.warnings)));
+        for (whose, warnings, quality) in
+            [("pre", &before.warnings, &quality.pre), ("post", &after.warnings, &quality.post)]
+        {
+            let of_regions = quality.iter().flat_map(ScanQuality::of_regions).collect::<Vec<_>>();
+            produced.warn(all_of(whose, warnings).chain(all_of(whose, &of_regions)));
+        }
         let spacing = scans.pre.grid.spacing_mm().into_iter().chain(scans.post.grid.spacing_mm());
         produced.facts = facts(&AnatFacts {
             volumes: ResectionVolumes {

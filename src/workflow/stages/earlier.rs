@@ -9,7 +9,7 @@ use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{PRE_BRAIN, PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, TEMPLATE_FIT};
 use crate::register::deformable::{DisplacementField, FieldFrame};
 use crate::resect::HeadApart;
-use crate::segment::{Scale, SegmentWarning, Segmentation, TissueVolumes, atlas};
+use crate::segment::{RegionEvidence, Scale, SegmentWarning, Segmentation, TissueVolumes, atlas};
 use crate::workflow::case::Case;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::stage_name::Subject;
@@ -21,6 +21,8 @@ pub struct HeadFacts {
     pub tissue_means: [f64; 3],
     pub csf_grey_border: f64,
     pub volumes: TissueVolumes,
+    #[serde(default)]
+    pub regions: Vec<RegionEvidence>,
     pub warnings: Vec<SegmentWarning>,
     pub scale: Scale,
     pub fit: FieldFrame,
@@ -43,7 +45,7 @@ impl Earlier {
     /// The head as the prediction has taken it apart.
     pub fn head(&self, pre: &Volume<f32, Pre>) -> Result<HeadApart, WorkflowError> {
         let grid = atlas::template().grid();
-        let HeadFacts { tissue_means, csf_grey_border, volumes, warnings, scale, fit, template_correlation } =
+        let HeadFacts { tissue_means, csf_grey_border, volumes, regions, warnings, scale, fit, template_correlation } =
             &self.head;
         let labels_mni = self.on_mni(self.labels(PRE_LABELS)?, PRE_LABELS)?;
         let brain_mni = self.on_mni(self.labels(PRE_BRAIN)?, PRE_BRAIN)?.map(|l| l > 0);
@@ -67,6 +69,7 @@ impl Earlier {
             tissue_means: *tissue_means,
             csf_grey_border: *csf_grey_border,
             volumes: *volumes,
+            regions: regions.clone(),
             warnings: warnings.clone(),
         };
         let template_from_patient = template_from_patient.ok_or_else(|| self.damaged(TEMPLATE_FIT))?;

@@ -32,7 +32,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -107,7 +107,7 @@ pub(crate) fn plan(
         let (before, template, scale) =
             once(&scan.shared.head, || Ok::<_, WorkflowError>(take_head_apart(&pre, &given, &work.settings.anat)?))?;
         let correlation = template_correlation(&given, template);
-        let quality = scan_quality(&pre, &before.labels, &template.atlas_from_subject, correlation);
+        let quality = scan_quality(&pre, (&before.labels, &before.regions), &template.atlas_from_subject, correlation);
         work.tell(|p| p.step());
         work.tell(|p| p.doing("writing"));
         let resected = mask_on(&scan.resection, &grid, &mni_from_pre.inverse());
@@ -133,7 +133,7 @@ pub(crate) fn plan(
         write(PRE_NATIVE_LABELS, encode_u8(&before.labels));
         write(NATIVE_RESECTED, encode_mask(&scan.resection));
         work.tell(|p| p.end());
-        produced.warn(all_of("pre", &before.warnings));
+        produced.warn(all_of("pre", &before.warnings).chain(all_of("pre", &quality.of_regions())));
         produced.facts = facts(&PlanFacts {
             volumes: ResectionVolumes {
                 cavity_cc: None,
@@ -147,6 +147,7 @@ pub(crate) fn plan(
                 tissue_means: before.tissue_means,
                 csf_grey_border: before.csf_grey_border,
                 volumes: before.volumes,
+                regions: before.regions.clone(),
                 warnings: before.warnings.clone(),
                 scale: *scale,
                 fit,
