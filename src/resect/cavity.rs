@@ -77,14 +77,22 @@ pub struct CavityFinding {
     pub evidence: Option<Evidence>,
 }
 
+/// More of the brain than this outside the field of view is told, percent: as of a scan that is segmented.
+const TOLD_PERCENT: f64 = 2.0;
+
 /// There is no cavity to speak of.
 #[derive(Debug, Error, PartialEq)]
 pub enum ResectError {
     /// Post looks like pre.
     #[error(
         "no operation is seen: no cavity of at least {smallest_cc} cc was found on the post-operative scan (largest loss of \
-         tissue: {largest_cc:.2} cc{}); check that the files are not swapped or the same, or give a cavity mask",
-        doubt.map_or_else(String::new, |d| format!("; {d}"))
+         tissue: {largest_cc:.2} cc{}{}); check that the files are not swapped or the same, or give a cavity mask",
+        doubt.map_or_else(String::new, |d| format!("; {d}")),
+        if *unseen_percent > TOLD_PERCENT {
+            format!("; {unseen_percent:.0} % of the brain lies outside that scan's field of view, where nothing can be seen")
+        } else {
+            String::new()
+        }
     )]
     NoOperation {
         /// The largest candidate.
@@ -93,6 +101,8 @@ pub enum ResectError {
         smallest_cc: f64,
         /// Why the largest candidate is not believed, where it is large enough.
         doubt: Option<Doubt>,
+        /// Share of the brain that the post-operative scan does not show, in percent.
+        unseen_percent: f64,
     },
     /// What pre lacks, post has.
     #[error(
@@ -171,7 +181,9 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
         }
     }
     let Some((seed, evidence)) = believed else {
-        return Err(ResectError::NoOperation { largest_cc, smallest_cc: settings.smallest_cc, doubt });
+        let seen = both(pair.pre_brain, pair.post_known).count() as f64 / pair.pre_brain.count().max(1) as f64;
+        let unseen_percent = 100.0 * (1.0 - seen);
+        return Err(ResectError::NoOperation { largest_cc, smallest_cc: settings.smallest_cc, doubt, unseen_percent });
     };
 
     let grown = grow(&seed, &both(&dark, pair.pre_brain), settings.growth_mm);
@@ -403,6 +415,19 @@ mod tests {
         let unseen = Head { post: h.post.map(|_| 0.0), ..head(12.0) };
         assert!(find_cavity(&pair(&unseen, &h.hole.map(|_| false)), &CavitySettings::default()).is_err());
         assert!(find_cavity(&pair(&h, &known), &CavitySettings::default()).is_err());
+    }
+
+    #[test]
+    fn where_the_second_scan_ends_within_the_brain_no_operation_seen_says_how_much_it_does_not_show() {
+        let h = head(12.0);
+        let told =
+            |known: &Mask<Mni>| find_cavity(&pair(&h, known), &CavitySettings::default()).unwrap_err().to_string();
+        let hidden = told(&h.hole.map(|inside| !inside));
+        let percent = 100.0 * both(&h.hole, &h.brain).count() as f64 / h.brain.count() as f64;
+        assert!(hidden.contains(&format!("{percent:.0} % of the brain lies outside")), "{hidden}");
+        let whole = head(0.0);
+        let seen = find_cavity(&pair(&whole, &whole.brain.map(|_| true)), &CavitySettings::default()).unwrap_err();
+        assert!(!seen.to_string().contains("field of view"), "{seen}");
     }
 
     #[test]

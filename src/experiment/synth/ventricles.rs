@@ -14,9 +14,12 @@ use rayon::prelude::*;
 /// How far from the ventricles the brain makes room, mm.
 const REACH_MM: f64 = 32.0;
 
-/// The furthest that their wall may move, mm: half of what would fold the brain within the reach (a smooth step falls by at most 1.5
-/// over its width).
-const FURTHEST_MM: f64 = 0.5 * REACH_MM / 1.5;
+/// The furthest that their wall may move, mm: less than half the reach, so that the brain beside them keeps more than half its width.
+const FURTHEST_MM: f64 = 15.0;
+
+/// In how many steps it moves. A step is shorter than the smoothing of the distance, so that none folds, and what does not fold
+/// does not fold after another either: in a narrow horn the walls part from its middle, however far they go.
+const STEPS: usize = 12;
 
 /// Anatomy whose ventricles are about `factor` times as large as those of the head under `anatomy`.
 pub fn widened(anatomy: &Field, head: &Head, factor: f64) -> Field {
@@ -50,15 +53,24 @@ impl Wall {
 
     /// From a point of the head with wider ventricles to where it was, with the wall moved out by `wall_mm`.
     fn origin(&self, p: Point3<f64>, wall_mm: f64) -> Vector3<f64> {
+        let step_mm = wall_mm / STEPS as f64;
+        (0..STEPS).fold(p, |q, _| q - step_mm * self.outwards(q)) - p
+    }
+
+    /// The way out of the ventricles: of length 1 at their wall, less further off and in their middle, nothing at the skull.
+    fn outwards(&self, p: Point3<f64>) -> Vector3<f64> {
         const STEP_MM: f64 = 1.0;
         let at = |p: Point3<f64>| self.distance_mm.trilinear(Position::from_point(p)).map(f64::from);
+        let t = (1.0 - at(p).unwrap_or(REACH_MM).max(0.0) / REACH_MM).clamp(0.0, 1.0);
+        let free = self.free.trilinear(Position::from_point(p)).map_or(0.0, f64::from);
+        if t * free <= 0.0 {
+            return Vector3::zeros();
+        }
         let slope = [0, 1, 2].map(|a| {
             let step = Vector3::ith(a, STEP_MM);
             at(p + step).zip(at(p - step)).map_or(0.0, |(up, down)| (up - down) / (2.0 * STEP_MM))
         });
-        let t = (1.0 - at(p).unwrap_or(REACH_MM).max(0.0) / REACH_MM).clamp(0.0, 1.0);
-        let free = self.free.trilinear(Position::from_point(p)).map_or(0.0, f64::from);
-        -wall_mm * free * t * t * (3.0 - 2.0 * t) * Vector3::from(slope)
+        free * t * t * (3.0 - 2.0 * t) * Vector3::from(slope)
     }
 
     /// How far the wall moves so that the ventricles become `factor` times as large; as far as it may where that is not enough.
@@ -67,6 +79,8 @@ impl Wall {
         let near: Vec<Point3<f64>> = (0..grid.len())
             .into_par_iter()
             .filter(|&n| f64::from(self.distance_mm.data[n]) < FURTHEST_MM + 2.0)
+            // Every other voxel along each axis says the volume well enough.
+            .filter(|&n| grid.voxel(n).iter().all(|x| x % 2 == 0))
             .map(|n| grid.centre(grid.voxel(n)).mm)
             .collect();
         let inside = |wall_mm: f64| {
@@ -75,7 +89,7 @@ impl Wall {
         };
         let wanted = factor * inside(0.0);
         let (mut low, mut high) = (0.0, FURTHEST_MM);
-        for _ in 0..16 {
+        for _ in 0..12 {
             let middle = 0.5 * (low + high);
             if inside(middle) < wanted { low = middle } else { high = middle }
         }
@@ -114,7 +128,7 @@ mod tests {
                     step + (field.at(p + step) - field.at(p - step)) / 2.0
                 });
                 let volume = nalgebra::Matrix3::from_columns(&columns).determinant();
-                assert!(volume > 0.0, "{volume} at {p}");
+                assert!(volume > 0.0, "{volume} at {p} for {factor}");
                 let skull_mm = head.skull_mm.trilinear(Position::from_point(p)).unwrap_or(1.0);
                 assert!(skull_mm < 0.0 || field.at(p).norm() < 0.3, "{} at {p}", field.at(p).norm());
             }
