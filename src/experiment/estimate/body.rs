@@ -1,6 +1,6 @@
 //! The solver as a forward model: log-moduli in, distances to what was observed out.
 
-use super::fluid::FluidLevels;
+use super::fluid_levels::FluidLevels;
 use super::levenberg_marquardt::{Forward, Linearisation};
 use super::{LogPrior, Scale};
 use crate::experiment::observed::ObservedSurfaces;

@@ -10,6 +10,7 @@ mod displacement;
 mod evidence;
 mod findings;
 mod fluid;
+mod fluid_levels;
 mod independent;
 mod levenberg_marquardt;
 mod mesh_error;
@@ -31,7 +32,8 @@ pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
 pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, STRONG, Unexplained, weights};
 pub use findings::{Odds, ProblemError, Shift};
-pub use fluid::{FluidLevels, FluidOutcome, prior_of_drained};
+pub use fluid::{FluidOutcome, prior_of_drained};
+pub use fluid_levels::FluidLevels;
 pub use levenberg_marquardt::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, estimate,
 };
