@@ -16,8 +16,16 @@ use serde::{Deserialize, Serialize};
 const STRIDE: usize = 3;
 /// With fewer looked-at voxels of grey or of white matter than this a part says nothing by itself.
 const FEW: f64 = 100.0;
-/// A part of which fewer labels are expected to be right is told of, percent.
-pub(super) const UNSURE_PERCENT: f64 = 75.0;
+/// A part of which fewer labels are expected to be right is told of, percent: where less was stated two of three parts were wrong by
+/// more than that.
+const UNSURE_PERCENT: f64 = 75.0;
+/// So much below the usual it must be, too: in the brainstem grey and white matter are hard to tell in any scan.
+const BELOW_USUAL_PERCENT: f64 = 10.0;
+
+/// What a reader is told of when less is stated of a part, percent.
+pub(super) fn unsure_below_percent(region: Region) -> f64 {
+    UNSURE_PERCENT.min(100.0 * usual(region).1 - BELOW_USUAL_PERCENT)
+}
 
 /// What speaks for the labels of a part of the brain that the scan shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -93,13 +101,13 @@ pub(super) fn evidence(
 /// Separation and share that is right of a good scan.
 fn usual(region: Region) -> (f64, f64) {
     match region {
-        Region::LeftFrontal | Region::RightFrontal => (3.88, 0.903),
-        Region::LeftTemporal | Region::RightTemporal => (3.96, 0.908),
-        Region::LeftParietal | Region::RightParietal => (3.92, 0.912),
-        Region::LeftOccipital | Region::RightOccipital => (3.61, 0.874),
-        Region::LeftDeep | Region::RightDeep => (1.66, 0.862),
-        Region::Cerebellum => (2.98, 0.867),
-        Region::Brainstem => (4.17, 0.852),
+        Region::LeftFrontal | Region::RightFrontal => (3.85, 0.897),
+        Region::LeftTemporal | Region::RightTemporal => (3.95, 0.899),
+        Region::LeftParietal | Region::RightParietal => (3.84, 0.902),
+        Region::LeftOccipital | Region::RightOccipital => (3.41, 0.875),
+        Region::LeftDeep | Region::RightDeep => (2.11, 0.840),
+        Region::Cerebellum => (3.20, 0.873),
+        Region::Brainstem => (2.80, 0.738),
     }
 }
 
@@ -109,7 +117,7 @@ fn times_usual(region: Region, separation: f64) -> f64 {
 }
 
 /// What the logarithms of a part's separation and of the whole brain's, over the usual, do to the logit of the share that is right.
-const WEIGHTS: [f64; 2] = [1.58, 2.06];
+const WEIGHTS: [f64; 2] = [0.79, 2.77];
 
 impl RegionEvidence {
     /// Share of the part's labels that are expected to be right, 0 to 1.
@@ -130,12 +138,12 @@ mod tests {
     fn layers(white: f32, noise: f32) -> (LabelMap<Mni>, Volume<f32, Mni>) {
         let grid = Grid::<Mni>::axis_aligned([80, 100, 80], [2.0; 3], [-79.0, -118.0, -70.0]);
         let labels = Volume::from_fn(grid, |n| {
-            if (grid.voxel(n)[2] / 6) % 2 == 0 { label::GREY_MATTER } else { label::WHITE_MATTER }
+            if (grid.voxel(n)[2] / 6).is_multiple_of(2) { label::GREY_MATTER } else { label::WHITE_MATTER }
         });
         let even = Volume::from_fn(grid, |n| {
             let plain = if labels.data[n] == label::GREY_MATTER { 100.0 } else { white };
             let [i, j, k] = grid.voxel(n);
-            plain + if (i / STRIDE + j / STRIDE + k / STRIDE) % 2 == 0 { noise } else { -noise }
+            plain + if (i / STRIDE + j / STRIDE + k / STRIDE).is_multiple_of(2) { noise } else { -noise }
         });
         (labels, even)
     }
