@@ -283,11 +283,9 @@ pub fn segment_head<F: Frame>(
     let (outside, short) = (beyond(&found.brain, &found.known, &priors), short(&found.brain, &found.known, &priors));
     let known = &found.known.data;
     let expected = Mask::from_fn(priors.brain_mm.grid, |n| priors.brain_mm.data[n] < 0.0 && known[n]);
-    let (near, in_scan) = (found.brain.grid, found.known.clone());
-    let (mut segmentation, seen) = labelled(scan, found, &priors, overrides, settings)?;
-    let labels = segmentation.labels_mni.cropped(&segmentation.labels_mni.grid.box_of(&near));
+    let mut segmentation = labelled(scan, found, &priors, overrides, settings)?;
     let on_template = |p| carried.fit.atlas_from_subject.apply(p);
-    segmentation.regions = evidence(&seen, &labels, &in_scan, &priors, on_template);
+    segmentation.regions = evidence(&segmentation.labels_mni, &segmentation.t1_mni, on_template);
     segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));

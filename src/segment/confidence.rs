@@ -1,88 +1,60 @@
-//! How much of each part of the brain is expected to be labelled right: from what the segmentation knows of itself.
+//! How much of each part of the brain is expected to be labelled right: by how far grey and white matter lie apart there.
+//!
+//! What the mixture believes of its own labels says little: its Markov field smooths noise away and trusts the result. How far the two
+//! tissues lie apart once they are labelled tells noise, shading that was not taken out, and tissues in each other's place
+//! (docs/evidence/choices.md).
 
 use super::label;
-use super::mixture::Mixture;
-use super::priors::AtlasPriors;
 use super::region::Region;
 use crate::geometry::{Mni, Position};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::image::{LabelMap, Volume};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One voxel in so many along each axis is looked at: a region still has thousands.
 const STRIDE: usize = 3;
-/// Outlines of brain found and of the carried template that lie nearer to each other than this agree, mm: the misfit that is
-/// left everywhere.
-const APART_MM: f32 = 2.0;
-/// A region with fewer voxels than this in the scan says nothing.
-const FEW: usize = 100;
+/// With fewer looked-at voxels of grey or of white matter than this a part says nothing by itself.
+const FEW: f64 = 100.0;
+/// A part of which fewer labels are expected to be right is told of, percent: where less was stated two of three parts were wrong by
+/// more than that.
+const UNSURE_PERCENT: f64 = 75.0;
+/// So much below the usual it must be, too: in the brainstem grey and white matter are hard to tell in any scan.
+const BELOW_USUAL_PERCENT: f64 = 10.0;
 
-/// What speaks for the labels of a part of the brain, over what the scan shows of it.
+/// What a reader is told of when less is stated of a part, percent.
+pub(super) fn unsure_below_percent(region: Region) -> f64 {
+    UNSURE_PERCENT.min(100.0 * usual(region).1 - BELOW_USUAL_PERCENT)
+}
+
+/// What speaks for the labels of a part of the brain that the scan shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionEvidence {
     /// The part.
     pub region: Region,
-    /// How much of a voxel is the tissue that it is labelled as, on average, 0 to 1 (the mixture's expectation).
-    pub content: f64,
-    /// How probable the carried template holds that tissue there, on average, 0 to 1.
-    pub expected: f64,
-    /// Share of the part where brain was found 2 mm and more outside the carried template or not found as far inside, 0 to 1.
-    pub astray: f64,
-    /// Distance of the means of white and grey matter over their mean standard deviation, after the bias is taken out; of the
-    /// whole brain where the part has hardly any of one of them. The mixture smooths noise away and believes the result.
+    /// Distance of the means of white and grey matter over their mean standard deviation, after the bias is taken out.
     pub separation: f64,
+    /// How many times the usual one that is over the whole brain (geometric mean of the parts, deep nuclei left out).
+    pub whole_over_usual: f64,
 }
 
-/// What is kept of a looked-at voxel of the brain.
-pub(super) struct Seen {
-    /// Place in memory.
-    n: u32,
-    /// How much of its label it holds.
-    content: f32,
-    /// Intensity without the bias.
-    even: f32,
-}
-
-/// Every looked-at voxel of the brain, by the labels as they are in the end.
-pub(super) fn seen(
-    model: &Mixture,
-    labels: &LabelMap<Mni>,
-    even: &Volume<f32, Mni>,
-    priors: &AtlasPriors,
-) -> Vec<Seen> {
-    let looked_at = |n: u32| labels.grid.voxel(n as usize).iter().all(|v| v % STRIDE == 0);
-    let of = |(&n, p): (&u32, &[f32; 3])| {
-        let at = n as usize;
-        let content = match labels.data[at] {
-            // In the nuclei place tells grey from white matter.
-            label::GREY_MATTER if priors.deep_grey.data[at] > 0.5 => p[1] + p[2],
-            label::GREY_MATTER => p[1],
-            label::WHITE_MATTER => p[2],
-            label::CSF | label::VENTRICLE => p[0],
-            _ => 0.0,
-        };
-        Seen { n, content, even: even.data[at] }
-    };
-    model.voxels.iter().zip(&model.contents).filter(|(n, _)| looked_at(**n)).map(of).collect()
+/// A voxel of tissue: where it lies, whether it is white, how bright it is.
+struct Seen {
+    region: Region,
+    white: bool,
+    even: f64,
 }
 
 /// White from grey matter, over their mean deviation; `None` with hardly any of one of them.
-fn separation<'a>(of: impl Iterator<Item = &'a Seen>, labels: &LabelMap<Mni>) -> Option<f64> {
+fn separation<'a>(of: impl Iterator<Item = &'a Seen>) -> Option<f64> {
     let mut sums = [[0.0f64; 3]; 2];
-    for Seen { n, even, .. } in of {
-        let which = match labels.data[*n as usize] {
-            label::GREY_MATTER => 0,
-            label::WHITE_MATTER => 1,
-            _ => continue,
-        };
-        let x = f64::from(*even);
-        for (sum, term) in sums[which].iter_mut().zip([1.0, x, x * x]) {
+    for &Seen { white, even, .. } in of {
+        for (sum, term) in sums[usize::from(white)].iter_mut().zip([1.0, even, even * even]) {
             *sum += term;
         }
     }
-    if sums.iter().any(|[count, ..]| *count < FEW as f64) {
+    if sums.iter().any(|[count, ..]| *count < FEW) {
         return None;
     }
     let [grey, white] = sums.map(|[count, sum, squares]| {
@@ -93,69 +65,66 @@ fn separation<'a>(of: impl Iterator<Item = &'a Seen>, labels: &LabelMap<Mni>) ->
     (spread > 0.0).then(|| (white.0 - grey.0) / spread)
 }
 
-/// The evidence of every part of which the scan shows enough; all on the priors' grid.
+/// The evidence of every part of which the scan shows enough: of its labels and its intensities without the bias.
 pub(super) fn evidence(
-    seen: &[Seen],
     labels: &LabelMap<Mni>,
-    known: &Mask<Mni>,
-    priors: &AtlasPriors,
+    even: &Volume<f32, Mni>,
     template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
 ) -> Vec<RegionEvidence> {
-    let grid = priors.brain_mm.grid;
-    let prior = |n: usize| match labels.data[n] {
-        label::GREY_MATTER => priors.tissue[1].data[n],
-        label::WHITE_MATTER => priors.tissue[2].data[n],
-        _ => priors.tissue[0].data[n],
+    let grid = labels.grid;
+    let seen_at = |n: usize| {
+        let white = match labels.data[n] {
+            label::GREY_MATTER => false,
+            label::WHITE_MATTER => true,
+            _ => return None,
+        };
+        let region = Region::at(template_from_patient(grid.centre(grid.voxel(n))));
+        Some(Seen { region, white, even: f64::from(even.data[n]) })
     };
-    // Brain found, with its content; then what was expected and not found.
-    let found = seen.par_iter().map(|seen| (seen.n as usize, Some(seen)));
-    let missed = (0..grid.dims[2]).into_par_iter().step_by(STRIDE).flat_map_iter(|k| {
+    let of_slice = |k: usize| -> Vec<Seen> {
         let rows = (0..grid.dims[1]).step_by(STRIDE);
-        rows.flat_map(move |j| (0..grid.dims[0]).step_by(STRIDE).map(move |i| grid.index(i, j, k)))
-            .filter(|&n| priors.brain_mm.data[n] < 0.0 && known.data[n] && labels.data[n] == label::BACKGROUND)
-            .map(|n| (n, None))
-    });
-    let judged: Vec<(Region, Option<&Seen>, f32, bool)> = found
-        .chain(missed)
-        .map(|(n, seen)| {
-            let mm = priors.brain_mm.data[n];
-            let astray = if seen.is_some() { mm > APART_MM } else { mm < -APART_MM };
-            (Region::at(template_from_patient(grid.centre(grid.voxel(n)))), seen, prior(n), astray)
-        })
-        .collect();
-    let whole = separation(seen.iter(), labels).unwrap_or(0.0);
-    let of = |region: Region| {
-        let own = || judged.iter().filter(move |s| s.0 == region);
-        let [mut all, mut brain, mut content, mut expected, mut astray] = [0.0f64; 5];
-        for &(_, held, prior, beside) in own() {
-            all += 1.0;
-            astray += f64::from(u8::from(beside));
-            if let Some(held) = held {
-                brain += 1.0;
-                content += f64::from(held.content);
-                expected += f64::from(prior);
-            }
-        }
-        let [content, expected] = [content, expected].map(|sum| sum / f64::max(brain, 1.0));
-        let separation = separation(own().filter_map(|s| s.1), labels).unwrap_or(whole);
-        (brain >= FEW as f64).then_some(RegionEvidence { region, content, expected, astray: astray / all, separation })
+        let places = rows.flat_map(|j| (0..grid.dims[0]).step_by(STRIDE).map(move |i| grid.index(i, j, k)));
+        places.filter_map(seen_at).collect()
     };
-    Region::ALL.into_iter().filter_map(of).collect()
+    let seen: Vec<Vec<Seen>> = (0..grid.dims[2]).into_par_iter().step_by(STRIDE).map(of_slice).collect();
+    let of = |region: Region| {
+        let own = seen.iter().flatten().filter(|seen| seen.region == region);
+        Some((region, separation(own)?))
+    };
+    let parts: Vec<(Region, f64)> = Region::ALL.into_iter().filter_map(of).collect();
+    let plain = parts.iter().filter(|(region, _)| !matches!(region, Region::LeftDeep | Region::RightDeep));
+    let logs: Vec<f64> = plain.map(|&(region, separation)| times_usual(region, separation).ln()).collect();
+    let whole_over_usual = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
+    parts.into_iter().map(|(region, separation)| RegionEvidence { region, separation, whole_over_usual }).collect()
 }
 
-/// A part of which fewer labels are expected to be right is told of, percent.
-pub(super) const UNSURE_PERCENT: f64 = 75.0;
+/// Separation and share that is right of a good scan.
+fn usual(region: Region) -> (f64, f64) {
+    match region {
+        Region::LeftFrontal | Region::RightFrontal => (3.85, 0.897),
+        Region::LeftTemporal | Region::RightTemporal => (3.95, 0.899),
+        Region::LeftParietal | Region::RightParietal => (3.84, 0.902),
+        Region::LeftOccipital | Region::RightOccipital => (3.41, 0.875),
+        Region::LeftDeep | Region::RightDeep => (2.11, 0.840),
+        Region::Cerebellum => (3.20, 0.873),
+        Region::Brainstem => (2.80, 0.738),
+    }
+}
 
-/// Weights of one, the logit of the content, the template's expectation, what is astray and the logarithm of the separation in the
-/// logit of the share that is right, fitted to heads with known labels (docs/evidence/choices.md).
-const WEIGHTS: [f64; 5] = [-5.0, 0.6, 5.0, -3.0, 1.5];
+fn times_usual(region: Region, separation: f64) -> f64 {
+    // Tissues in each other's place have a separation below zero.
+    (separation / usual(region).0).max(0.05)
+}
+
+/// What the logarithms of a part's separation and of the whole brain's, over the usual, do to the logit of the share that is right.
+const WEIGHTS: [f64; 2] = [0.79, 2.77];
 
 impl RegionEvidence {
     /// Share of the part's labels that are expected to be right, 0 to 1.
     pub fn confidence(&self) -> f64 {
-        let content = self.content.clamp(0.01, 0.99);
-        let terms = [1.0, (content / (1.0 - content)).ln(), self.expected, self.astray, self.separation.max(0.1).ln()];
-        let logit: f64 = WEIGHTS.iter().zip(terms).map(|(weight, term)| weight * term).sum();
+        let share = usual(self.region).1;
+        let own = WEIGHTS[0] * times_usual(self.region, self.separation).ln();
+        let logit = (share / (1.0 - share)).ln() + own + WEIGHTS[1] * self.whole_over_usual.max(0.05).ln();
         1.0 / (1.0 + (-logit).exp())
     }
 }
@@ -163,46 +132,51 @@ impl RegionEvidence {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Grid;
+
+    /// Grey and white matter of these brightnesses in layers over the template's brain, with this much noise.
+    fn layers(white: f32, noise: f32) -> (LabelMap<Mni>, Volume<f32, Mni>) {
+        let grid = Grid::<Mni>::axis_aligned([80, 100, 80], [2.0; 3], [-79.0, -118.0, -70.0]);
+        let labels = Volume::from_fn(grid, |n| {
+            if (grid.voxel(n)[2] / 6).is_multiple_of(2) { label::GREY_MATTER } else { label::WHITE_MATTER }
+        });
+        let even = Volume::from_fn(grid, |n| {
+            let plain = if labels.data[n] == label::GREY_MATTER { 100.0 } else { white };
+            let [i, j, k] = grid.voxel(n);
+            plain + if (i / STRIDE + j / STRIDE + k / STRIDE).is_multiple_of(2) { noise } else { -noise }
+        });
+        (labels, even)
+    }
 
     #[test]
-    fn whatever_speaks_for_the_labels_makes_them_surer_and_an_outline_astray_less_sure() {
-        let plain = RegionEvidence {
-            region: Region::LeftFrontal,
-            content: 0.88,
-            expected: 0.62,
-            astray: 0.01,
-            separation: 3.0,
-        };
-        let less = [
-            RegionEvidence { content: 0.8, ..plain },
-            RegionEvidence { expected: 0.55, ..plain },
-            RegionEvidence { astray: 0.1, ..plain },
-            RegionEvidence { separation: 2.0, ..plain },
-        ];
-        for evidence in less {
-            assert!(evidence.confidence() < plain.confidence(), "{evidence:?}");
-        }
-        for content in [0.0, 1.0] {
-            let sure = RegionEvidence { content, ..plain }.confidence();
-            assert!(sure > 0.0 && sure < 1.0);
+    fn separation_is_the_distance_of_the_means_in_deviations_in_every_part() {
+        let (labels, even) = layers(150.0, 20.0);
+        let found = evidence(&labels, &even, |p| p);
+        assert_eq!(found.len(), Region::ALL.len());
+        for part in found {
+            assert!((part.separation - 2.5).abs() < 0.1, "{part:?}");
         }
     }
 
     #[test]
-    fn separation_is_the_distance_of_the_means_in_deviations() {
-        let grid = crate::image::Grid::<Mni>::axis_aligned([40, 10, 10], [1.0; 3], [0.0; 3]);
-        let labels =
-            Volume::from_fn(grid, |n| if grid.voxel(n)[0] < 20 { label::GREY_MATTER } else { label::WHITE_MATTER });
-        let spread = |n: usize| if n % 2 == 0 { 5.0f32 } else { -5.0 };
-        let of = |white: f32| -> Vec<Seen> {
-            let value = |n: usize| spread(n) + if labels.data[n] == label::GREY_MATTER { 60.0 } else { white };
-            (0..grid.len()).map(|n| Seen { n: n as u32, content: 1.0, even: value(n) }).collect()
+    fn tissues_less_apart_are_less_sure_and_every_confidence_is_a_share() {
+        let of = |white: f32, noise: f32| {
+            let (labels, even) = layers(white, noise);
+            evidence(&labels, &even, |p| p)
         };
-        for white in [70.0, 100.0] {
-            let found = separation(of(white).iter(), &labels).unwrap();
-            assert!((found - f64::from(white - 60.0) / 5.0).abs() < 1e-6, "{found}");
+        let scans = [of(150.0, 8.0), of(150.0, 20.0), of(120.0, 20.0), of(80.0, 20.0)];
+        for pair in scans.windows(2) {
+            for (better, worse) in pair[0].iter().zip(&pair[1]) {
+                let [better, worse] = [better, worse].map(RegionEvidence::confidence);
+                assert!((0.0..=1.0).contains(&better) && worse < better, "{better} {worse}");
+            }
         }
-        let few = of(100.0);
-        assert_eq!(separation(few.iter().take(50), &labels), None);
+    }
+
+    #[test]
+    fn a_part_without_one_of_the_tissues_says_nothing() {
+        let (labels, even) = layers(150.0, 20.0);
+        let alone = labels.map(|_| label::GREY_MATTER);
+        assert_eq!(evidence(&alone, &even, |p| p), []);
     }
 }

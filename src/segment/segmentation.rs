@@ -3,7 +3,7 @@
 use super::border::with_the_scans_border;
 use super::brain::{BrainSettings, at_each, brain_mask};
 use super::coil::{evened, strong_gain};
-use super::confidence::{RegionEvidence, Seen, seen};
+use super::confidence::RegionEvidence;
 use super::folia::with_whole_folia;
 use super::label;
 use super::mixture::{Mixture, MixtureSettings, fit_mixture};
@@ -287,7 +287,7 @@ pub fn segment_with_priors<F: Frame>(
 ) -> Result<Segmentation<F>, SegmentError> {
     settings.check()?;
     let found = find_brain(scan, priors, overrides.brain, settings)?;
-    Ok(labelled(scan, found, priors, overrides, settings)?.0)
+    labelled(scan, found, priors, overrides, settings)
 }
 
 /// A brain found or given, and nothing looked at inside it; the volumes lie on the priors' grid.
@@ -344,7 +344,7 @@ pub(super) fn find_brain<F: Frame>(
     Ok(FoundBrain { gain, raw, known, brain, warnings })
 }
 
-/// What is inside the brain, and what its labels are judged by.
+/// What is inside the brain.
 ///
 /// # Errors
 /// As [`segment_with_priors`].
@@ -354,7 +354,7 @@ pub(super) fn labelled<F: Frame>(
     priors: &AtlasPriors,
     overrides: &SegmentOverrides<'_, F>,
     settings: &SegmentSettings,
-) -> Result<(Segmentation<F>, Vec<Seen>), SegmentError> {
+) -> Result<Segmentation<F>, SegmentError> {
     let FoundBrain { gain, raw, known, brain, mut warnings } = found;
     let PosedScan { t1, mni_from_t1, .. } = scan;
     let (grid, t1_from_mni, found_cc) = (raw.grid, mni_from_t1.inverse(), brain.volume_cc());
@@ -391,7 +391,6 @@ pub(super) fn labelled<F: Frame>(
     }
     with_white_walls(&mut labels_mni, &ventricle, &priors.deep_grey);
     with_whole_folia(&mut labels_mni, priors);
-    let seen = seen(&model, &labels_mni, &even, priors);
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let volumes = TissueVolumes {
         brain_cc: found_cc,
@@ -416,7 +415,7 @@ pub(super) fn labelled<F: Frame>(
             };
         }
     }
-    let segmentation = Segmentation {
+    Ok(Segmentation {
         brain: overrides
             .brain
             .filter(|m| m.grid.coincides(&t1.grid, 1e-3))
@@ -432,8 +431,7 @@ pub(super) fn labelled<F: Frame>(
         volumes,
         regions: Vec::new(),
         warnings,
-    };
-    Ok((segmentation, seen))
+    })
 }
 
 impl SegmentWarning {

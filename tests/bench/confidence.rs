@@ -67,7 +67,7 @@ pub fn bars() -> Vec<Bar> {
         println!("skipped: confidence by regions (heads/)");
         return Vec::new();
     };
-    let mut table = String::from("head\thurt\tregion\tcontent\texpected\tastray\tseparation\tright\tvoxels\twords\n");
+    let mut table = String::from("head\thurt\tregion\tseparation\tstated\tright\tvoxels\twords\n");
     for Known { name, t1, labels } in known(&data) {
         let Some(unhurt) = taken_apart(&t1) else {
             println!("{name} itself refused");
@@ -97,10 +97,11 @@ pub fn bars() -> Vec<Bar> {
 }
 
 fn lines(table: &mut String, name: &str, hurt: &str, regions: &[RegionEvidence], counts: &[[usize; 2]], words: &str) {
-    for RegionEvidence { region, content, expected, astray, separation } in regions {
-        let [all, right] = counts[*region as usize];
+    for part in regions {
+        let region = part.region;
+        let [all, right] = counts[region as usize];
         let share = right as f64 / all.max(1) as f64;
-        let figures = format!("{content:.4}\t{expected:.4}\t{astray:.4}\t{separation:.4}\t{share:.4}\t{all}");
+        let figures = format!("{:.2}\t{:.3}\t{share:.3}\t{all}", part.separation, part.confidence());
         println!("{name}\t{hurt}\t{region}\t{figures}\t{words}");
         writeln!(table, "{name}\t{hurt}\t{region}\t{figures}\t{words}").unwrap();
     }

@@ -13,7 +13,7 @@ mod gain;
 
 pub use air::Air;
 
-use super::confidence::{RegionEvidence, UNSURE_PERCENT};
+use super::confidence::{RegionEvidence, unsure_below_percent};
 use super::posed_scan::PosedScan;
 use super::region::Region;
 use super::segmentation::SegmentWarning;
@@ -84,7 +84,9 @@ impl ScanQuality {
     pub fn of_regions(&self) -> Vec<SegmentWarning> {
         let outside = self.regions.iter().filter(|r| r.outside_percent >= OUTSIDE_PERCENT);
         let mut parts: Vec<(Region, f64)> = outside.map(|r| (r.region, r.outside_percent)).collect();
-        let unsure = |r: &RegionQuality| Some((r.region, r.confidence_percent.filter(|c| *c < UNSURE_PERCENT)?));
+        let unsure = |r: &RegionQuality| {
+            Some((r.region, r.confidence_percent.filter(|stated| *stated < unsure_below_percent(r.region))?))
+        };
         let mut doubtful: Vec<(Region, f64)> = self.regions.iter().filter_map(unsure).collect();
         // The worst first.
         parts.sort_by(|a, b| b.1.total_cmp(&a.1));
