@@ -40,6 +40,15 @@ impl Likeness {
     /// again.
     pub const ONE_HEAD: f64 = 0.8;
 
+    /// Folds that follow each other upside down this far are one head's: what is bright in one scan is dark in the other. Those
+    /// of two heads do not follow each other at all.
+    const REVERSED: f64 = -0.5;
+
+    /// Whether bright and dark tissue have changed places: another weighting, not another head.
+    pub fn is_reversed(&self) -> bool {
+        self.folds <= Self::REVERSED
+    }
+
     /// Whether this is one head.
     pub fn is_one_head(&self) -> bool {
         self.folds >= Self::ONE_HEAD
@@ -171,6 +180,22 @@ mod tests {
         );
         let off = likeness(&one, &one, &same, &moved).unwrap();
         assert!(!off.is_one_head() && off.folds < 0.7, "{off:?}");
+    }
+
+    #[test]
+    fn one_head_in_another_weighting_is_told_from_another_head() {
+        let one = template();
+        let brightest = one.data.iter().copied().fold(0.0f32, f32::max);
+        let reversed = one.map(|t1| if t1 > 0.0 { 1.2 * brightest - t1 } else { 0.0 });
+        let same = RigidTransform::<Mni, Mni>::identity();
+        let found = likeness(&one, &reversed, &same, &same).unwrap();
+        assert!(found.is_reversed() && !found.is_one_head(), "{found:?}");
+        let moved = RigidTransform::<Mni, Mni>::about(
+            nalgebra::Point3::origin(),
+            Vector3::zeros(),
+            Vector3::new(0.0, 12.0, 6.0),
+        );
+        assert!(!likeness(&one, &one, &same, &moved).unwrap().is_reversed());
     }
 
     /// The template's brain sunk by up to 9 mm, as smoothly as brains do, is still the same brain.

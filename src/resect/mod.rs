@@ -4,6 +4,7 @@ mod belief;
 mod blood;
 mod cavity;
 mod cavity_pair;
+mod edge;
 mod intensity;
 mod likeness;
 mod midline;

@@ -1,6 +1,7 @@
 //! A pre- and a post-operative scan taken apart together.
 
 use super::blood::{SaggedPair, with_blood};
+use super::edge::at_edge_percent;
 use super::sag::{SagScans, fit_sag};
 use super::sets::both;
 use super::{
@@ -132,6 +133,16 @@ pub enum PairError {
         /// See [`Likeness::folds`].
         folds: f64,
     },
+    /// One head, in two weightings.
+    #[error(
+        "what is bright in one of the two scans is dark in the other (once one lies on the other their folds correlate by {folds:.2}): \
+         they have two weightings; a cavity is told by what has become dark, so give two T1-weighted scans, or a cavity mask to go on \
+         all the same"
+    )]
+    OtherWeighting {
+        /// See [`Likeness::folds`].
+        folds: f64,
+    },
     /// A scan cannot be taken apart, or the brain of one not be found in the other.
     #[error("{scan}: {source}")]
     Head {
@@ -173,7 +184,12 @@ pub fn take_pair_apart(
     let likeness = likeness(pre.t1, post.t1, &pre.mni_from_t1, &post.mni_from_t1);
     let by_hand = given.cavity.is_some() || given.resected.is_some();
     if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
-        return Err(PairError::NotOnePerson { folds: found.folds });
+        let folds = found.folds;
+        return Err(if found.is_reversed() {
+            PairError::OtherWeighting { folds }
+        } else {
+            PairError::NotOnePerson { folds }
+        });
     }
 
     step("pre-operative tissue");
@@ -271,6 +287,8 @@ pub fn take_pair_apart(
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
+    let at_edge = at_edge_percent(&finding.cavity, &before.brain_mni, post_known);
+    after.warnings.extend((at_edge > NOTED_AT_EDGE).then_some(SegmentWarning::CavityAtEdge { percent: at_edge }));
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);
@@ -341,6 +359,8 @@ pub fn template_correlation(given: &GivenMasks, fit: &AtlasFit<Mni>) -> Option<f
 /// What lies further from the cavity than this has no part in it, mm: more than any brain sags, and more than the windows
 /// of all filters.
 const NEAR_MM: f64 = 25.0;
+/// More of a cavity's surroundings outside the scan than this is told, percent.
+const NOTED_AT_EDGE: f64 = 2.0;
 
 /// The box around a mask with a margin; the whole grid for an empty mask.
 fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {

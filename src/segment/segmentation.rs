@@ -198,6 +198,15 @@ pub enum SegmentWarning {
         /// Share of that tissue, in percent.
         percent: f64,
     },
+    /// The cavity ends where the scan does.
+    #[error(
+        "{percent:.0} % of the cavity's outside borders on brain that the post-operative scan does not show: the cavity and what was \
+         resected run on beyond it and are found too small"
+    )]
+    CavityAtEdge {
+        /// Share of the cavity's outside, in percent.
+        percent: f64,
+    },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
     NoVentricle,
