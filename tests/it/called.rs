@@ -32,7 +32,7 @@ fn a_called_command_returns_what_it_would_print_and_says_what_it_would_say() {
 #[test]
 fn no_operation_and_two_people_are_answers_with_a_name_and_exit_code_4() {
     let pair = |error: PairError| Failure::from(WorkflowError::Pair(error));
-    let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
+    let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None, unseen_percent: 0.0 };
     for (failure, name) in
         [(pair(PairError::NotOnePerson { folds: 0.4 }), "not-one-person"), (pair(none.into()), "no-operation")]
     {

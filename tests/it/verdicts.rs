@@ -95,7 +95,7 @@ fn on_terminal(outcome: &ExperimentOutcome) -> String {
     if outcome.answer.is_none() {
         return summary(outcome);
     }
-    let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None };
+    let none = ResectError::NoOperation { largest_cc: 0.2, smallest_cc: 1.0, doubt: None, unseen_percent: 0.0 };
     Failure::from(WorkflowError::Pair(PairError::from(none))).parts().1.to_string()
 }
 
