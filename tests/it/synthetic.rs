@@ -4,7 +4,7 @@ use crate::job::{contents, output};
 use hgm::image::nifti::{ReadOptions, decode_mask};
 
 #[test]
-fn a_fault_out_of_range_ends_with_3_names_its_field_and_leaves_nothing() {
+fn a_fault_out_of_range_ends_with_3_says_where_it_stands_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     for (text, field) in [
@@ -13,7 +13,8 @@ fn a_fault_out_of_range_ends_with_3_names_its_field_and_leaves_nothing() {
         ("[synth.post]\nmissing_slices = 500\n", "post.missing_slices"),
         ("[synth.pathology]\nventricle_factor = 9.0\n", "pathology.ventricle_factor"),
         ("[synth.pathology]\noedemas = \"pre\"\n", "oedemas"),
-        ("[synth.pre]\ncut_side = \"inner\"\n", "cut_side"),
+        // A word that is none of a list is told by its line, as in every table.
+        ("[synth.pre]\ncut_side = \"inner\"\n", "line 2: table [synth]: unknown value `inner`"),
     ] {
         std::fs::write(path("faults.toml"), text).unwrap();
         let ended = output(&["synth", "--config", &path("faults.toml"), "-o", &path("patient")]);
