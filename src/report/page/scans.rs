@@ -55,7 +55,7 @@ fn by_regions(scans: &ScanQualities, shown: &[WhichScan]) -> Markup {
         (false, words(std::iter::once(region.name().to_owned()).chain(columns.iter().map(cell))))
     };
     let rows: Vec<Row> = Region::ALL.into_iter().map(row).collect();
-    html! { (table("Parts of the brain", &head, &rows)) }
+    html! { div class="regions" { (table("Parts of the brain", &head, &rows)) } }
 }
 
 /// The order with its reasons: cells of a row, after the subject's own.
