@@ -39,7 +39,7 @@ impl FluidLevels {
         [level, slope * steps as f64]
     }
 
-    /// The level at the number of the unknown part that has drained (the logarithm of its odds), mm, and what it changes by per unit of the number.
+    /// The level where the odds of the part drained have this logarithm, mm, and what it changes by per unit of that.
     pub fn at_number(&self, number: f64) -> [f64; 2] {
         let part = Scale::Share.value(number);
         let [level, slope] = self.at(part);
