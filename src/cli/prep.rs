@@ -24,5 +24,5 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (settings, place) = (session.settings(flags)?, session.place(&args.pair.output));
     let case = run_to(goal, &args.pair.inputs(), &place, &settings, &mut *session.listener())?;
     session.emit(&case.outcome()?, &in_words(&case)?)?;
-    if goal == Goal::Mesh { Ok(case.quality_gate()?) } else { Ok(()) }
+    Ok(if goal == Goal::Mesh { case.quality_gate() } else { case.image_gate() }?)
 }

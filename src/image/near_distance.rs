@@ -1,14 +1,14 @@
 //! Euclidean distance where it is at most a few voxels.
 //!
 //! As for the [whole distance](super::distance) the square is separable. A short reach is looked through voxel by voxel, whole
-//! rows at a time: that is less work than an envelope of parabolas, and rows without anything near are passed over.
+//! rows at a time, and rows without anything near are passed over (docs/evidence/choices.md has what that gains).
 
 use super::distance::{row_distance, squared_distance_mm2};
 use super::pieces::each_piece;
 use super::volume::{Mask, Volume};
 use crate::geometry::Frame;
 
-/// Voxels of reach beyond which the envelope is less work.
+/// Voxels of reach beyond which the whole distance is found instead: its work does not grow with the reach.
 const MOST_VOXELS: usize = 16;
 
 /// Squared distance in mm2 to the nearest voxel whose value is `seed`, where it is at most `limit`; elsewhere something

@@ -35,8 +35,8 @@ Exit codes:
   1  failed: the computation broke down, or a file could not be written
   2  usage: the command line cannot be understood
   3  input rejected: the message names file, field and remedy; nothing was written
-  4  computed (outputs kept), but not to be believed: no operation is seen, the scans do not show one person, or a
-     boundary set is implausible
+  4  computed (outputs kept), but not to be believed: no operation is seen, the scans do not show one person, the
+     second scan cuts the cavity, or a boundary set is implausible
   128 + N  ended by signal N; the same command goes on where it was";
 
 /// The whole command line, as it is parsed and shown.

@@ -40,8 +40,8 @@ impl Likeness {
     /// again.
     pub const ONE_HEAD: f64 = 0.8;
 
-    /// Folds that follow each other upside down this far are one head's: what is bright in one scan is dark in the other. Those
-    /// of two heads do not follow each other at all.
+    /// Folds that follow each other upside down this far are one head's: what is bright in one scan is dark in the other. What two
+    /// T1 scans of two heads have in common is the right way up.
     const REVERSED: f64 = -0.5;
 
     /// Whether bright and dark tissue have changed places: another weighting, not another head.

@@ -287,8 +287,10 @@ pub fn take_pair_apart(
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
-    let at_edge = at_edge_percent(&finding.cavity, &before.brain_mni, post_known);
-    after.warnings.extend((at_edge > NOTED_AT_EDGE).then_some(SegmentWarning::CavityAtEdge { percent: at_edge }));
+    if given.resected.is_none() {
+        let percent = at_edge_percent(&finding.cavity, &before.brain_mni, post_known);
+        after.warnings.extend((percent > NOTED_AT_EDGE).then_some(SegmentWarning::CavityAtEdge { percent }));
+    }
     let post_ventricle = apart_from(&after.labels_mni.map(|l| l == label::VENTRICLE), &finding.cavity, 1.0);
     if post_ventricle.count() == 0 {
         return Err(PairError::NoVentricle);

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 const STRIDE: usize = 3;
 /// With fewer looked-at voxels of grey or of white matter than this a part says nothing by itself.
 const FEW: f64 = 100.0;
-/// A part of which fewer labels are expected to be right is told of, percent: where less was stated two of three parts were wrong by
-/// more than that.
+/// A part of which fewer labels are expected to be right is told of, percent: of the parts of which less was stated most had fewer
+/// right indeed.
 const UNSURE_PERCENT: f64 = 75.0;
 /// So much below the usual it must be, too: in the brainstem grey and white matter are hard to tell in any scan.
 const BELOW_USUAL_PERCENT: f64 = 10.0;

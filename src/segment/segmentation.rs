@@ -218,6 +218,17 @@ pub enum SegmentWarning {
     },
 }
 
+/// So much of a cavity's outside at the scan's edge hides a tenth of the cavity and more, percent: of a ball, the disc where a
+/// plane cuts that part off.
+const HIDDEN_PERCENT: f64 = 16.0;
+
+impl SegmentWarning {
+    /// Whether the cavity, and what was resected, cannot be believed for it.
+    pub fn belies_the_cavity(&self) -> bool {
+        matches!(self, Self::CavityAtEdge { percent } if *percent >= HIDDEN_PERCENT)
+    }
+}
+
 /// "left temporal lobe: 18 % lies outside the scan (cerebellum: 7 %)".
 fn in_words(parts: &[(Region, f64)], what: &str) -> String {
     let of = |(region, percent): &(Region, f64)| format!("{region}: {percent:.0} %");

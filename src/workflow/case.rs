@@ -1,7 +1,7 @@
 //! A case folder: what is in it and how it is read back.
 
 use super::error::{CaseError, WorkflowError};
-use super::facts::{EstimateFacts, MeshFacts};
+use super::facts::{EstimateFacts, Implausible, MeshFacts};
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use crate::artefact::Manifest;
@@ -126,11 +126,24 @@ impl Case {
         Ok(self.stage(&StageName::Estimate)?.1)
     }
 
-    /// Whether its boundary sets are to be believed.
+    /// Whether its masks are to be believed.
     ///
     /// # Errors
-    /// [`WorkflowError::QualityGate`] with a sentence per set; a phantom's are not asked.
+    /// [`WorkflowError::QualityGate`] with a sentence per mask; only a patient's are asked.
+    pub fn image_gate(&self) -> Result<(), WorkflowError> {
+        if self.subject() != Some(Subject::Patient) {
+            return Ok(());
+        }
+        let (_, Implausible { implausible }) = self.stage(&StageName::Anat)?;
+        if implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(implausible)) }
+    }
+
+    /// Whether its masks and boundary sets are to be believed.
+    ///
+    /// # Errors
+    /// [`WorkflowError::QualityGate`] with a sentence per mask or set; a phantom's are not asked.
     pub fn quality_gate(&self) -> Result<(), WorkflowError> {
+        self.image_gate()?;
         let (_, mesh): (_, MeshFacts) = self.stage(&StageName::Mesh)?;
         if mesh.implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(mesh.implausible)) }
     }

@@ -16,6 +16,14 @@ pub struct MeshFacts {
     pub implausible: Vec<String>,
 }
 
+/// Of the figures of a patient's images what is not to be believed.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Implausible {
+    /// A sentence each.
+    #[serde(default)]
+    pub implausible: Vec<String>,
+}
+
 /// The estimate's numbers, and its state as one more sample.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EstimateFacts {

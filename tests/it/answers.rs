@@ -51,3 +51,35 @@ fn slow_two_heads_are_not_one_person() {
     let [pre, _] = synthetic_patient();
     answered(&pre, &sample("post.nii.gz"), "not-one-person", "do not show one person");
 }
+
+/// A patient of `hgm synth` with this fault of the second scan, and how `hgm prep --no-mesh` of its scans ends, with what is said.
+fn prepared_with(fault: &str, lobe: &str, seed: &str) -> (Option<i32>, String, bool) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(at("faults.toml"), format!("[synth.post]\n{fault}\n")).unwrap();
+    let (faults, patient, case) = (at("faults.toml"), at("patient"), at("case"));
+    let made =
+        output(&["synth", "--lobe", lobe, "--seed", seed, "--spacing-mm", "2", "--config", &faults, "-o", &patient]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let (pre, post) = (at("patient/pre.nii.gz"), at("patient/post.nii.gz"));
+    let ended = output(&["prep", "--no-mesh", &pre, &post, "-o", &case]);
+    let kept = folder.path().join("case/anat/post_space-MNI_label-cavity_mask.nii.gz").exists();
+    (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned(), kept)
+}
+
+#[test]
+fn slow_a_cavity_that_the_second_scan_cuts_is_kept_and_not_believed() {
+    let (code, said, kept) = prepared_with("cut_mm = 45.0", "parietal", "13");
+    assert!(code == Some(4) && kept, "{code:?} {said}");
+    assert!(
+        said.contains("the cavity's outside borders on brain that the post-operative scan does not show"),
+        "{said}"
+    );
+}
+
+#[test]
+fn slow_one_head_in_two_weightings_is_not_called_two_people() {
+    let (code, said, kept) = prepared_with("t2_like = true", "frontal", "14");
+    assert!(code == Some(3) && !kept, "{code:?} {said}");
+    assert!(said.contains("two weightings") && !said.contains("one person"), "{said}");
+}

@@ -10,6 +10,7 @@ mod files;
 mod frame;
 mod ghost;
 mod head;
+mod head_side;
 mod landmarks;
 #[cfg(test)]
 mod laws;
@@ -25,9 +26,10 @@ mod scans;
 mod settings;
 mod ventricles;
 
-pub use fault::{HeadSide, ScanFaults};
+pub use fault::ScanFaults;
 pub use frame::Patient;
 pub use head::Head;
+pub use head_side::HeadSide;
 pub use lobe::Lobe;
 pub use pathology::Pathology;
 pub use scans::Scans;
@@ -35,7 +37,6 @@ pub use settings::{SagKind, SynthError, SynthSettings};
 
 use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
-
 use crate::image::{Grid, LabelMap, Mask, Volume, VoxelBox};
 use crate::material::random::CounterRng;
 use crate::segment::{atlas, label};
@@ -437,11 +438,7 @@ fn operate(head: Head, taken: Option<&Mask<Mni>>, settings: &SynthSettings) -> R
         _ => Some(old_lesion::old_lesion(&labels, |p| head.in_template(in_head(p)), &resection, settings)?),
     };
     if let Some(lesion) = &old_lesion {
-        for (label, &wall_mm) in labels.data.iter_mut().zip(&lesion.wall_mm.data) {
-            if wall_mm < 0.0 && *label != label::BACKGROUND && *label != label::VENTRICLE {
-                *label = label::CSF;
-            }
-        }
+        lesion.label(&mut labels, label::CSF);
     }
     let sag = match settings.sag {
         SagKind::None => None,

@@ -29,6 +29,15 @@ impl Resection {
     pub fn distance_mm(&self, p: Point3<f64>) -> f64 {
         self.wall_mm.trilinear(Position::from_point(p)).map_or(60.0, f64::from)
     }
+
+    /// Gives what lies within the wall this label; never the ventricle.
+    pub fn label(&self, labels: &mut LabelMap<Patient>, as_label: u8) {
+        for (own, &wall_mm) in labels.data.iter_mut().zip(&self.wall_mm.data) {
+            if wall_mm < 0.0 && *own != label::BACKGROUND && *own != label::VENTRICLE {
+                *own = as_label;
+            }
+        }
+    }
 }
 
 /// Takes `resection_cc` from where the surgeon of the lobe begins, with an uneven wall; never the ventricle.

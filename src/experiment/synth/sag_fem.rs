@@ -34,11 +34,7 @@ pub fn by_finite_elements(
     let failed = |what: String| SynthError::Sag(what);
     // Ventricle and resected tissue keep labels of their own, so that their walls are meshed smoothly, and are then left out.
     let mut map = with_closed_sulci(labels, SULCUS_MM);
-    for (label, &wall_mm) in map.data.iter_mut().zip(&resection.wall_mm.data) {
-        if wall_mm < 0.0 && *label != label::BACKGROUND && *label != label::VENTRICLE {
-            *label = label::RESECTED;
-        }
-    }
+    resection.label(&mut map, label::RESECTED);
     let mesh_settings =
         MeshSettings { size: MeshSize::Cells(settings.cells), split: Some(falx_sheet()), ..MeshSettings::default() };
     let template = |p: [f64; 3]| <[f64; 3]>::from(template(Point3::from(p)).mm);

@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 19;
+const VERSION: u32 = 20;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -41,6 +41,9 @@ pub struct AnatFacts {
     /// How good the scans are.
     #[serde(default)]
     pub scans: ScanQualities,
+    /// Masks that are not to be believed, a sentence each.
+    #[serde(default)]
+    pub implausible: Vec<String>,
 }
 
 /// The masks a case's later stages start from, as its files hold them.
@@ -213,6 +216,7 @@ pub(crate) fn anat(
             side: found.side,
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),
             scans: quality,
+            implausible: after.warnings.iter().filter(|w| w.belies_the_cavity()).map(ToString::to_string).collect(),
         });
         Ok(produced)
     })

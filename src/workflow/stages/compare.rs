@@ -37,7 +37,7 @@ pub(crate) fn compare(
         let families = [(1, Tissue::whole_brain()), (2, Tissue::grey_and_white())];
         let bodies = Bodies::of(work, &EstimateInput { held: input.every_fluid.or(input.held), ..*input })?;
         let own = [if LAWS.contains(&prior.law) { prior.law } else { LAWS[0] }];
-        // A law tells as much of a fluid as of none; crossed with all of them the family would take twice as long.
+        // Crossed with every law the family would have twice as many models.
         let laws = |body: &HeldBody| if body.levels.is_some() { &own[..] } else { &LAWS[..] };
         let models: usize = bodies.list.iter().map(|body| families.len() * laws(body).len()).sum();
         work.tell(|p| p.begin("models", models));
