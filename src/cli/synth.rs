@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "head", conflicts_with_all = ["lobe", "resection_cc"])]
     pub resected_mask: Option<PathBuf>,
     /// Operated lobe [default: temporal]
-    #[arg(long, value_name = "temporal|frontal|parietal|occipital|insular")]
+    #[arg(long, value_name = "temporal|frontal|parietal|occipital|insular|hemisphere")]
     pub lobe: Option<Lobe>,
     /// Operated side [default: left]
     #[arg(long, value_parser = word::<Side>, value_name = "left|right")]

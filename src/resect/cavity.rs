@@ -272,7 +272,7 @@ pub(super) fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask
     either(&opened, seed)
 }
 
-fn side_of(mask: &Mask<Mni>) -> Side {
+pub(super) fn side_of(mask: &Mask<Mni>) -> Side {
     let x_mm = |n: usize| mask.grid.position(mask.grid.voxel(n).map(|c| c as f64).into()).mm.x;
     let sum: f64 = (0..mask.data.len()).filter(|&n| mask.data[n]).map(x_mm).sum();
     if sum < 0.0 { Side::Left } else { Side::Right }

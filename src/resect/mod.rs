@@ -5,6 +5,7 @@ mod blood;
 mod cavity;
 mod cavity_pair;
 mod edge;
+mod elsewhere;
 mod intensity;
 mod likeness;
 mod midline;

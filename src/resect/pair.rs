@@ -2,6 +2,7 @@
 
 use super::blood::{SaggedPair, with_blood};
 use super::edge::at_edge_percent;
+use super::elsewhere::{lost_elsewhere_cc, with_losses_elsewhere};
 use super::sag::{SagScans, fit_sag};
 use super::sets::both;
 use super::{
@@ -225,32 +226,32 @@ pub fn take_pair_apart(
     let post_t1 = if scale.turned_at.is_some() { post_t1.map(|x| scale.of(x)) } else { post_t1 };
     let computed = by_hand.is_none();
     let unchanged = given.cavity.as_ref().and_then(|cavity| unchanged_percent(cavity, &before, &post_t1, post_known));
-    let mut finding = if let Some(finding) = by_hand {
-        finding
-    } else {
-        let pair = CavityPair {
-            pre: &before.t1_mni,
-            pre_labels: &before.labels_mni,
-            pre_brain: &before.brain_mni,
-            post: &post_t1,
-            post_known,
-            csf_grey_border: before.csf_grey_border,
-            grey_mean: before.tissue_means[1],
-            grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
-        };
-        find_cavity(&pair, &settings.cavity)?
-    };
-
-    step("sag");
-    let scans = SagScans {
+    let pair = CavityPair {
         pre: &before.t1_mni,
+        pre_labels: &before.labels_mni,
         pre_brain: &before.brain_mni,
         post: &post_t1,
         post_known,
-        cavity: &finding.cavity,
+        csf_grey_border: before.csf_grey_border,
+        grey_mean: before.tissue_means[1],
+        grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
     };
-    let sag = fit_sag(&scans, &settings.sag)
-        .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?;
+    let found = by_hand.map_or_else(|| find_cavity(&pair, &settings.cavity), Ok);
+
+    step("sag");
+    let fit_around = |cavity: &Mask<Mni>| {
+        let scans = SagScans { pre: &before.t1_mni, pre_brain: &before.brain_mni, post: &post_t1, post_known, cavity };
+        let fit = fit_sag(&scans, &settings.sag);
+        fit.map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })
+    };
+    let (mut finding, sag) = if computed {
+        with_losses_elsewhere(found, &pair, fit_around, &settings.cavity)?
+    } else {
+        let finding = found?;
+        let sag = fit_around(&finding.cavity)?;
+        (finding, sag)
+    };
+    let lost_elsewhere_cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, &settings.cavity);
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -287,6 +288,7 @@ pub fn take_pair_apart(
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
+    after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
     if given.resected.is_none() {
         let percent = at_edge_percent(&finding.cavity, &before.brain_mni, post_known);
         after.warnings.extend((percent > NOTED_AT_EDGE).then_some(SegmentWarning::CavityAtEdge { percent }));

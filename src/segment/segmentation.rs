@@ -207,6 +207,15 @@ pub enum SegmentWarning {
         /// Share of the cavity's outside, in percent.
         percent: f64,
     },
+    /// Tissue is gone elsewhere than in the cavity.
+    #[error(
+        "{cc:.1} cc of tissue are fluid after the operation elsewhere than in the cavity: a second cavity, a cut or a new lesion; \
+         look at the post-operative scan, and give a cavity mask that holds all of what was taken"
+    )]
+    LostElsewhere {
+        /// Volume, cc.
+        cc: f64,
+    },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
     NoVentricle,

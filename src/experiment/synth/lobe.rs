@@ -21,11 +21,33 @@ pub enum Lobe {
     Occipital,
     /// Around the middle of the insula.
     Insular,
+    /// A cut around the central core (insula, basal ganglia, thalamus), as of a functional hemispherotomy: the hemisphere
+    /// stays, disconnected. The volume says how wide the cut is: 35 cc about 4.5 mm.
+    Hemisphere,
+}
+
+/// The central core, as an ellipsoid around (|x|, y, z), mm.
+const CORE_MM: [f64; 3] = [27.0, -8.0, 6.0];
+/// Half axes of its outside, where the cut runs, mm.
+const CORE_RADII_MM: [f64; 3] = [25.0, 44.0, 27.0];
+/// The core's lower part stays on the brainstem, mm.
+const CUT_BOTTOM_MM: f64 = -14.0;
+/// The cut is nowhere wider than twice this, mm.
+const CUT_MM: f64 = 6.0;
+
+/// About how far a point lies from the outside of the central core, mm.
+fn from_core_mm(p: [f64; 3]) -> f64 {
+    let from: Vec<f64> = (0..3).map(|a| p[a] - CORE_MM[a]).collect();
+    let radius = from.iter().zip(CORE_RADII_MM).map(|(d, r)| (d / r).powi(2)).sum::<f64>().sqrt();
+    let length = from.iter().map(|d| d * d).sum::<f64>().sqrt();
+    // Along the ray from the centre.
+    (radius - 1.0).abs() * length / radius.max(1e-6)
 }
 
 impl Lobe {
     /// Every place.
-    pub const ALL: [Self; 5] = [Self::Temporal, Self::Frontal, Self::Parietal, Self::Occipital, Self::Insular];
+    pub const ALL: [Self; 6] =
+        [Self::Temporal, Self::Frontal, Self::Parietal, Self::Occipital, Self::Insular, Self::Hemisphere];
 
     /// The word in files and messages.
     pub fn name(self) -> &'static str {
@@ -35,6 +57,7 @@ impl Lobe {
             Self::Parietal => "parietal",
             Self::Occipital => "occipital",
             Self::Insular => "insular",
+            Self::Hemisphere => "hemisphere",
         }
     }
 
@@ -50,7 +73,16 @@ impl Lobe {
                 Self::Parietal => y < central_mm && y > -72.0 && above_sylvian && z > 18.0,
                 Self::Occipital => y < -68.0 && z > -8.0 && z < 45.0,
                 Self::Insular => (26.0..46.0).contains(&x) && (-22.0..28.0).contains(&y) && (-10.0..20.0).contains(&z),
+                Self::Hemisphere => z > CUT_BOTTOM_MM && from_core_mm([x, y, z]) < CUT_MM,
             }
+    }
+
+    /// How far the wall strays, and the radius of what is taken at once, mm.
+    pub(super) fn tool_mm(self) -> (f64, f64) {
+        match self {
+            Self::Hemisphere => (0.4, 1.0),
+            _ => (2.5, 2.0),
+        }
     }
 
     /// How late a point would be taken: an elliptic distance from where the surgeon begins, mm.
@@ -62,6 +94,7 @@ impl Lobe {
             Self::Parietal => ([36.0, -50.0, 62.0], [1.0, 1.0, 1.0]),
             Self::Occipital => ([18.0, -104.0, 6.0], [1.0, 1.3, 1.0]),
             Self::Insular => ([37.0, 4.0, 5.0], [0.7, 1.3, 1.1]),
+            Self::Hemisphere => return from_core_mm([sign * p.mm.x, p.mm.y, p.mm.z]),
         };
         let from = [p.mm.x - sign * begin[0], p.mm.y - begin[1], p.mm.z - begin[2]];
         (0..3).map(|a| (from[a] / stretch[a]).powi(2)).sum::<f64>().sqrt()
@@ -72,13 +105,27 @@ impl std::str::FromStr for Lobe {
     type Err = String;
     fn from_str(word: &str) -> Result<Self, String> {
         let known = Self::ALL.into_iter().find(|lobe| lobe.name() == word);
-        known.ok_or_else(|| "say temporal, frontal, parietal, occipital or insular".to_owned())
+        known.ok_or_else(|| "say temporal, frontal, parietal, occipital, insular or hemisphere".to_owned())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_cut_that_disconnects_a_hemisphere_goes_around_its_core_and_leaves_the_core_and_the_other_side() {
+        let cut = |x: f64, y: f64, z: f64| Lobe::Hemisphere.holds(Side::Left, Position::new(x, y, z));
+        // Callosum, frontal white matter, corona radiata above, insula's opercula.
+        for (x, y, z) in [(-3.0, -8.0, 8.0), (-27.0, 36.0, 6.0), (-27.0, -8.0, 33.0), (-51.0, -8.0, 6.0)] {
+            assert!(cut(x, y, z), "{x} {y} {z}");
+            assert!(!cut(-x, y, z) && Lobe::Hemisphere.order_mm(Side::Left, Position::new(x, y, z)) < 2.0);
+        }
+        // Putamen, pole, vertex, brainstem.
+        for (x, y, z) in [(-27.0, -2.0, 2.0), (-27.0, 60.0, 6.0), (-27.0, -8.0, 60.0), (-5.0, -30.0, -40.0)] {
+            assert!(!cut(x, y, z), "{x} {y} {z}");
+        }
+    }
 
     #[test]
     fn a_place_lies_in_one_lobe_of_one_side_and_the_surgeon_begins_beside_it() {

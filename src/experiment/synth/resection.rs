@@ -4,7 +4,7 @@ use super::frame::{Patient, centre};
 use super::settings::{SynthError, SynthSettings};
 use crate::experiment::smooth_noise::SmoothNoise;
 use crate::geometry::{Mni, Position};
-use crate::image::components::{Connectivity, largest_component};
+use crate::image::components::{Connectivity, largest_component, without_islands};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, open};
@@ -50,6 +50,7 @@ pub fn resect(
     let noise = |stream, size_mm| SmoothNoise::new(CounterRng::new(settings.seed, stream), size_mm);
     let (wall, lobe_edge) = (noise(201, 16.0), noise(202, 24.0));
     let sign = if settings.side == Side::Left { -1.0 } else { 1.0 };
+    let (stray_mm, tip_mm) = settings.lobe.tool_mm();
     // How late a voxel would be taken: uneven by a few mm.
     let order: Vec<f32> = (0..grid.len())
         .into_par_iter()
@@ -64,7 +65,7 @@ pub fn resect(
             if !settings.lobe.holds(settings.side, moved) {
                 return f32::INFINITY;
             }
-            (settings.lobe.order_mm(settings.side, at) + 2.5 * wall.at(p.into())) as f32
+            (settings.lobe.order_mm(settings.side, at) + stray_mm * wall.at(p.into())) as f32
         })
         .collect();
     let mut lobe: Vec<f32> = order.iter().copied().filter(|o| o.is_finite()).collect();
@@ -83,10 +84,10 @@ pub fn resect(
     let limit = lobe[wanted.min(lobe.len() - 1)];
     let taken = Mask::from_data(grid, order.iter().map(|&o| o < limit).collect());
     // A suction tip leaves neither threads nor islands.
-    Ok(walled(labels, &close(&open(&taken, 2.0), 3.0)))
+    Ok(walled(labels, &close(&open(&taken, tip_mm), 1.5 * tip_mm)))
 }
 
-/// Takes what a mask of the head holds of the brain; never the ventricle.
+/// Takes what a mask of the head holds of the brain, in one place or several; never the ventricle.
 pub fn resect_mask(
     labels: &LabelMap<Patient>,
     in_head: impl Fn(Point3<f64>) -> Position<Mni> + Sync,
@@ -107,25 +108,25 @@ pub fn resect_mask(
     if found_cc == 0.0 {
         return Err(SynthError::NothingToTake);
     }
-    if !(LEAST_CC..=MOST_CC).contains(&found_cc) {
+    // Crumbs are a mask's edge, not a place of the operation.
+    let voxels = (LEAST_CC * 1000.0 / grid.voxel_volume_mm3()).ceil() as usize;
+    let places = without_islands(&taken, Connectivity::Faces, voxels);
+    if places.count() == 0 || found_cc > MOST_CC {
         return Err(SynthError::MaskSize { found_cc, least_cc: LEAST_CC, most_cc: MOST_CC });
     }
-    Ok(walled(labels, &taken))
+    Ok(with_wall(&places))
 }
 
-/// The region with a smooth wall; never the ventricle.
+/// The largest part of the region, with a smooth wall; never the ventricle.
 pub(super) fn walled(labels: &LabelMap<Patient>, smooth: &Mask<Patient>) -> Resection {
-    let grid = labels.grid;
-    let ventricle = labels.map(|l| l == label::VENTRICLE);
-    let head = labels.map(|l| l != label::BACKGROUND);
-    let kept = smooth
-        .data
-        .iter()
-        .zip(&ventricle.data)
-        .zip(&head.data)
-        .map(|((&taken, &ventricle), &head)| taken && !ventricle && head);
-    let region = largest_component(&Mask::from_data(grid, kept.collect()), Connectivity::Faces);
-    let wall_mm = gaussian(&signed_distance_mm(&region), 0.8);
+    let free = |l: u8| l != label::VENTRICLE && l != label::BACKGROUND;
+    let kept = Mask::from_fn(labels.grid, |n| smooth.data[n] && free(labels.data[n]));
+    with_wall(&largest_component(&kept, Connectivity::Faces))
+}
+
+fn with_wall(region: &Mask<Patient>) -> Resection {
+    let grid = region.grid;
+    let wall_mm = gaussian(&signed_distance_mm(region), 0.8);
     let inside = (0..grid.len()).filter(|&n| region.data[n]);
     let sum =
         inside.fold((Point3::origin().coords, 0f64), |(sum, count), n| (sum + centre(&grid, n).coords, count + 1.0));

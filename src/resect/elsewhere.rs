@@ -1,0 +1,273 @@
+//! Tissue that is gone elsewhere than in the cavity: cuts too thin for a cavity's seed, as of a hemisphere that was
+//! disconnected, and second cavities.
+//!
+//! A cavity is looked for before the brain's sag is known, so only thickly ([`CavitySettings::opening_mm`]): sulci that
+//! have opened or moved would be taken for one. Once the sag is known, what it explains is no loss, and what remains may
+//! be thin.
+
+use super::belief::Evidence;
+use super::cavity::{CavityFinding, CavitySettings, ResectError, grow, settled, side_of, with_fluid_of};
+use super::cavity_pair::CavityPair;
+use super::pair::PairError;
+use super::sets::{both, either, without};
+use crate::geometry::Mni;
+use crate::image::components::{Connectivity, components};
+use crate::image::morphology::{dilate, erode, open};
+use crate::image::{Mask, Volume};
+use crate::register::deformable::AtlasFit;
+use crate::segment::label;
+
+/// What is thinner than twice this once the sag is known is an error of the sag, mm.
+const THREAD_MM: f64 = 1.0;
+/// So near to the cavity the sag follows its surroundings and is less sure, mm.
+const BESIDE_MM: f64 = 1.0;
+/// Smaller parts are not looked at, cc: a cut that noise or a vessel has parted is larger.
+const LEAST_PART_CC: f64 = 0.25;
+/// How often the sag is fitted again without what was found: a cut that takes part in a fit is partly explained away.
+const MOST_FITS: usize = 3;
+
+/// Where the tissue is after the operation, by the sag.
+struct Carried {
+    t1: Volume<f32, Mni>,
+    tissue: Mask<Mni>,
+    brain: Mask<Mni>,
+    ventricle: Mask<Mni>,
+}
+
+impl Carried {
+    fn of(pair: &CavityPair<'_>, sag: &AtlasFit<Mni>) -> Self {
+        let [tissue, brain, ventricle] = [
+            pair.pre_labels.map(|l| f32::from(label::is_tissue(l))),
+            pair.pre_brain.map(f32::from),
+            pair.pre_labels.map(|l| f32::from(l == label::VENTRICLE)),
+        ];
+        let [t1, tissue, brain, ventricle] =
+            sag.atlas_from_subject.warp([pair.pre, &tissue, &brain, &ventricle], &pair.pre.grid);
+        let most = |share: Volume<f32, Mni>| share.map(|s| s >= 0.5);
+        Self { t1, tissue: most(tissue), brain: most(brain), ventricle: most(ventricle) }
+    }
+}
+
+/// What the sag does not explain.
+struct Loss {
+    seed: Mask<Mni>,
+    evidence: Evidence,
+}
+
+/// Tissue that is dark now where the sag says that it should be, away from the cavity and from the brain's rim; `None` where
+/// there is less of it than of a cavity, or where it makes no sense as something that was taken out.
+fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: &CavitySettings) -> Option<Loss> {
+    let bright = f64::midpoint(pair.csf_grey_border, pair.grey_mean) as f32;
+    let near = either(&dilate(cavity, BESIDE_MM), &erode(&carried.brain, settings.rim_mm).map(|deep| !deep));
+    let lost = dark(pair, |n| carried.tissue.data[n] && carried.t1.data[n] > bright && !near.data[n]);
+    let thick = open(&lost, THREAD_MM);
+    let parts = components(&thick, Connectivity::Corners);
+    let voxel_cc = pair.pre.grid.voxel_volume_mm3() / 1000.0;
+    let labels = Volume::from_fn(pair.pre.grid, |n| if carried.ventricle.data[n] { label::VENTRICLE } else { 0 });
+    let sagged = CavityPair { pre: &carried.t1, pre_labels: &labels, pre_brain: &carried.brain, ..*pair };
+    let mut believed: Vec<(u32, Evidence)> = Vec::new();
+    for (part, _) in (1..).zip(&parts.voxels).filter(|(_, voxels)| **voxels as f64 * voxel_cc >= LEAST_PART_CC) {
+        let evidence = Evidence::of(&parts.mask(part), &sagged);
+        if evidence.doubt().is_none() {
+            believed.push((part, evidence));
+        }
+    }
+    let seed = parts.kept(|part, _| believed.iter().any(|(own, _)| *own == part));
+    let (_, largest) = believed.into_iter().max_by(|a, b| a.1.seed_cc.total_cmp(&b.1.seed_cc))?;
+    // As far as it goes, thick or thin.
+    let seed = holding(&lost, &seed);
+    let seed_cc = seed.volume_cc();
+    (seed_cc >= settings.smallest_cc).then_some(Loss { seed, evidence: Evidence { seed_cc, ..largest } })
+}
+
+/// The connected parts of a mask that hold any of the seed.
+fn holding(mask: &Mask<Mni>, seed: &Mask<Mni>) -> Mask<Mni> {
+    let parts = components(mask, Connectivity::Faces);
+    let mut held = vec![false; parts.voxels.len() + 1];
+    parts
+        .labels
+        .data
+        .iter()
+        .zip(&seed.data)
+        .filter(|(_, seed)| **seed)
+        .for_each(|(&part, _)| held[part as usize] = true);
+    parts.kept(|part, _| held[part as usize])
+}
+
+fn dark(pair: &CavityPair<'_>, and: impl Fn(usize) -> bool + Sync + Send) -> Mask<Mni> {
+    let border = pair.csf_grey_border as f32;
+    Mask::from_fn(pair.pre.grid, |n| pair.post_known.data[n] && pair.post.data[n] < border && and(n))
+}
+
+/// The cavity with what is gone elsewhere, and the sag around all of it. Where no cavity was seen at all (not where one was
+/// doubted), a thin cut alone is one.
+///
+/// # Errors
+/// That of `found`, or of `fit`, which fits the sag around a cavity.
+pub(super) fn with_losses_elsewhere(
+    found: Result<CavityFinding, ResectError>,
+    pair: &CavityPair<'_>,
+    fit: impl Fn(&Mask<Mni>) -> Result<AtlasFit<Mni>, PairError>,
+    settings: &CavitySettings,
+) -> Result<(CavityFinding, AtlasFit<Mni>), PairError> {
+    let (mut cavity, mut evidence, unseen) = match found {
+        Ok(CavityFinding { cavity, evidence, .. }) => (cavity, evidence, None),
+        Err(none @ ResectError::NoOperation { doubt: None, .. }) => (pair.pre_brain.map(|_| false), None, Some(none)),
+        Err(other) => return Err(other.into()),
+    };
+    let mut sag = fit(&cavity)?;
+    for _ in 0..MOST_FITS {
+        let carried = Carried::of(pair, &sag);
+        let Some(more) = loss(pair, &carried, &cavity, settings) else { break };
+        let way = dark(pair, |n| carried.tissue.data[n] && carried.brain.data[n]);
+        let grown = grow(&more.seed, &way, settings.growth_mm);
+        let whole = settled(&either(&cavity, &grown), &carried.brain, settings.closing_mm);
+        let whole = with_fluid_of(&whole, &carried.tissue, settings.surroundings_mm);
+        cavity = either(&cavity, &without(&whole, &carried.ventricle));
+        evidence = evidence.or(Some(more.evidence));
+        sag = fit(&cavity)?;
+    }
+    if let (Some(unseen), None) = (unseen, evidence) {
+        return Err(unseen.into());
+    }
+    let ventricle = pair.pre_labels.map(|l| l == label::VENTRICLE);
+    let resected = without(&both(&cavity, pair.pre_brain), &ventricle);
+    let side = side_of(&cavity);
+    Ok((CavityFinding { cavity, resected, side, evidence }, sag))
+}
+
+/// How much tissue is gone elsewhere than in this cavity, cc; `None` where nothing to speak of.
+pub(super) fn lost_elsewhere_cc(
+    pair: &CavityPair<'_>,
+    sag: &AtlasFit<Mni>,
+    cavity: &Mask<Mni>,
+    settings: &CavitySettings,
+) -> Option<f64> {
+    loss(pair, &Carried::of(pair, sag), cavity, settings).map(|lost| lost.evidence.seed_cc)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::belief::Doubt;
+    use super::super::find_cavity;
+    use super::*;
+    use crate::image::{Grid, LabelMap};
+    use crate::register::deformable::{DeformableQuality, DisplacementField};
+    use nalgebra::Point3;
+
+    /// A ball of folded tissue of radius 40 mm with a ventricle of 8 mm in it, in voxels of 1 mm; `gone` says what is fluid on the
+    /// second scan, `moved_mm` how far everything has moved along x on it.
+    struct Head {
+        pre: Volume<f32, Mni>,
+        labels: LabelMap<Mni>,
+        brain: Mask<Mni>,
+        post: Volume<f32, Mni>,
+        gone: Mask<Mni>,
+    }
+
+    /// A sheet of fluid of 4 mm, as thick as a deep sulcus.
+    fn sulcus(p: Point3<f64>) -> bool {
+        (p.x - 16.0).abs() < 2.0 && p.y.abs() < 16.0 && p.z.abs() < 16.0
+    }
+
+    fn head(gone: impl Fn(Point3<f64>) -> bool + Sync + Send, moved_mm: f64) -> Head {
+        let grid = Grid::axis_aligned([90; 3], [1.0; 3], [-44.5; 3]);
+        let at = |n: usize| grid.position(grid.voxel(n).map(|c| c as f64).into()).mm;
+        let label_at = |p: Point3<f64>| match p.coords.norm() {
+            r if r < 8.0 => label::VENTRICLE,
+            r if r < 40.0 && sulcus(p) => label::CSF,
+            r if r < 40.0 => label::WHITE_MATTER,
+            _ => label::BACKGROUND,
+        };
+        let value_at = |p: Point3<f64>| match label_at(p) {
+            label::WHITE_MATTER => 100.0 + 8.0 * (0.9 * p.y).sin() as f32,
+            _ => 25.0,
+        };
+        let gone = Mask::from_fn(grid, |n| label_at(at(n)) == label::WHITE_MATTER && gone(at(n)));
+        let before = |n: usize| at(n) - nalgebra::Vector3::new(moved_mm, 0.0, 0.0);
+        Head {
+            pre: Volume::from_data(grid, (0..grid.len()).map(|n| value_at(at(n))).collect()),
+            labels: LabelMap::from_data(grid, (0..grid.len()).map(|n| label_at(at(n))).collect()),
+            brain: Mask::from_data(grid, (0..grid.len()).map(|n| label_at(at(n)) != label::BACKGROUND).collect()),
+            post: Volume::from_data(
+                grid,
+                (0..grid.len()).map(|n| if gone.data[n] { 25.0 } else { value_at(before(n)) }).collect(),
+            ),
+            gone,
+        }
+    }
+
+    fn found(h: &Head, sag_mm: f32) -> Result<CavityFinding, PairError> {
+        let known = h.brain.map(|_| true);
+        let pair = CavityPair {
+            pre: &h.pre,
+            pre_labels: &h.labels,
+            pre_brain: &h.brain,
+            post: &h.post,
+            post_known: &known,
+            csf_grey_border: 60.0,
+            grey_mean: 95.0,
+            grey_white_contrast: 30.0,
+        };
+        let by = |x: f32| DisplacementField::from_displacement(&Volume::filled(h.pre.grid, [x, 0.0, 0.0]));
+        let fit = |_: &Mask<Mni>| {
+            let quality = DeformableQuality {
+                correlation: [1.0; 2],
+                smallest_jacobian: 1.0,
+                largest_jacobian: 1.0,
+                round_trip_mm: 0.0,
+                iterations: Vec::new(),
+            };
+            Ok(AtlasFit { atlas_from_subject: by(-sag_mm), subject_from_atlas: by(sag_mm), quality })
+        };
+        let settings = CavitySettings::default();
+        with_losses_elsewhere(find_cavity(&pair, &settings), &pair, fit, &settings).map(|(found, _)| found)
+    }
+
+    fn cut(p: Point3<f64>) -> bool {
+        (p.x + 18.0).abs() < 2.0 && p.y.abs() < 18.0 && p.z.abs() < 18.0
+    }
+
+    #[test]
+    fn a_cut_too_thin_for_a_cavity_is_found_once_the_sag_is_known() {
+        let h = head(cut, 0.0);
+        let found = found(&h, 0.0).unwrap();
+        assert!(found.cavity.dice(&h.gone) > 0.9, "{}", found.cavity.dice(&h.gone));
+        assert!(found.resected.dice(&h.gone) > 0.9 && found.evidence.is_some_and(|e| e.doubt().is_none()));
+    }
+
+    #[test]
+    fn two_cavities_and_the_cut_between_them_are_all_found() {
+        let ball = |p: Point3<f64>, y: f64| (p - Point3::new(-18.0, y, 0.0)).norm() < 8.0;
+        let h = head(
+            |p| ball(p, -18.0) || ball(p, 18.0) || ((p.x + 18.0).abs() < 2.0 && p.y.abs() < 18.0 && p.z.abs() < 6.0),
+            0.0,
+        );
+        let found = found(&h, 0.0).unwrap();
+        assert!(found.cavity.dice(&h.gone) > 0.9, "{}", found.cavity.dice(&h.gone));
+    }
+
+    #[test]
+    fn what_the_sag_explains_is_no_loss_and_what_it_does_not_is() {
+        let h = head(|_| false, 4.0);
+        assert!(matches!(found(&h, 4.0), Err(PairError::Resect(ResectError::NoOperation { doubt: None, .. }))));
+        let lost = found(&h, 0.0).unwrap().cavity;
+        let moved = Mask::from_fn(lost.grid, |n| {
+            let p = lost.grid.position(lost.grid.voxel(n).map(|c| c as f64).into()).mm;
+            sulcus(p - nalgebra::Vector3::new(4.0, 0.0, 0.0))
+        });
+        assert!(both(&lost, &moved).count() * 10 > 9 * lost.count(), "the sulcus where it is now");
+    }
+
+    #[test]
+    fn what_was_doubted_stays_doubted_and_ventricles_that_have_grown_a_little_are_no_cut() {
+        let grown = |r: f64| head(move |p| p.coords.norm() < r, 0.0);
+        let thick = found(&grown(12.0), 0.0).map(|f| f.cavity.count()).unwrap_err();
+        assert!(
+            matches!(thick, PairError::Resect(ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. })),
+            "{thick}"
+        );
+        let thin = found(&grown(10.5), 0.0).map(|f| f.cavity.count()).unwrap_err();
+        assert!(matches!(thin, PairError::Resect(ResectError::NoOperation { .. })), "{thin}");
+    }
+}
