@@ -1,10 +1,12 @@
 //! What of a cell is which material.
 //!
 //! A cell whose parts are of several tissues deforms as one, so the energy in it is the sum of its tissues' by their parts,
-//! W = sum_i f_i W_i (Voigt, Annalen der Physik 274, 1889; for finite strain Ogden, Math. Proc. Camb. Phil. Soc. 84, 1978, who shows that it bounds the
-//! energy of any arrangement from above). That is the integral of the energy over the cell under a deformation that is constant in
-//! it, for any law. So such a cell is assembled once for each tissue with a part of its volume, and stress, tangent and
-//! sensitivities are sums as the energy is. The bound is the stiff one: soft tissue in a cell cannot give way by itself.
+//! W = sum_i f_i W_i (Voigt, Annalen der Physik 274, 1889): for any law the integral of the energy over the cell under a
+//! deformation that is constant in it. So such a cell is assembled once for each tissue with a part of its volume, and stress,
+//! tangent and sensitivities are sums as the energy is.
+//!
+//! It bounds the energy of any arrangement from above (Hill, Proc. Phys. Soc. A 65, 1952; for large strain Ogden, Int. J. Solids
+//! Structures 14, 1978). The bound is the stiff one: soft tissue within a cell cannot give way by itself.
 
 use super::FemError;
 use super::portion::Portion;

@@ -32,8 +32,7 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
     let (points, cells) = (mesh.nodes_mm().len(), mesh.tets().len());
     check_fields(point_fields, points, &mesh.node_sets.keys().map(String::as_str).collect::<Vec<_>>())?;
     let facet_names: Vec<String> = mesh.facet_sets.keys().map(|name| format!("{FACETS}{name}")).collect();
-    let fraction = |l: u8| format!("{FRACTION}{}", label::name(l).map_or_else(|| l.to_string(), str::to_owned));
-    let fractions: Vec<String> = mesh.fractions().keys().map(|&l| fraction(l)).collect();
+    let fractions: Vec<String> = mesh.fractions().keys().map(|&label| fraction_name(label)).collect();
     let taken: Vec<&str> = facet_names.iter().chain(&fractions).map(String::as_str).chain(["label"]).collect();
     check_fields(cell_fields, cells, &taken)?;
 
@@ -76,6 +75,12 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
     }
     xml += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
     Ok(xml.into_bytes())
+}
+
+/// The cell array that says which part of every cell a label fills.
+pub fn fraction_name(label: u8) -> String {
+    let name = label::name(label).map_or_else(|| label.to_string(), str::to_owned);
+    format!("{FRACTION}{name}")
 }
 
 fn array(number: &str, name: &str, components: usize, bytes: &[u8]) -> String {
