@@ -115,7 +115,7 @@ impl TetMesh {
     /// [`MeshError::FractionCount`] and [`MeshError::Fractions`].
     pub fn set_fractions(&mut self, fractions: Fractions) -> Result<(), MeshError> {
         let tets = self.tets.len();
-        for (&label, of) in fractions.iter().filter(|(_, of)| of.len() != tets) {
+        if let Some((&label, of)) = fractions.iter().find(|(_, of)| of.len() != tets) {
             return Err(MeshError::FractionCount { label, tets, found: of.len() });
         }
         for tet in 0..if fractions.is_empty() { 0 } else { tets } {

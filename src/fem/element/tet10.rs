@@ -31,7 +31,9 @@ impl Element for Tet10 {
         let (tets, portions) = sorted(mesh.with_mid_edge_nodes, mesh.number, mesh.portions);
         let mut points = points(mesh.nodes_m, &tets);
         for (of, portion) in points.iter_mut().zip(&portions) {
-            of.iter_mut().for_each(|point| point.weight_m3 *= portion.share);
+            for point in of {
+                point.weight_m3 *= portion.share;
+            }
         }
         let elements = Elements::new(tets, points, portions, mesh.row_of, mesh.pattern);
         Box::new(Plain { elements, mass_share })
