@@ -56,6 +56,9 @@ pub fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     for field in state.cell_fields {
         cells.set_item(field.name.clone(), field_array(py, field)?)?;
     }
+    for (&label, of) in state.mesh.fractions() {
+        cells.set_item(vtu::fraction_name(label), array1(py, of.clone()))?;
+    }
     found.set_item("point_data", points)?;
     found.set_item("cell_data", cells)?;
     Ok(found)

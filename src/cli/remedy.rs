@@ -133,7 +133,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             "run `hgm sweep CASE` on the shard it belongs to with the settings of the other shards (`hgm why CASE` tells \
              what differs)"
         }
-        WorkflowError::Mesh(MeshFileError::Output { .. })
+        WorkflowError::Mesh(MeshFileError::Output { .. } | MeshFileError::Fractions { .. })
         | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o",
         WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out",
         WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => {

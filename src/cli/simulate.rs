@@ -7,8 +7,10 @@ use std::path::PathBuf;
 /// Deform a tetrahedral mesh by the loads and materials of a scenario
 ///
 /// MESH is a VTU (cell array `label`, point arrays of 0 and 1 as node sets; gmsh's and meshio's work too) or an MSH 4.1
-/// with physical groups. The result has displacement (mm) and reactions (N) on the nodes, volume ratio and strain energy
-/// density in the cells; a motion also gets a PVD series beside it.
+/// with physical groups. Where a VTU says what lies within the cells (cell arrays `fraction:TISSUE` that sum to 1, as
+/// `hgm mesh` writes them with `partial_volume = true` in the table [mesh]), a cell's energy is the sum of its tissues' by
+/// their parts. The result has displacement (mm) and reactions (N) on the nodes, volume ratio and strain energy density in
+/// the cells; a motion also gets a PVD series beside it.
 ///
 /// Example: hgm simulate brain.vtu gravity.toml -o out.vtu
 #[derive(Debug, clap::Args)]

@@ -12,38 +12,6 @@ pub(super) fn node_set<'a>(mesh: &'a TetMesh, set: &str) -> Result<&'a [u32], Fe
     if nodes.is_empty() { Err(FemError::EmptySet { set: set.to_owned() }) } else { Ok(nodes) }
 }
 
-/// Which material every tetrahedron has; checks names both ways.
-pub(super) fn materials_of_cells(mesh: &TetMesh, scenario: &Scenario) -> Result<(Vec<u16>, Vec<String>), FemError> {
-    for (first, number) in &scenario.labels {
-        let same = scenario.labels.iter().find(|(other, n)| *other > first && *n == number);
-        if let Some((second, _)) = same {
-            let (first, second) = (first.clone(), second.clone());
-            return Err(FemError::SameLabel { first, second, number: *number });
-        }
-    }
-    let names: Vec<String> = scenario.materials.keys().cloned().collect();
-    for name in &names {
-        if scenario.label_number(name).is_none() {
-            return Err(FemError::UnknownLabel { name: name.clone() });
-        }
-    }
-    let mut index_of_label = [None; 256];
-    let mut materials = Vec::with_capacity(mesh.tets().len());
-    for (cell, &label) in mesh.labels().iter().enumerate() {
-        let index = if let Some(index) = index_of_label[usize::from(label)] {
-            index
-        } else {
-            let name = scenario.label_name(label).ok_or(FemError::UnnamedLabel { cell, label })?;
-            let index = names.iter().position(|n| n == name);
-            let index = index.ok_or_else(|| FemError::NoMaterial { cell, label, name: name.to_owned() })? as u16;
-            index_of_label[usize::from(label)] = Some(index);
-            index
-        };
-        materials.push(index);
-    }
-    Ok((materials, names))
-}
-
 pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     let refuse = |key: &str, value: f64, rule| Err(FemError::Setting { key: key.to_owned(), value, rule });
     let loads = &scenario.loads;

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 const AMPLITUDE: [f64; 3] = [0.1, -0.08, 0.06];
 
 /// The unit cube (m) of n^3 cells, six tetrahedra each, all faces held.
-fn cube(n: usize) -> TetMesh {
+pub(super) fn cube(n: usize) -> TetMesh {
     let m = n + 1;
     let number = |i: usize, j: usize, k: usize| (i + m * (j + m * k)) as u32;
     let at = |c: usize| 1e3 * c as f64 / n as f64;

@@ -16,9 +16,11 @@ mod load;
 #[cfg(test)]
 mod manufactured;
 mod mass;
+mod mixture;
 mod model;
 mod order;
 mod outcome;
+mod portion;
 mod reduce;
 mod scenario;
 mod sensitivity;

@@ -2,11 +2,12 @@
 //! every solve.
 
 use super::buoyancy::Buoyancy;
-use super::check::{check_held_together, check_materials, check_settings, floating, materials_of_cells, node_set};
+use super::check::{check_held_together, check_materials, check_settings, floating, node_set};
 use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
 use super::linear::{Symbolic, Tangent};
 use super::load::{Load, NodalForces, nodal_forces_n};
+use super::mixture::portions;
 use super::order::{Graph, renumbered, reverse_cuthill_mckee};
 use super::scenario::{MassKind, Materials, Method, Scenario};
 use super::sharing::Sharing;
@@ -75,7 +76,7 @@ impl Model {
         check_materials(&scenario.materials)?;
         let body = scenario.body(mesh)?;
         let mesh = &*body;
-        let (material_of_cell, names) = materials_of_cells(mesh, scenario)?;
+        let (portions, names) = portions(mesh, scenario)?;
         let corners = mesh.nodes_mm().len();
         let element = scenario.solver.element.element();
         let quadratic = element.has_mid_edge_nodes().then(|| with_mid_edge_nodes(corners, mesh.tets()));
@@ -185,7 +186,7 @@ impl Model {
         let body = element.body(&Numbered {
             number: &number,
             nodes_m: &nodes_m,
-            material_of_cell: &material_of_cell,
+            portions: &portions,
             tets: mesh.tets(),
             with_mid_edge_nodes: quadratic.as_ref().map_or(&[], |(tets, _)| tets),
             row_of: &row_of,

@@ -2,6 +2,8 @@
 //!
 //! Source: George and Liu, "Computer Solution of Large Sparse Positive Definite Systems", 1981, ch. 4.
 
+use super::portion::Portion;
+
 /// Adjacency of nodes in compressed rows, without the diagonal, ascending.
 pub(super) struct Graph {
     pub start: Vec<usize>,
@@ -129,18 +131,17 @@ pub(super) fn renumbered(graph: &Graph, order: &[u32], number: &[u32]) -> Graph 
     Graph { start, neighbours }
 }
 
-/// Elements in solver numbers, ordered by their first node so that neighbours in the list share memory.
+/// Elements in solver numbers, one for each portion of a cell, ordered by their first node so that neighbours in the list share
+/// memory.
 pub(super) fn sorted<const K: usize>(
     tets: &[[u32; K]],
     number: &[u32],
-    material_of_cell: &[u16],
-) -> (Vec<[u32; K]>, Vec<u16>, Vec<u32>) {
-    let renumbered = |cell: u32| tets[cell as usize].map(|n| number[n as usize]);
-    let mut cells: Vec<u32> = (0..tets.len() as u32).collect();
-    cells.sort_by_cached_key(|&cell| (renumbered(cell).iter().copied().min(), cell));
-    let nodes = cells.iter().map(|&cell| renumbered(cell)).collect();
-    let materials = cells.iter().map(|&cell| material_of_cell[cell as usize]).collect();
-    (nodes, materials, cells)
+    portions: &[Portion],
+) -> (Vec<[u32; K]>, Vec<Portion>) {
+    let renumbered = |portion: &Portion| tets[portion.cell as usize].map(|n| number[n as usize]);
+    let mut sorted = portions.to_vec();
+    sorted.sort_by_cached_key(|portion| (renumbered(portion).iter().copied().min(), portion.cell, portion.material));
+    (sorted.iter().map(renumbered).collect(), sorted)
 }
 
 #[cfg(test)]

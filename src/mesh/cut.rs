@@ -45,6 +45,8 @@ impl TetMesh {
         }
         // The shape of no tetrahedron has changed.
         let Ok(mut mesh) = Self::new(nodes, tets, self.labels().to_vec()) else { return self.clone() };
+        // No cell has come or gone.
+        let Ok(()) = mesh.set_fractions(self.fractions().clone()) else { return self.clone() };
         for (set, members) in &self.node_sets {
             let more = doubles.iter().filter(|(node, _)| members.binary_search(node).is_ok()).map(|d| d.1);
             mesh.node_sets.insert(set.clone(), members.iter().copied().chain(more).collect());

@@ -9,6 +9,7 @@ pub mod format;
 mod isosurface;
 mod label_field;
 mod optimise;
+mod partial_volume;
 mod pieces;
 pub mod quality;
 mod repair;
@@ -21,8 +22,9 @@ pub use enclosed::OpenSurface;
 pub use isosurface::isosurface;
 pub use label_field::LabelField;
 pub use optimise::OptimiseSettings;
+pub use partial_volume::tissue_fractions;
 pub use repair::Island;
-pub use tet_mesh::{MeshError, TET_FACES, TetMesh};
+pub use tet_mesh::{Fractions, MeshError, TET_FACES, TetMesh};
 pub use tri_mesh::TriMesh;
 
 /// Height of a polyline of (y, z) at `y`: linear between its points, constant beyond its ends. It runs from front to back.

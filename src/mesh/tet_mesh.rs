@@ -7,6 +7,12 @@ use thiserror::Error;
 /// The four faces of a tetrahedron as local corners, each seen counter-clockwise from outside.
 pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
+/// The part of every cell that each label fills, by label.
+pub type Fractions = BTreeMap<u8, Vec<f64>>;
+
+/// How far the fractions of a cell may sum beside one: what six digits in a file lose.
+const SUM_TOLERANCE: f64 = 1e-5;
+
 /// Linear tetrahedra, mm, RAS+. Every tet has positive volume, every index is valid, every coordinate finite.
 ///
 /// ```
@@ -20,6 +26,7 @@ pub struct TetMesh {
     nodes_mm: Vec<[f64; 3]>,
     tets: Vec<[u32; 4]>,
     labels: Vec<u8>,
+    fractions: Fractions,
     /// Named node sets, node numbers ascending.
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Named facet sets: triangles by node numbers, outward where the facet has an outside.
@@ -42,6 +49,13 @@ pub enum MeshError {
     NoSuchNode { tet: usize, node: u32, nodes: usize },
     #[error("tetrahedron {tet} has volume {volume_mm3:e} mm3: inverted or flat; reorder its nodes or repair the mesh")]
     NotPositive { tet: usize, volume_mm3: f64 },
+    #[error("{found} fractions of label {label} for {tets} tetrahedra: one each is needed")]
+    FractionCount { label: u8, tets: usize, found: usize },
+    #[error(
+        "the fractions of tetrahedron {tet} (counted from 0) are not parts of one whole: each is 0 to 1 and together they make 1, but they \
+         make {sum}; mesh it again, or take the arrays `fraction:` out of the file"
+    )]
+    Fractions { tet: usize, sum: f64 },
     #[error("set `{set}` names node {node}, but there are only {nodes} nodes")]
     SetNode { set: String, node: u32, nodes: usize },
 }
@@ -70,7 +84,8 @@ impl TetMesh {
                 return Err(MeshError::NotPositive { tet: t, volume_mm3 });
             }
         }
-        Ok(Self { nodes_mm, tets, labels, node_sets: BTreeMap::new(), facet_sets: BTreeMap::new() })
+        let (fractions, node_sets, facet_sets) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        Ok(Self { nodes_mm, tets, labels, fractions, node_sets, facet_sets })
     }
 
     /// Node coordinates in mm.
@@ -88,6 +103,38 @@ impl TetMesh {
         &self.labels
     }
 
+    /// What lies within the cells, where that is known; else empty, and every cell is of its label alone. `hgm simulate` takes a cell
+    /// for the mix of it.
+    pub fn fractions(&self) -> &Fractions {
+        &self.fractions
+    }
+
+    /// Says what lies within the cells.
+    ///
+    /// # Errors
+    /// [`MeshError::FractionCount`] and [`MeshError::Fractions`].
+    pub fn set_fractions(&mut self, fractions: Fractions) -> Result<(), MeshError> {
+        let tets = self.tets.len();
+        if let Some((&label, of)) = fractions.iter().find(|(_, of)| of.len() != tets) {
+            return Err(MeshError::FractionCount { label, tets, found: of.len() });
+        }
+        for tet in 0..if fractions.is_empty() { 0 } else { tets } {
+            let sum: f64 = fractions.values().map(|of| of[tet]).sum();
+            let parts = fractions.values().all(|of| (0.0..=1.0).contains(&of[tet]));
+            if !parts || (sum - 1.0).abs() > SUM_TOLERANCE {
+                return Err(MeshError::Fractions { tet, sum });
+            }
+        }
+        self.fractions = fractions;
+        Ok(())
+    }
+
+    /// The same mesh, every cell of its label alone.
+    #[must_use]
+    pub fn without_fractions(self) -> Self {
+        Self { fractions: Fractions::new(), ..self }
+    }
+
     /// Volume of one tetrahedron in mm3.
     pub fn volume_mm3(&self, tet: usize) -> f64 {
         signed_volume(&self.nodes_mm, &self.tets[tet])
@@ -100,7 +147,8 @@ impl TetMesh {
     pub fn moved(self, to_mm: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, MeshError> {
         let nodes_mm = self.nodes_mm.iter().map(|p| to_mm(*p)).collect();
         let moved = Self::new(nodes_mm, self.tets, self.labels)?;
-        Ok(Self { node_sets: self.node_sets, facet_sets: self.facet_sets, ..moved })
+        let Self { fractions, node_sets, facet_sets, .. } = self;
+        Ok(Self { fractions, node_sets, facet_sets, ..moved })
     }
 
     /// Adds or replaces a node set; the numbers are sorted and made unique.
@@ -188,6 +236,12 @@ impl TetMesh {
         let nodes = old_number.iter().map(|&n| self.nodes_mm[n as usize]).collect();
         let tets = kept.iter().map(|&t| self.tets[t].map(|n| new_number[n as usize])).collect();
         let mut part = Self::new(nodes, tets, kept.iter().map(|&t| self.labels[t]).collect()).ok()?;
+        for (&label, of) in &self.fractions {
+            let of: Vec<f64> = kept.iter().map(|&t| of[t]).collect();
+            if of.iter().any(|f| *f > 0.0) {
+                part.fractions.insert(label, of);
+            }
+        }
         for (name, set) in &self.node_sets {
             part.node_sets.insert(name.clone(), set.iter().filter_map(|&n| number(n)).collect());
         }
@@ -245,6 +299,26 @@ mod tests {
         assert_eq!((part.tets().len(), old.as_slice()), (1, [1, 2, 3, 4].as_slice()));
         assert_eq!(part.node_sets["tip"], [3]);
         assert!(mesh.restricted(|_| false).is_none());
+    }
+
+    #[test]
+    fn fractions_follow_their_cells_and_must_make_one() {
+        let mut mesh = two_tets();
+        let with = |grey: [f64; 2], white: [f64; 2]| Fractions::from([(2, grey.to_vec()), (3, white.to_vec())]);
+        mesh.set_fractions(with([1.0, 0.25], [0.0, 0.75])).unwrap();
+        assert_eq!(
+            mesh.restricted(|label| label == 3).unwrap().0.fractions(),
+            &Fractions::from([(2, vec![0.25]), (3, vec![0.75])])
+        );
+        assert_eq!(mesh.restricted(|label| label == 2).unwrap().0.fractions(), &Fractions::from([(2, vec![1.0])]));
+        assert_eq!(mesh.clone().moved(|p| p).unwrap(), mesh);
+        assert_eq!(mesh.cut_along("sheet", &[[1, 2, 3]]).fractions(), mesh.fractions());
+        for wrong in [with([1.0, 0.25], [0.0, 0.7]), with([1.0, 1.5], [0.0, -0.5]), with([f64::NAN, 0.0], [0.0, 1.0])] {
+            assert!(matches!(mesh.set_fractions(wrong), Err(MeshError::Fractions { .. })));
+        }
+        let short = Fractions::from([(2, vec![1.0])]);
+        assert_eq!(mesh.set_fractions(short), Err(MeshError::FractionCount { label: 2, tets: 2, found: 1 }));
+        assert_eq!(mesh.clone().without_fractions(), two_tets());
     }
 
     #[test]

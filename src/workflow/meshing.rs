@@ -78,6 +78,9 @@ pub fn mesh_file(
     if !FORMATS.contains(&extension.as_str()) {
         return Err(MeshFileError::Output { output: files.output.clone() }.into());
     }
+    if settings.mesh.partial_volume && extension != "vtu" {
+        return Err(MeshFileError::Fractions { output: files.output.clone() }.into());
+    }
     for file in [Some(&files.output), files.preview.as_ref()].into_iter().flatten() {
         check_writable(file)?;
     }

@@ -3,6 +3,7 @@
 //! Rows are dealt out to threads; every row is summed in the order of its elements by the one thread that owns it, so
 //! the bytes do not depend on the number of threads. Elements on a seam are evaluated once per owner.
 
+use super::super::portion::Portion;
 use super::super::reduce::CHUNK;
 use super::super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::kernel::{Kernel, M3, cofactors};
@@ -13,10 +14,8 @@ use rayon::prelude::*;
 pub(in super::super) struct Elements<const K: usize, const Q: usize> {
     pub nodes: Vec<[u32; K]>,
     pub points: Vec<[Point<K>; Q]>,
-    /// Which kernel each element uses.
-    pub material: Vec<u16>,
-    /// The cell of the mesh each element is.
-    pub cell: Vec<u32>,
+    /// Of which cell each element is which part, and which kernel it uses.
+    pub portions: Vec<Portion>,
     /// Where block (a, b) of each element goes in the matrix.
     positions: Vec<[[u32; K]; K]>,
 }
@@ -48,8 +47,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
     pub(in super::super) fn new(
         nodes: Vec<[u32; K]>,
         points: Vec<[Point<K>; Q]>,
-        material: Vec<u16>,
-        cell: Vec<u32>,
+        portions: Vec<Portion>,
         row_of: &[u32],
         pattern: &BlockPattern,
     ) -> Self {
@@ -57,7 +55,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
             .iter()
             .map(|element| element.map(|a| element.map(|b| pattern.position(row_of[a as usize], row_of[b as usize]))))
             .collect();
-        Self { nodes, points, material, cell, positions }
+        Self { nodes, points, portions, positions }
     }
 
     /// Parts of about equal work, one per thread.
@@ -114,7 +112,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
             let mut sum = 0.0;
             for e in range {
                 let local = self.local(e, u);
-                let kernel = &kernels[usize::from(self.material[e])];
+                let kernel = &kernels[usize::from(self.portions[e].material)];
                 for point in &self.points[e] {
                     sum += point.weight_m3 * kernel.energy(&Self::gradient(point, &local));
                 }
@@ -150,7 +148,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
             for &e in &part.elements {
                 let e = e as usize;
                 let local = self.local(e, u);
-                let kernel = &kernels[usize::from(self.material[e])];
+                let kernel = &kernels[usize::from(self.portions[e].material)];
                 let more = more_stress_pa.map(|m| &m[e]);
                 let owned = self.nodes[e].map(|n| part.nodes.contains(&(n as usize)));
                 let positions = &self.positions[e];
@@ -195,7 +193,7 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
     pub(in super::super) fn state(&self, u: &[[f64; 3]], kernels: &[Kernel]) -> Vec<[f64; 3]> {
         let one = |e: usize| {
             let local = self.local(e, u);
-            let kernel = &kernels[usize::from(self.material[e])];
+            let kernel = &kernels[usize::from(self.portions[e].material)];
             let (mut volume, mut mean_j, mut least_j, mut energy) = (0.0, 0.0, f64::INFINITY, 0.0);
             for point in &self.points[e] {
                 let h = Self::gradient(point, &local);

@@ -3,6 +3,7 @@
 use super::assembly::Partition;
 use super::kernel::Kernel;
 use super::nodal::{NodalTangent, Rings};
+use crate::fem::portion::Portion;
 use crate::fem::sparse::{BlockMatrix, BlockPattern};
 use crate::material::Hyperelastic;
 use crate::material::law::Material;
@@ -28,7 +29,8 @@ pub(in super::super) struct Numbered<'a> {
     pub number: &'a [u32],
     /// Nodes in solver numbering, m.
     pub nodes_m: &'a [[f64; 3]],
-    pub material_of_cell: &'a [u16],
+    /// What fills the cells; every portion is an element.
+    pub portions: &'a [Portion],
     pub tets: &'a [[u32; 4]],
     /// The same with mid-edge nodes, where the element has them.
     pub with_mid_edge_nodes: &'a [[u32; 10]],

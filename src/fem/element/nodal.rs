@@ -77,7 +77,7 @@ impl NodalGradient {
     pub(in super::super) fn new(elements: &Elements<4, 1>, row_of: &[u32]) -> Self {
         let mut keys: Vec<(u32, u16, u32)> = Vec::with_capacity(4 * elements.nodes.len());
         for (e, nodes) in elements.nodes.iter().enumerate() {
-            keys.extend(nodes.map(|n| (n, elements.material[e], e as u32)));
+            keys.extend(nodes.map(|n| (n, elements.portions[e].material, e as u32)));
         }
         keys.sort_unstable();
         let mut groups: Vec<Group> = Vec::new();

@@ -4,6 +4,7 @@ use super::assembly::{At, Elements, Partition};
 use super::definition::{Body, Laws};
 use super::kernel::Kernel;
 use super::nodal::{NodalTangent, Rings};
+use crate::fem::portion::Portion;
 use crate::fem::sparse::{BlockMatrix, BlockPattern};
 use crate::material::law::Material;
 use std::sync::Arc;
@@ -14,11 +15,14 @@ pub(in super::super) struct Plain<const K: usize, const Q: usize> {
     pub mass_share: fn(usize, usize) -> f64,
 }
 
-/// By cells of the mesh what is known by elements.
-pub(super) fn by_cell(cells: &[u32], of_elements: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-    let mut by_cell = vec![[0.0; 3]; of_elements.len()];
-    for (cell, state) in cells.iter().zip(of_elements) {
-        by_cell[*cell as usize] = state;
+/// By cells of the mesh what is known by elements: the portions of a cell deform alike and share its energy.
+pub(super) fn by_cell(portions: &[Portion], of_elements: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+    let cells = portions.iter().map(|p| p.cell as usize + 1).max().unwrap_or(0);
+    let mut by_cell = vec![[0.0; 3]; cells];
+    for (portion, [mean_j, least_j, energy]) in portions.iter().zip(of_elements) {
+        let before = by_cell[portion.cell as usize][2];
+        let energy = if portion.share == 1.0 { energy } else { before + portion.share * energy };
+        by_cell[portion.cell as usize] = [mean_j, least_j, energy];
     }
     by_cell
 }
@@ -65,7 +69,7 @@ impl<const K: usize, const Q: usize> Body for Plain<K, Q> {
     }
 
     fn state(&self, u: &[[f64; 3]], laws: &Laws) -> Vec<[f64; 3]> {
-        by_cell(&self.elements.cell, self.elements.state(u, &laws.kernels))
+        by_cell(&self.elements.portions, self.elements.state(u, &laws.kernels))
     }
 
     fn each_element(&self, with: &mut dyn FnMut(&[u32], f64)) {

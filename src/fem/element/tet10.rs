@@ -28,9 +28,14 @@ impl Element for Tet10 {
     }
 
     fn body(&self, mesh: &Numbered) -> Box<dyn Body> {
-        let (tets, materials, cells) = sorted(mesh.with_mid_edge_nodes, mesh.number, mesh.material_of_cell);
-        let points = points(mesh.nodes_m, &tets);
-        let elements = Elements::new(tets, points, materials, cells, mesh.row_of, mesh.pattern);
+        let (tets, portions) = sorted(mesh.with_mid_edge_nodes, mesh.number, mesh.portions);
+        let mut points = points(mesh.nodes_m, &tets);
+        for (of, portion) in points.iter_mut().zip(&portions) {
+            for point in of {
+                point.weight_m3 *= portion.share;
+            }
+        }
+        let elements = Elements::new(tets, points, portions, mesh.row_of, mesh.pattern);
         Box::new(Plain { elements, mass_share })
     }
 }

@@ -33,15 +33,16 @@ impl Element for Tet4 {
 
 /// Linear elements of a mesh.
 pub(super) fn elements(mesh: &Numbered) -> Elements<4, 1> {
-    let (tets, materials, cells) = sorted(mesh.tets, mesh.number, mesh.material_of_cell);
+    let (tets, portions) = sorted(mesh.tets, mesh.number, mesh.portions);
     let points = tets
         .iter()
-        .map(|tet| {
-            let (gradients, weight_m3) = barycentric_gradients(tet.map(|n| mesh.nodes_m[n as usize]));
-            [Point { weight_m3, gradients }]
+        .zip(&portions)
+        .map(|(tet, portion)| {
+            let (gradients, volume_m3) = barycentric_gradients(tet.map(|n| mesh.nodes_m[n as usize]));
+            [Point { weight_m3: portion.share * volume_m3, gradients }]
         })
         .collect();
-    Elements::new(tets, points, materials, cells, mesh.row_of, mesh.pattern)
+    Elements::new(tets, points, portions, mesh.row_of, mesh.pattern)
 }
 
 /// Integrals of products of shape functions over a tetrahedron of volume 1: (1 + [a = b]) / 20.

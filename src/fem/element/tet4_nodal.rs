@@ -94,7 +94,7 @@ impl Body for Averaged {
         let mut state = self.elements.state(u, &laws.kernels);
         let averaged = self.nodal.energy_density(u, &laws.nodal);
         state.iter_mut().zip(averaged).for_each(|(state, extra)| state[2] += extra);
-        by_cell(&self.elements.cell, state)
+        by_cell(&self.elements.portions, state)
     }
 
     fn each_element(&self, with: &mut dyn FnMut(&[u32], f64)) {

@@ -10,6 +10,7 @@ use crate::geometry::Frame;
 use crate::image::LabelMap;
 use crate::mesh::label_field::LabelField;
 use crate::mesh::optimise::{self, Complex, Point};
+use crate::mesh::partial_volume::tissue_fractions;
 use crate::mesh::repair::{self, Island};
 use crate::mesh::tet_mesh::{MeshError, TetMesh};
 use serde::Serialize;
@@ -56,6 +57,8 @@ pub fn mesh_labels<F: Frame>(
     if cells > MOST_CELLS {
         return Err(EngineError::TooFine { edge_mm, cells, most: MOST_CELLS });
     }
+    // What is too small for cells of its own is still a part of others.
+    let voxels_of_labels = settings.partial_volume.then(|| map.clone());
     let islands = repair::remove_islands(&mut map, settings.smallest_part, TET_SHARE * edge_mm.powi(3));
     let field = LabelField::new(&map, settings.smoothing_voxels).ok_or_else(no_labels)?;
     settings.sizing.check(&field.labels()[1..])?;
@@ -102,7 +105,11 @@ pub fn mesh_labels<F: Frame>(
         return Err(EngineError::TooSmall { engine: name, centre_mm, volume_mm3, edge_mm });
     }
     let complex = polish(complex);
-    let mesh = to_frame(&complex, &field).map_err(|source| EngineError::Invalid { engine: name, source })?;
+    let invalid = |source| EngineError::Invalid { engine: name, source };
+    let mut mesh = to_frame(&complex, &field).map_err(invalid)?;
+    if let Some(map) = &voxels_of_labels {
+        mesh.set_fractions(tissue_fractions(&mesh, map)).map_err(invalid)?;
+    }
     Ok((mesh, MeshingRecord { engine: settings.engine, edge_mm, islands }))
 }
 
@@ -243,6 +250,27 @@ pub(super) mod tests {
             pool.install(|| mesh_labels(&ball_in_shell(), &settings, &EnginePrograms::default()).unwrap().0)
         };
         assert!(on(1) == on(2));
+    }
+
+    #[test]
+    fn fractions_fill_the_volume_of_the_voxels_and_are_the_same_on_one_and_two_threads() {
+        let map = ball_in_shell();
+        let settings = MeshSettings { size: MeshSize::Cells(3000), partial_volume: true, ..MeshSettings::default() };
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| mesh_labels(&map, &settings, &EnginePrograms::default()).unwrap().0)
+        };
+        let mesh = on(1);
+        assert!(mesh == on(2));
+        let plain = MeshSettings { partial_volume: false, ..settings.clone() };
+        let (plain, _) = mesh_labels(&map, &plain, &EnginePrograms::default()).unwrap();
+        assert!(plain.fractions().is_empty());
+        assert!(mesh.clone().without_fractions() == plain);
+        let filled: f64 = (0..mesh.tets().len()).map(|t| mesh.fractions()[&3][t] * mesh.volume_mm3(t)).sum();
+        let voxels = map.data.iter().filter(|l| **l == 3).count() as f64 * map.grid.voxel_volume_mm3();
+        assert!((filled / voxels - 1.0).abs() < 0.005, "{filled} against {voxels} mm3");
+        let mixed = mesh.fractions()[&3].iter().filter(|f| **f > 0.0 && **f < 1.0).count();
+        assert!(mixed > 100, "{mixed}");
     }
 
     /// Volumes of the tets whose centres have a distance from the balls' centre within `mm`, on average.

@@ -47,6 +47,9 @@ pub struct MeshSettings {
     pub without: Vec<u8>,
     /// A sheet in the plane x = 0 to which the tets conform.
     pub split: Option<MidplaneSplit>,
+    /// Whether every cell knows the part of it that each tissue fills by the voxels of the label map (arrays `fraction:` of the VTU).
+    /// A simulation then takes the energy of a cell for the sum of its tissues' energies by their parts (Voigt's mean), not for that of one.
+    pub partial_volume: bool,
     /// Smoothing of the label indicators, in voxels.
     pub smoothing_voxels: f64,
     /// Parts of the labelled region smaller than this share of the largest are removed; parts of a label smaller than
@@ -90,6 +93,7 @@ impl Default for MeshSettings {
             sizing: Sizing::default(),
             without: Vec::new(),
             split: None,
+            partial_volume: false,
             smoothing_voxels: 0.7,
             smallest_part: 0.05,
             optimise: OptimiseSettings::default(),

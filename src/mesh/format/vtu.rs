@@ -3,12 +3,14 @@
 //! Labels are the integer cell array `label`; every node set is a `UInt8` point array of 0 and 1 under its name,
 //! since VTU has no sets. In our own files such an array says `hgm_set="nodes"` and the file `hgm_sets="marked"`, which
 //! other readers pass over: a result that happens to be 0 and 1 is then no set. A facet set is the `UInt8` cell array `facets:NAME`: bit `f` of a tetrahedron is set when
-//! its local face `f` (the one opposite corner `f`, see [`TET_FACES`]) belongs to the set. Fields are `Float64`.
+//! its local face `f` (the one opposite corner `f`, see [`TET_FACES`]) belongs to the set. What lies within the cells is one `Float64` cell
+//! array for each label, `fraction:NAME` (`fraction:white_matter`; a number for a label without a name). Fields are `Float64`.
 //! Reading takes text, base64 and raw bytes, inline or appended, plain or zlib, either byte order and header width.
 
 use super::vtk_array::{NumberType, Source, Storage, base64_zlib, numbers_from_bytes, numbers_from_text};
 use super::{Field, MeshWithFields, ReadError, WriteError, check_fields, facet_owners};
-use crate::mesh::{TET_FACES, TetMesh};
+use crate::mesh::{Fractions, TET_FACES, TetMesh};
+use crate::segment::label;
 use quick_xml::escape::escape;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
@@ -16,6 +18,7 @@ use quick_xml::{Reader, XmlVersion};
 /// VTK's number of the linear tetrahedron.
 const VTK_TETRA: u8 = 10;
 const FACETS: &str = "facets:";
+const FRACTION: &str = "fraction:";
 /// Attribute of a file whose node sets are marked.
 const MARKED: &str = "hgm_sets";
 /// Attribute of an array that is a set, and what it is a set of.
@@ -29,7 +32,8 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
     let (points, cells) = (mesh.nodes_mm().len(), mesh.tets().len());
     check_fields(point_fields, points, &mesh.node_sets.keys().map(String::as_str).collect::<Vec<_>>())?;
     let facet_names: Vec<String> = mesh.facet_sets.keys().map(|name| format!("{FACETS}{name}")).collect();
-    let taken: Vec<&str> = facet_names.iter().map(String::as_str).chain(["label"]).collect();
+    let fractions: Vec<String> = mesh.fractions().keys().map(|&label| fraction_name(label)).collect();
+    let taken: Vec<&str> = facet_names.iter().chain(&fractions).map(String::as_str).chain(["label"]).collect();
     check_fields(cell_fields, cells, &taken)?;
 
     let mut xml = format!(
@@ -63,11 +67,20 @@ pub fn encode(mesh: &TetMesh, point_fields: &[Field], cell_fields: &[Field]) -> 
         }
         xml += &array("UInt8", name, 1, &faces);
     }
+    for (name, of) in fractions.iter().zip(mesh.fractions().values()) {
+        xml += &array("Float64", name, 1, &float_bytes(of));
+    }
     for field in cell_fields {
         xml += &array("Float64", &field.name, field.components, &float_bytes(&field.values));
     }
     xml += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
     Ok(xml.into_bytes())
+}
+
+/// The cell array that says which part of every cell a label fills.
+pub fn fraction_name(label: u8) -> String {
+    let name = label::name(label).map_or_else(|| label.to_string(), str::to_owned);
+    format!("{FRACTION}{name}")
 }
 
 fn array(number: &str, name: &str, components: usize, bytes: &[u8]) -> String {
@@ -116,7 +129,7 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<MeshWithFields, ReadError> {
             point_fields.push(field);
         }
     }
-    let mut cell_fields = Vec::new();
+    let (mut cell_fields, mut fractions) = (Vec::new(), Fractions::new());
     for raw in file.arrays.iter().filter(|a| a.section == "CellData" && a.name != "label") {
         let Some(mut field) = file.field(raw, file.cells)? else { continue };
         let width = field.components;
@@ -132,10 +145,19 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<MeshWithFields, ReadError> {
                 .flat_map(|(t, &bits)| (0..4).filter(move |f| bits as u8 >> f & 1 == 1).map(move |f| (t, f)));
             let facets = faces.map(|(t, f): (usize, usize)| TET_FACES[f].map(|c| mesh.tets()[t][c])).collect();
             mesh.facet_sets.insert(set.to_owned(), facets);
+        } else if let Some(word) = field.name.strip_prefix(FRACTION)
+            && width == 1
+        {
+            let Some(label) = label::number(word) else {
+                let problem = format!("`{word}` is no label: name a tissue (white_matter) or give its number");
+                return Err(file.unsupported(&field.name, problem));
+            };
+            fractions.insert(label, field.values);
         } else {
             cell_fields.push(field);
         }
     }
+    mesh.set_fractions(fractions).map_err(|source| ReadError::Mesh { file: name.to_owned(), source })?;
     Ok(MeshWithFields { mesh, point_fields, cell_fields })
 }
 
@@ -500,6 +522,25 @@ mod tests {
         );
         assert_eq!((back.point_fields, back.cell_fields), (vec![u, e], vec![j]));
         assert_eq!(encode(&mesh, &[], &[]), encode(&mesh, &[], &[]));
+    }
+
+    #[test]
+    fn fractions_are_read_back_to_the_bit_and_refused_where_they_make_no_whole() {
+        let mut mesh = two_tets();
+        let thirds = Fractions::from([(3, vec![1.0 / 3.0, 0.0]), (17, vec![2.0 / 3.0, 1.0])]);
+        mesh.set_fractions(thirds.clone()).unwrap();
+        let back = decode(&encode(&mesh, &[], &[]).unwrap(), "a.vtu").unwrap();
+        assert_eq!((back.mesh.fractions(), back.cell_fields.len()), (&thirds, 0));
+        let array = |name: &str, values: &str| {
+            format!("{LABEL}<DataArray type=\"Float32\" Name=\"fraction:{name}\" format=\"ascii\">{values}</DataArray>")
+        };
+        let read =
+            |more: &str| decode(ascii(CELLS, more).as_bytes(), "a.vtu").map(|read| read.mesh.fractions().clone());
+        assert_eq!(read(&array("white_matter", "0 1")), Ok(Fractions::from([(3, vec![1.0])])));
+        let refused = read(&array("white_matter", "0 0.5")).unwrap_err().to_string();
+        assert!(refused.contains("a.vtu") && refused.contains("they make 0.5"), "{refused}");
+        let refused = read(&array("white", "0 1")).unwrap_err().to_string();
+        assert!(refused.contains("a.vtu: fraction:white") && refused.contains("no label"), "{refused}");
     }
 
     #[test]

@@ -11,6 +11,11 @@ use thiserror::Error;
 pub enum MeshFileError {
     #[error("{}: the name of a mesh ends in .vtu, .msh, .inp or .feb", output.display())]
     Output { output: PathBuf },
+    #[error(
+        "{}: what lies within the cells (`partial_volume` of [mesh]) is kept by .vtu alone; write a .vtu, or set it to false",
+        output.display()
+    )]
+    Fractions { output: PathBuf },
     #[error("{file}: {source}")]
     Format { file: String, source: WriteError },
     #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]

@@ -7,6 +7,7 @@ mod inversion;
 mod laws;
 mod loads;
 mod meshes;
+mod mixed_cells;
 mod motion;
 mod refusals;
 mod sensitivities;

@@ -3,6 +3,7 @@
 use super::meshes::two_tissue_cube;
 use hgm::fem::{By, Load, Model, Scenario};
 use hgm::material::law::Parameter;
+use hgm::mesh::TetMesh;
 
 const SCENARIO: &str = "
     fixed = ['z0']
@@ -80,9 +81,12 @@ fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
 }
 
 fn agree_with_differences(text: &str) {
-    let mesh = two_tissue_cube(3, 60.0);
+    agree_on(&two_tissue_cube(3, 60.0), text);
+}
+
+fn agree_on(mesh: &TetMesh, text: &str) {
     let scenario = Scenario::from_toml(text).unwrap();
-    let model = Model::new(&mesh, &scenario).unwrap();
+    let model = Model::new(mesh, &scenario).unwrap();
     let (outcome, state) = model.solve(&scenario.materials, None, &|_| ()).unwrap();
     let columns = model.sensitivities(&scenario.materials, &state, &all()).unwrap();
     let step: f64 = 1e-3;
@@ -91,7 +95,7 @@ fn agree_with_differences(text: &str) {
     for ((by, column), adjoint) in all().iter().zip(&columns).zip(adjoint) {
         let at = |factor: f64| {
             let scenario = changed(&scenario, by, factor);
-            let model = Model::new(&mesh, &scenario).unwrap();
+            let model = Model::new(mesh, &scenario).unwrap();
             let start = model.state(&outcome.displacement_mm).unwrap();
             model.solve(&scenario.materials, Some(&start), &|_| ()).unwrap().0.displacement_mm
         };
@@ -125,6 +129,17 @@ fn sensitivities_with_moved_nodes_are_the_slopes_of_solutions() {
 #[test]
 fn sensitivities_of_averaged_deformation_are_the_slopes_of_solutions() {
     agree_with_differences(&format!("{SCENARIO}element = 'tet4-nodal'\n"));
+}
+
+#[test]
+fn sensitivities_of_mixed_cells_are_the_slopes_of_solutions() {
+    let mut mesh = two_tissue_cube(3, 60.0);
+    let white: Vec<f64> = (0..mesh.tets().len()).map(|t| (t % 5) as f64 / 4.0).collect();
+    let grey = white.iter().map(|f| 1.0 - f).collect();
+    mesh.set_fractions([(2, grey), (3, white)].into()).unwrap();
+    for element in ["tet4", "tet4-nodal"] {
+        agree_on(&mesh, &format!("{SCENARIO}element = '{element}'\n"));
+    }
 }
 
 #[test]
