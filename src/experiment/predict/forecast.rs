@@ -34,8 +34,13 @@ impl Posed {
 
     /// How many steps [`forecast`] tells of.
     pub fn steps(&self, (draws, checks): (usize, usize)) -> usize {
-        let path = Path::new(&self.uncertainty, self.has_walls());
+        let path = self.path();
         path.points(&self.uncertainty).len() + path.beside(&self.uncertainty) + self.solved_of(draws) + checks
+    }
+
+    /// The path of its surface.
+    fn path(&self) -> Path {
+        Path::new(&self.uncertainty, self.has_walls()).in_fluid(self.scenario.loads.csf.is_some())
     }
 
     /// How many of so many draws are solved instead of read from the surface.
@@ -99,7 +104,7 @@ pub fn forecast(
         SolvedState { at, displacement_mm: found.outcome.displacement_mm, slopes_mm: found.sensitivities }
     };
     // From stiff and light to soft and heavy, each from the one before it.
-    let path = Path::new(uncertainty, posed.has_walls());
+    let path = posed.path();
     let mut states = Vec::new();
     for at in path.points(uncertainty) {
         let found = rough.solve(&at).map_err(refused)?;
@@ -150,7 +155,7 @@ pub fn forecast(
 
 #[cfg(test)]
 mod tests {
-    use super::super::uncertain::{Cause, Uncertain};
+    use super::super::uncertain::{Cause, Reading, Uncertain};
     use super::*;
     use crate::experiment::estimate::{Turn, Unknown};
     use crate::experiment::phantom::block;
@@ -166,7 +171,7 @@ mod tests {
         .unwrap();
         let unknown = |unknown: Unknown, mean: f64, sd: f64, cause| {
             let prior = unknown.prior(mean, sd);
-            Uncertain { unknown, prior, cause, levels_mm: Vec::new() }
+            Uncertain { unknown, prior, cause, reading: Reading::Itself }
         };
         let mut list: Vec<Uncertain> = Tissue::grey_and_white()
             .into_iter()
@@ -203,7 +208,7 @@ mod tests {
         let posed = Posed { scenario: Scenario::from_toml(&text).unwrap(), ..posed(1.0) };
         let unknown = Unknown::Gap(0);
         let prior = unknown.prior(0.3f64.ln(), 0.5);
-        let room = Uncertain { unknown, prior, cause: Cause::Room, levels_mm: Vec::new() };
+        let room = Uncertain { unknown, prior, cause: Cause::Room, reading: Reading::Itself };
         let list = posed.uncertainty.list.iter().cloned().chain(wall.then_some(room)).collect();
         Posed { uncertainty: Uncertainty::new(list), ..posed }
     }

@@ -9,6 +9,7 @@ mod cut;
 mod draws_table;
 mod ellipsoid;
 mod evaluation;
+mod fluid;
 mod forecast;
 mod head;
 mod heads;
@@ -36,10 +37,11 @@ pub use ellipsoid::{Ellipsoid, Scatter, ellipsoid_95};
 pub use evaluation::{
     EvaluationLimit, HeadEvaluation, LandmarkForecast, OtherWayRound, PredictionEvaluation, TakenAgainstPlan,
 };
+pub use fluid::{FluidOfHead, KnownLevel, LevelError};
 pub use forecast::{Forecast, ForecastError, Posed, forecast};
 pub use head::{Head, HeadParseError, same_way, twice};
 pub use heads::{HeadComparison, HeadDraws, compared_heads};
-pub use low_discrepancy::{halton, inverse_normal, normals};
+pub use low_discrepancy::{halton, inverse_normal, normals, normals_of};
 pub use modes::{DrawnState, Modes};
 pub use outcome::{HeadPrediction, Prediction, TargetPlace, TargetPrediction, UnknownOutcome};
 pub use path::Path;
@@ -53,4 +55,4 @@ pub use shares::{Shares, variance_shares};
 pub use spread::{Spread, farthest, spread};
 pub use support::SupportWeight;
 pub use taught::TaughtError;
-pub use uncertain::{Cause, Uncertain, Uncertainty};
+pub use uncertain::{Cause, Reading, Uncertain, Uncertainty};

@@ -233,7 +233,7 @@ impl Response {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::uncertain::tests::of_two_tissues;
-    use super::super::uncertain::{Cause, Uncertain};
+    use super::super::uncertain::{Cause, Reading, Uncertain};
     use super::*;
 
     /// A formula as a body: nodes that grey matter, white matter or both let move, under gravity that turns.
@@ -333,7 +333,7 @@ pub(super) mod tests {
         let of_spread = |sd: f64| {
             let unknown = Unknown::Gap(0);
             let prior = unknown.prior(0.0, 0.5 * sd);
-            let room = Uncertain { unknown, prior, cause: Cause::Room, levels_mm: Vec::new() };
+            let room = Uncertain { unknown, prior, cause: Cause::Room, reading: Reading::Itself };
             Uncertainty::new(of_two_tissues(sd).list.into_iter().chain([room]).collect())
         };
         let uncertainty = of_spread(1.0);

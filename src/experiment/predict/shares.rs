@@ -3,7 +3,6 @@
 //! The share of X is Var(E[u | X]) / Var(u) (Sobol, Mathematics and Computers in Simulation 55, 2001), variances summed over
 //! components and nodes. What is missing to one is what unknowns do only together.
 
-use super::low_discrepancy::normals;
 use super::response::Response;
 use super::uncertain::{Cause, Uncertainty};
 use rayon::prelude::*;
@@ -22,6 +21,9 @@ pub struct Shares {
     pub direction: f64,
     /// Of the room under the skull.
     pub room: f64,
+    /// Of Poisson's ratio, where it was drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson: Option<f64>,
     /// Of how the brain is supported.
     pub supports: f64,
     /// Of what unknowns do together.
@@ -78,14 +80,15 @@ pub fn variance_shares(models: &[Supported<'_>]) -> Shares {
         let variance = (square / count - of_mean).max(f64::MIN_POSITIVE);
         ((product / count - of_mean) / variance).clamp(0.0, 1.0)
     };
-    let [stiffness, load, direction, room] = Cause::ALL.map(share);
+    let [stiffness, load, direction, room, poisson] = Cause::ALL.map(share);
     let supports = share_of_supports(models, weights, &firsts);
     // Found from draws, they may be a hair more than all there is.
-    let sum = (stiffness + load + direction + room + supports).max(1.0);
-    let [stiffness, load, direction, room, supports] =
-        [stiffness, load, direction, room, supports].map(|share| share / sum);
-    let together = (1.0 - stiffness - load - direction - room - supports).max(0.0);
-    Shares { stiffness, load, direction, room, supports, together }
+    let sum = (stiffness + load + direction + room + supports + poisson).max(1.0);
+    let [stiffness, load, direction, room, supports, poisson] =
+        [stiffness, load, direction, room, supports, poisson].map(|share| share / sum);
+    let together = (1.0 - stiffness - load - direction - room - supports - poisson).max(0.0);
+    let drawn = models.iter().any(|(_, _, u)| !u.of(Cause::Poisson).is_empty());
+    Shares { stiffness, load, direction, room, poisson: drawn.then_some(poisson), supports, together }
 }
 
 /// The variance between the means of the supports.
@@ -117,8 +120,8 @@ fn share_of_supports(models: &[Supported<'_>], weights: f64, firsts: &[Drawn]) -
 
 /// A draw that has the unknowns of one cause in common with draw `n`, all others apart from it.
 fn in_common(uncertainty: &Uncertainty, cause: Cause, n: usize, dimensions: usize) -> Vec<f64> {
-    let mut z = normals(n, dimensions, uncertainty.list.len());
-    let same = normals(n, 0, uncertainty.list.len());
+    let mut z = uncertainty.normals(n, dimensions);
+    let same = uncertainty.normals(n, 0);
     for place in uncertainty.of(cause) {
         z[place] = same[place];
     }
@@ -128,8 +131,8 @@ fn in_common(uncertainty: &Uncertainty, cause: Cause, n: usize, dimensions: usiz
 #[cfg(test)]
 mod tests {
     use super::super::response::tests::{linear_body, response};
-    use super::super::uncertain::Uncertain;
     use super::super::uncertain::tests::of_two_tissues;
+    use super::super::uncertain::{Reading, Uncertain};
     use super::*;
     use crate::experiment::estimate::Unknown;
     use crate::experiment::sample::Tissue;
@@ -138,7 +141,7 @@ mod tests {
     fn one_and_one(of_modulus: f64, of_density: f64) -> Uncertainty {
         let unknown = |unknown: Unknown, mean: f64, sd: f64, cause| {
             let prior = unknown.prior(mean, sd);
-            Uncertain { unknown, prior, cause, levels_mm: Vec::new() }
+            Uncertain { unknown, prior, cause, reading: Reading::Itself }
         };
         Uncertainty::new(vec![
             unknown(Unknown::ShearModulus(Tissue::whole_brain().remove(0)), 6.0, of_modulus, Cause::Stiffness),

@@ -22,7 +22,7 @@ pub enum TaughtError {
     OtherTissues { taught: Vec<String>, drawn: Vec<String> },
     #[error(
         "`population` of the table [prior] was learnt under an effective density of {learnt} kg/m3, and where a part of the fluid has drained \
-         (`drained` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that part out"
+         (`drained` or `fluid_level` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that out"
     )]
     OtherWeight { learnt: f64, weighs: f64 },
 }
@@ -39,8 +39,9 @@ impl PredictSettings {
         if taught.iter().any(|tissue| !drawn.contains(tissue)) {
             return Err(TaughtError::OtherTissues { taught, drawn });
         }
-        // Without `drained` the load is what the settings were held against already.
-        let weighs = self.drained.map_or(own.density_kg_per_m3, |_| self.tissue_density_kg_per_m3);
+        // Where nothing is said of the fluid the load is what the settings were held against already.
+        let fluid = self.drained.is_some() || self.fluid_level.is_some();
+        let weighs = if fluid { self.tissue_density_kg_per_m3 } else { own.density_kg_per_m3 };
         if population.is_under(weighs) {
             return Ok(());
         }
