@@ -41,7 +41,7 @@ pub struct Path {
     /// There are walls.
     walls: bool,
     /// There is a fluid whose surface turns with gravity.
-    fluid: bool,
+    pub(super) fluid: bool,
 }
 
 /// Standard deviations of t from the centre at which the states of a body without walls lie: the outer nodes of Gauss and

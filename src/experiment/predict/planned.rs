@@ -195,6 +195,7 @@ fn level_in_words(settings: &PredictSettings, found: &Prediction) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fluid::KnownLevel;
     use super::super::support::SupportWeight;
     use super::*;
     use crate::geometry::Mni;
@@ -219,8 +220,31 @@ mod tests {
         let held = [Stiffness, Stiffness, Load, Direction, Direction];
         assert_eq!(causes(&settings, Supports::Fixed), held);
         assert_eq!(causes(&settings, Supports::Sliding), [&held[..], &[Room]].concat());
-        let drained = PredictSettings { drained: Some(0.3), ..settings };
+        let drained = PredictSettings { drained: Some(0.3), ..settings.clone() };
         assert_eq!(causes(&drained, Supports::Fixed), held);
+        // Before the room, so that its draws are the same for every way of supporting the brain.
+        let poisson = PredictSettings { poisson_log_sd: Some(0.7), ..settings };
+        assert_eq!(causes(&poisson, Supports::Fixed), [&held[..], &[Cause::Poisson]].concat());
+        assert_eq!(causes(&poisson, Supports::Sliding), [&held[..], &[Cause::Poisson, Room]].concat());
+    }
+
+    #[test]
+    fn poissons_ratio_is_drawn_around_the_patients_and_never_reaches_a_half() {
+        let settings = PredictSettings { poisson_log_sd: Some(2.0), ..PredictSettings::default() };
+        for ratio in [0.35, 0.45, 0.49] {
+            let own = ResectionSettings { poisson_ratio: ratio, ..ResectionSettings::default() };
+            let own = settings.resection(&own, [0.0, -9.81, 0.0], Supports::Fixed);
+            let drawn = settings.uncertainty(&own, &PriorSettings::default(), &labels()).unwrap();
+            let place = drawn.of(Cause::Poisson)[0];
+            let told = UnknownOutcome::of(&drawn.list[place]);
+            assert!((told.median - ratio).abs() < 1e-9 && told.interval_95[1] < 0.5, "{told:?}");
+            let of = |z: f64| Scale::LameRatio.value(drawn.point(&[z; 6])[place]);
+            assert!([-6.0, -2.0, 2.0, 6.0].iter().all(|z| of(*z) > 0.0 && of(*z) < 0.5));
+        }
+        // What the setting says of its own spread.
+        let usual = Scale::LameRatio.number(0.45);
+        let [low, high] = [-Z_95, Z_95].map(|z| Scale::LameRatio.value(usual + 0.7 * z));
+        assert!((low - 0.35).abs() < 5e-3 && (high - 0.49).abs() < 5e-3, "{low} {high}");
     }
 
     #[test]
@@ -260,6 +284,17 @@ mod tests {
         assert!(
             told(Supports::Fixed, &drained)
                 .contains("30 % of the fluid drains from the top, give or take a factor of 1.5")
+        );
+        assert!(!sliding.contains("Poisson"));
+        let poisson = PredictSettings { poisson_log_sd: Some(0.7), ..PredictSettings::default() };
+        assert!(
+            told(Supports::Fixed, &poisson).contains("Poisson's ratio is about 0.45 (95 % between 0.35 and 0.486)")
+        );
+        let fluid_level = Some(KnownLevel { below_top_mm: 25.0, sd_mm: 5.0 });
+        let level = told(Supports::Fixed, &PredictSettings { fluid_level, ..PredictSettings::default() });
+        assert!(
+            level.contains("25 mm below the brain's highest point, give or take 5 mm")
+                && !level.contains("is not known: the tissue")
         );
     }
 

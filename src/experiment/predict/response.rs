@@ -61,7 +61,7 @@ impl Coordinates {
     }
 
     /// Where states are needed besides the path: to both sides of what is curved, before walls of gravity's direction as well
-    /// (there the slopes by the direction alone), without them with the tissues apart.
+    /// (there the slopes by the direction alone, unless there is a fluid), without them with the tissues apart.
     pub fn beside(&self) -> Vec<Beside> {
         let mut points = Vec::new();
         let mut add = |changes: &[(usize, f64)], slopes: Vec<bool>| {
@@ -79,7 +79,7 @@ impl Coordinates {
         }
         for n in (0..self.kinds.len()).filter(|&n| self.path.bends(self.kinds[n])) {
             let turns = || self.kinds.iter().map(|kind| *kind == Kind::Turn).collect();
-            let slopes = if self.kinds[n] == Kind::Turn { turns() } else { all.clone() };
+            let slopes = if self.kinds[n] == Kind::Turn && !self.path.fluid { turns() } else { all.clone() };
             for side in [1.0, -1.0] {
                 add(&[(n, side)], slopes.clone());
             }

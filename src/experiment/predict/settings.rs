@@ -151,13 +151,15 @@ mod tests {
         assert_eq!(of(&|_| ()), Ok(()));
         type Change<'a> = &'a dyn Fn(&mut PredictSettings);
         let downward = |y: f64| Head::Down([0.0, y, 0.0]);
-        let cases: [(&str, Change<'_>); 8] = [
+        let cases: [(&str, Change<'_>); 10] = [
             ("`heads`", &|s| s.heads = Vec::new()),
             ("`heads` is [left, left]", &|s| s.heads = vec![Head::Left, Head::Left]),
             ("`heads` is [0,-1,0, 0,-2,0]", &|s| s.heads = vec![downward(-1.0), downward(-2.0)]),
             ("`draws`", &|s| s.draws = 3),
             ("`drained` is 0.0:", &|s| s.drained = Some(0.0)),
             ("`drained` is NaN:", &|s| s.drained = Some(f64::NAN)),
+            ("`poisson_log_sd` is 0.0:", &|s| s.poisson_log_sd = Some(0.0)),
+            ("`poisson_log_sd` is NaN:", &|s| s.poisson_log_sd = Some(f64::NAN)),
             ("`threshold_mm`", &|s| s.threshold_mm = f64::NAN),
             ("`fixed_weight and sliding_weight`", &|s| (s.fixed_weight, s.sliding_weight) = (0.0, 0.0)),
         ];

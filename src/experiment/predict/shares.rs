@@ -134,7 +134,7 @@ mod tests {
     use super::super::uncertain::tests::of_two_tissues;
     use super::super::uncertain::{Reading, Uncertain};
     use super::*;
-    use crate::experiment::estimate::Unknown;
+    use crate::experiment::estimate::{Scale, Unknown};
     use crate::experiment::sample::Tissue;
 
     /// One modulus, one density: u is lognormal, and of lognormal variables all is known.
@@ -164,6 +164,48 @@ mod tests {
             assert!((found.together - (1.0 - expected[0] - expected[1])).abs() < 0.02);
             assert_eq!((found.direction, found.room, found.supports), (0.0, 0.0, 0.0));
         }
+    }
+
+    /// Mean and mean square of a function of a standard normal variable.
+    fn moments(f: &dyn Fn(f64) -> f64) -> [f64; 2] {
+        let at = |n: i32| -8.0 + 0.01 * f64::from(n);
+        let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+        [1, 2].map(|power| (0..=1600).map(|n| 0.01 * density(at(n)) * f(at(n)).powi(power)).sum())
+    }
+
+    #[test]
+    fn poissons_share_of_a_confined_column_is_the_formula_within_two_points() {
+        // Pressed between walls a column gives way by its load over E (1 - nu) / ((1 + nu) (1 - 2 nu)) = mu (lambda / mu + 2).
+        let compliance = |ratio: f64| {
+            let nu = Scale::LameRatio.value(ratio);
+            let young = 2.0 * (1.0 + nu);
+            (1.0 + nu) * (1.0 - 2.0 * nu) / (young * (1.0 - nu))
+        };
+        for (of_modulus, of_density, of_ratio) in [(0.35, 0.56, 0.7), (0.5, 0.2, 0.4), (0.2, 0.1, 0.7)] {
+            let middle = Scale::LameRatio.number(0.45);
+            let prior = Unknown::PoissonRatio.prior(middle, of_ratio);
+            let (unknown, reading) = (Unknown::PoissonRatio, Reading::Itself);
+            let ratio = Uncertain { unknown, prior, cause: Cause::Poisson, reading };
+            let list = one_and_one(of_modulus, of_density).list.into_iter().chain([ratio]).collect();
+            let uncertainty = Uncertainty::new(list);
+            let body = |p: &[f64]| vec![[0.0, 40.0 * (p[1] - p[0]).exp() * compliance(p[2]), 0.0]];
+            let surface = response(&body, &uncertainty);
+            let found = variance_shares(&[(1.0, &surface, &uncertainty)]);
+            let lognormal = |sd: f64| [(0.5 * sd * sd).exp(), (2.0 * sd * sd).exp()];
+            let factors =
+                [lognormal(of_modulus), lognormal(of_density), moments(&|z| compliance(middle + z * of_ratio))];
+            let all = |n: usize| factors.iter().map(|m| m[n]).product::<f64>();
+            let whole = all(1) - all(0).powi(2);
+            // The others at their means, squared.
+            let expected = factors.map(|[mean, square]| (square / (mean * mean) - 1.0) * all(0).powi(2) / whole);
+            let shares = [found.stiffness, found.load, found.poisson.unwrap()];
+            assert!(shares.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.02), "{found:?} {expected:?}");
+            assert!((found.together - (1.0 - expected.iter().sum::<f64>())).abs() < 0.02, "{found:?} {expected:?}");
+        }
+        let none = one_and_one(0.3, 0.3);
+        let body = |p: &[f64]| vec![[0.0, (p[1] - p[0]).exp(), 0.0]];
+        let surface = response(&body, &none);
+        assert_eq!(variance_shares(&[(1.0, &surface, &none)]).poisson, None, "what is not drawn has no share");
     }
 
     #[test]

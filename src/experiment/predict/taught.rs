@@ -77,6 +77,7 @@ fn in_words(tissues: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fluid::KnownLevel;
     use super::*;
     use crate::experiment::population::{LearntPrior, PopulationPrior};
 
@@ -116,6 +117,9 @@ mod tests {
         let drained = PredictSettings { tissues: 1, drained: Some(0.3), ..PredictSettings::default() };
         let said = refused(&drained, &["brain"]).unwrap();
         assert!(said.contains("100 kg/m3") && said.contains("1040 kg/m3") && said.contains("`drained`"), "{said}");
+        let fluid_level = Some(KnownLevel { below_top_mm: 20.0, sd_mm: 5.0 });
+        let level = PredictSettings { drained: None, fluid_level, ..drained.clone() };
+        assert!(refused(&level, &["brain"]).unwrap().contains("`fluid_level`"));
         assert_eq!(refused(&PredictSettings { tissue_density_kg_per_m3: 100.0, ..drained }, &["brain"]), None);
     }
 }

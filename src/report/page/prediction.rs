@@ -196,7 +196,7 @@ fn checks(checks: &[Check]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::predict::{HeadComparison, TargetPrediction};
+    use crate::experiment::predict::{FluidOfHead, HeadComparison, TargetPrediction};
 
     fn prediction() -> Prediction {
         let head = |name: &str, cc: f64| HeadPrediction {
@@ -237,6 +237,22 @@ mod tests {
         let said = in_a_sentence(&prediction());
         for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."] {
             assert!(said.contains(words), "{words}: {said}");
+        }
+    }
+
+    #[test]
+    fn poissons_share_and_the_fluids_level_are_shown_where_they_were_drawn_and_known() {
+        let plain = section(&prediction(), None).into_string();
+        assert!(!plain.contains("Poisson") && !plain.contains("Where the fluid stands"));
+        let mut found = prediction();
+        found.heads[0].shares.poisson = Some(0.123);
+        found.heads[1].shares.poisson = Some(0.0);
+        let (drained, drained_95) = (Some(0.05), Some([0.02, 0.08]));
+        let fluid = FluidOfHead { below_top_mm: 25.0, drained, drained_95, ..FluidOfHead::default() };
+        found.heads[0].fluid = Some(fluid);
+        let page = section(&found, None).into_string();
+        for words in ["Poisson's ratio", "12 %", "Where the fluid stands", "5 % (2 to 8 %)"] {
+            assert!(page.contains(words), "{words}");
         }
     }
 
