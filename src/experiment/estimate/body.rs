@@ -512,7 +512,9 @@ fn materials(
     let drawn = unknowns.iter().zip(log_parameters).find(|(unknown, _)| **unknown == Unknown::PoissonRatio);
     let drawn = drawn.map(|(unknown, number)| unknown.scale().value(*number));
     if let Some(ratio) = drawn {
-        materials.values_mut().for_each(|material| *material = material.clone().with_poisson_ratio(ratio));
+        for material in materials.values_mut() {
+            *material = material.clone().with_poisson_ratio(ratio);
+        }
     }
     let poisson_ratio = drawn.unwrap_or(poisson_ratio);
     for (unknown, log) in unknowns.iter().zip(log_parameters) {

@@ -13,6 +13,7 @@ mod fluid;
 mod forecast;
 mod head;
 mod heads;
+mod known_level;
 mod low_discrepancy;
 mod modes;
 mod outcome;
@@ -37,10 +38,11 @@ pub use ellipsoid::{Ellipsoid, Scatter, ellipsoid_95};
 pub use evaluation::{
     EvaluationLimit, HeadEvaluation, LandmarkForecast, OtherWayRound, PredictionEvaluation, TakenAgainstPlan,
 };
-pub use fluid::{FluidOfHead, KnownLevel, LevelError};
+pub use fluid::{FluidOfHead, LevelError};
 pub use forecast::{Forecast, ForecastError, Posed, forecast};
 pub use head::{Head, HeadParseError, same_way, twice};
 pub use heads::{HeadComparison, HeadDraws, compared_heads};
+pub use known_level::KnownLevel;
 pub use low_discrepancy::{halton, inverse_normal, normals, normals_of};
 pub use modes::{DrawnState, Modes};
 pub use outcome::{HeadPrediction, Prediction, TargetPlace, TargetPrediction, UnknownOutcome};

@@ -195,7 +195,7 @@ fn level_in_words(settings: &PredictSettings, found: &Prediction) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fluid::KnownLevel;
+    use super::super::known_level::KnownLevel;
     use super::super::support::SupportWeight;
     use super::*;
     use crate::geometry::Mni;

@@ -1,7 +1,7 @@
 //! How a prediction is made; the table `[predict]` of the settings.
 
-use super::fluid::KnownLevel;
 use super::head::Head;
+use super::known_level::KnownLevel;
 use crate::experiment::resection::{CsfSettings, TISSUE_KG_PER_M3};
 use crate::experiment::setting::{SettingError, first_broken};
 use schemars::JsonSchema;

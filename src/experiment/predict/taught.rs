@@ -77,7 +77,7 @@ fn in_words(tissues: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fluid::KnownLevel;
+    use super::super::known_level::KnownLevel;
     use super::*;
     use crate::experiment::population::{LearntPrior, PopulationPrior};
 
