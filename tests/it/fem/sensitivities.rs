@@ -39,7 +39,6 @@ fn all() -> Vec<By> {
     vec![
         grey(Parameter::Stiffness),
         grey(Parameter::PoissonRatio),
-        By::LameRatio,
         white(Parameter::Stiffness),
         white(Parameter::Own(1)),
         white(Parameter::Own(0)),
@@ -49,6 +48,7 @@ fn all() -> Vec<By> {
         By::Gravity(0),
         By::Gravity(2),
         By::AllLoads,
+        By::LameRatio,
     ]
 }
 
