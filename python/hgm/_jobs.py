@@ -121,6 +121,8 @@ def predict(
     heads: Any = (),
     targets: Any = None,
     drained: Optional[float] = None,
+    fluid_below: Optional[float] = None,
+    poisson_log_sd: Optional[float] = None,
     threshold_mm: Optional[float] = None,
     draws: Optional[int] = None,
     checks: Optional[int] = None,
@@ -150,6 +152,10 @@ def predict(
         Points whose place is asked for (.csv, .fcsv, .mrk.json).
     drained : float, optional
         Part of the fluid that will have drained, above 0 to 1.
+    fluid_below : float, optional
+        How far below the brain's highest point the fluid will stand, mm along gravity of the way the head lies.
+    poisson_log_sd : float, optional
+        Draws Poisson's ratio as well: standard deviation of ln(lambda / mu).
     threshold_mm : float, optional
         What counts as a shift.
     draws, checks : int, optional
@@ -176,6 +182,8 @@ def predict(
             settings,
             head=heads,
             drained=drained,
+            fluid_below=fluid_below,
+            poisson_log_sd=poisson_log_sd,
             threshold_mm=threshold_mm,
             draws=draws,
             checks=checks,

@@ -35,6 +35,14 @@ pub struct Args {
     /// The part of the fluid that will have drained, above 0 to 1, where it can be told [default: not known]
     #[arg(long, value_name = "PART")]
     drained: Option<f64>,
+    /// How far below the brain's highest point the fluid will stand, mm along gravity of the way the head lies, where that is known
+    /// instead: 0 where the brain is just covered [default: not known]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    fluid_below: Option<f64>,
+    /// Draws Poisson's ratio as well: standard deviation of ln(lambda / mu); 0.7 for 0.35 to 0.49 around 0.45
+    /// [default: taken as known]
+    #[arg(long, value_name = "SD", allow_hyphen_values = true)]
+    poisson_log_sd: Option<f64>,
     /// Points whose place is asked for (.csv, .fcsv, .mrk.json), in the scanner's frame
     #[arg(long, value_name = "FILE")]
     targets: Option<PathBuf>,
@@ -70,6 +78,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.population.over(&mut flags)?;
     flags.list("predict.heads", &args.head);
     flags.set("predict.drained", args.drained);
+    flags.set("predict.fluid_level.below_top_mm", args.fluid_below);
+    flags.set("predict.poisson_log_sd", args.poisson_log_sd);
     flags.set("predict.threshold_mm", args.threshold_mm);
     flags.set("predict.draws", args.draws);
     flags.set("predict.checks", args.checks);

@@ -1,7 +1,7 @@
 //! What to do about an error, in words of the command line: the library's messages name no options.
 
 use crate::anatomy::LabelError;
-use crate::experiment::predict::TaughtError;
+use crate::experiment::predict::{LevelError, TaughtError};
 use crate::experiment::synth::SynthError;
 use crate::image::nifti::{NiftiError, NiftiProblem};
 use crate::layout;
@@ -107,8 +107,10 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             "see --tissues and --population"
         }
         WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => {
-            "see --population and --drained"
+            "see --population, --drained and --fluid-below"
         }
+        WorkflowError::Predict(PredictError::Level(LevelError::BelowBrain { .. })) => "see --fluid-below and --drained",
+        WorkflowError::Predict(PredictError::Level(LevelError::NoBrain)) => "--dseg takes labels of your own",
         WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",
         WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => {
             "name another folder (-o)"

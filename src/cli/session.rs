@@ -129,7 +129,7 @@ impl Session {
     pub fn settings_over(&self, own: &toml::Table, mut flags: Layer) -> Result<Settings, Failure> {
         flags.set("image.prefer", self.options.prefer);
         flags.set("image.volume", self.options.volume);
-        for room in ["register", "gp", "synth"] {
+        for room in ["register", "gp", "synth", "predict"] {
             flags.set(&format!("{room}.seed"), self.options.seed);
         }
         Ok(Settings::resolve([own, &self.config, &flags.0])?)

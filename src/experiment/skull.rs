@@ -1,7 +1,7 @@
 //! The inside of the skull, and the fluid that has drained from it.
 
 use super::setting::{SettingError, first_broken};
-use crate::geometry::{Frame, SmoothField};
+use crate::geometry::{Frame, Position, SmoothField};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::{LabelMap, Mask};
@@ -138,22 +138,52 @@ pub fn levels_when_drained<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3]) ->
     Some((0..=LEVELS).map(|n| level_of(&heights, n as f64 / LEVELS as f64)).collect())
 }
 
+fn is_fluid(l: u8) -> bool {
+    l == label::CSF || l == label::VENTRICLE
+}
+
+/// Places of the voxels of some labels with their heights against gravity (mm from the origin).
+fn heights<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3], of: fn(u8) -> bool) -> Vec<(f64, Position<F>)> {
+    let strength = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    (0..labels.data.len())
+        .filter(|&n| of(labels.data[n]))
+        .map(|n| {
+            let p = labels.grid.position(labels.grid.voxel(n).map(|v| v as f64).into());
+            (-(0..3).map(|a| p.mm[a] * gravity[a]).sum::<f64>() / strength, p)
+        })
+        .collect()
+}
+
 /// Heights of the fluid's voxels against gravity, the lowest first, mm; `None` without fluid or gravity.
 fn heights_of_fluid<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3]) -> Option<Vec<f64>> {
-    let strength = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
-    let fluid = |l: u8| l == label::CSF || l == label::VENTRICLE;
-    let mut heights: Vec<f64> = (0..labels.data.len())
-        .filter(|&n| fluid(labels.data[n]))
-        .map(|n| {
-            let p = labels.grid.position(labels.grid.voxel(n).map(|v| v as f64).into()).mm;
-            -(0..3).map(|a| p[a] * gravity[a]).sum::<f64>() / strength
-        })
-        .collect();
-    if heights.is_empty() || strength == 0.0 {
+    let mut heights: Vec<f64> = heights(labels, gravity, is_fluid).into_iter().map(|(height, _)| height).collect();
+    if heights.is_empty() || gravity == [0.0; 3] {
         return None;
     }
     heights.sort_unstable_by(f64::total_cmp);
     Some(heights)
+}
+
+/// A brain along gravity, heights in mm against it from the origin.
+#[derive(Clone, Debug)]
+pub struct Depths<F: Frame> {
+    /// The brain's highest point.
+    pub top_mm: f64,
+    /// Its lowest.
+    pub lowest_mm: f64,
+    /// Where the highest is.
+    pub top_at: Position<F>,
+    /// Every voxel of fluid.
+    pub fluid_mm: Vec<f64>,
+}
+
+/// The brain of `labels` along gravity: what is neither fluid nor outside. `None` where there is none, or no gravity.
+pub fn depths<F: Frame>(labels: &LabelMap<F>, gravity: [f64; 3]) -> Option<Depths<F>> {
+    let brain = heights(labels, gravity, |l| l != label::BACKGROUND && !is_fluid(l));
+    let by_height = |a: &&(f64, Position<F>), b: &&(f64, Position<F>)| a.0.total_cmp(&b.0);
+    let ((top_mm, top_at), (lowest_mm, _)) = (*brain.iter().max_by(by_height)?, *brain.iter().min_by(by_height)?);
+    let fluid_mm = heights(labels, gravity, is_fluid).into_iter().map(|(height, _)| height).collect();
+    (gravity != [0.0; 3]).then_some(Depths { top_mm, lowest_mm, top_at, fluid_mm })
 }
 
 fn level_of(heights: &[f64], drained: f64) -> f64 {

@@ -12,7 +12,7 @@ use super::scenario::Materials;
 use super::solver;
 use super::units::millimetres;
 use super::{FemError, State, reduce};
-use crate::material::law::Parameter;
+use crate::material::law::{Material, Parameter};
 use serde::{Deserialize, Serialize};
 
 /// What a displacement is differentiated by: the logarithm of it, but for [`By::CsfLevel`],
@@ -28,6 +28,8 @@ pub enum By {
         /// Parameter of its law.
         parameter: Parameter,
     },
+    /// ln(lambda / mu) of every material together, which moves between 0 and 1/2 whatever Poisson's ratio is.
+    LameRatio,
     /// One load.
     Load(Load),
     /// Density of the tissue, what a fluid carries left as it is.
@@ -206,6 +208,16 @@ impl<'a> Linearised<'a> {
                 let slope = derivative(along, 1.0 / 4096.0, true)?;
                 let both = self.model.load_n.iter().zip(&slope);
                 Ok(both.map(|(l, s)| [0, 1, 2].map(|i| l[i] - s[i])).collect())
+            }
+            By::LameRatio => {
+                // Forces are linear in lambda.
+                let stiffer = |material: &Material| {
+                    let (mu, lambda) = (material.shear_modulus_pa(), (1.0 + STEP) * material.lame_lambda_pa());
+                    material.clone().with_poisson_ratio(0.5 * lambda / (lambda + mu))
+                };
+                let changed = self.materials.iter().map(|(name, m)| (name.clone(), stiffer(m))).collect();
+                let (above, at) = (self.forces(&changed, self.u)?, self.forces(self.materials, self.u)?);
+                Ok(above.iter().zip(&at).map(|(a, b)| [0, 1, 2].map(|i| (b[i] - a[i]) / STEP)).collect())
             }
             By::Material { name, parameter } => {
                 let what = || format!("parameter {parameter:?} of `{name}`");

@@ -52,6 +52,13 @@ pub fn prediction_table(found: &Prediction) -> String {
             h.head, h.largest_mm, h.median_mm, h.sd_median_mm, h.reach95_largest_mm, h.over_threshold_cc
         );
     }
+    for (head, fluid) in found.heads.iter().filter_map(|h| Some((&h.head, h.fluid.as_ref()?))) {
+        text += &format!(
+            "fluid {} mm below the brain's highest point with the head {head}: {} drained\n",
+            fluid.below_top_mm,
+            fluid.drained_in_words()
+        );
+    }
     for h in found.heads.iter().filter(|h| !h.targets.is_empty()) {
         // As wide as the longest name.
         let width = h.targets.iter().map(|t| t.called().chars().count()).max().unwrap_or(0).max(8);

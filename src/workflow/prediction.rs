@@ -45,6 +45,9 @@ pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
     let settings = work.settings;
     settings.check()?;
     settings.predict.check_taught(&settings.resection, &settings.prior).map_err(PredictError::Taught)?;
+    if settings.predict.poisson_log_sd.is_some() && settings.resection.poisson_ratio == 0.0 {
+        return Err(PredictError::RatioAtEnd.into());
+    }
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
     Ok(())
@@ -88,6 +91,11 @@ fn every_stage(
     }
     let planned = stages::plan(work, &mut made, scan, targets)?;
     let head = PlannedHead::read(&work.case)?;
+    // A level that the brain has not is refused before anything is meshed for it.
+    let mni_from_pre = stages::mni_from_pre(&work.case)?;
+    for way in &settings.predict.heads {
+        stages::fluid_of_head(&settings.predict, way, &head.labels, &mni_from_pre)?;
+    }
     let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;
     work.case.drop_stale();
     let bytes = work.case.read(REST_MESH)?;

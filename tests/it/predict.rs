@@ -28,7 +28,7 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
     let brains =
         at("brains.toml", crate::population::of_brains(&[6.1, 6.3, 6.6, 6.4, 6.2, 6.5, 6.35, 6.45]).as_bytes());
     let one_tissue = ["--resection", &mask, "--population", &brains, "--tissues", "1", "--drained", "0.3"];
-    let cases: [(&[&str], &[&str]); 19] = [
+    let cases: [(&[&str], &[&str]); 23] = [
         (
             &["--resection", &mask, "--population", &brains, "--tissues", "2"],
             &["teaches `brain`", "`grey_matter` and `white_matter`", "`tissues = 1`", "--tissues"],
@@ -54,6 +54,13 @@ fn what_cannot_be_planned_is_refused_before_anything_is_written() {
         (&["--resection", &mask, "--head", "0,-1,0", "--head", "0,-2,0"], &["`heads`", "none twice"]),
         (&["--resection", &mask, "--drained", "0"], &["`drained` is 0.0:", "above 0, at most 1"]),
         (&["--resection", &mask, "--drained", "1.5"], &["`drained`", "above 0, at most 1"]),
+        (
+            &["--resection", &mask, "--drained", "0.3", "--fluid-below", "20"],
+            &["`fluid_level.below_top_mm` is 20.0", "`drained`", "give one of the two"],
+        ),
+        (&["--resection", &mask, "--fluid-below", "-5"], &["`fluid_level.below_top_mm` is -5.0", "just covered"]),
+        (&["--resection", &mask, "--fluid-below", "400"], &["`fluid_level.below_top_mm`", "300 mm"]),
+        (&["--resection", &mask, "--poisson-log-sd", "0"], &["`poisson_log_sd` is 0.0", "above 0, at most 2"]),
     ];
     for (n, (more, words)) in cases.into_iter().enumerate() {
         let case = folder.path().join(n.to_string());
@@ -89,6 +96,51 @@ fn triangles(faces: usize, by: f32) -> Vec<u8> {
         bytes.extend([0u8; 2]);
     }
     bytes
+}
+
+#[test]
+fn slow_a_known_level_and_poissons_ratio_are_drawn_and_told_and_a_seed_gives_other_draws() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let mask = plan().display().to_string();
+    let asked = ["--resection", &mask, "--draws", "16", "--head", "supine", "--head", "sitting", "--json"];
+    let told = |more: &[&str]| -> serde_json::Value {
+        let ended = planned(&case, &[&asked[..], more].concat());
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        serde_json::from_slice(&ended.stdout).unwrap()
+    };
+    // Deeper than this brain, which only its labels tell: what was there before stays.
+    let plain = told(&[]);
+    let before = contents(&case);
+    let ended = planned(&case, &[&asked[..], &["--fluid-below", "280"]].concat());
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(3) && said.contains("mm deep") && said.contains("--fluid-below"), "{said}");
+    assert!(contents(&case) == before);
+    assert!(plain["heads"][0]["shares"].get("poisson").is_none() && plain["heads"][0].get("fluid").is_none());
+
+    let found = told(&["--fluid-below", "30", "--poisson-log-sd", "0.7"]);
+    for head in found["heads"].as_array().unwrap() {
+        let shares = head["shares"].as_object().unwrap();
+        assert!(
+            (shares.values().map(|s| s.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-6
+                && shares.contains_key("poisson")
+        );
+        assert_eq!(head["fluid"]["below_top_mm"], 30.0);
+        assert!((0.01..0.6).contains(&head["fluid"]["drained"].as_f64().unwrap()), "{}", head["fluid"]);
+    }
+    let names: Vec<&str> = found["unknowns"].as_array().unwrap().iter().map(|u| u["name"].as_str().unwrap()).collect();
+    assert!(
+        names.contains(&"Poisson's ratio") && names.contains(&"fluid below the brain's highest point, mm"),
+        "{names:?}"
+    );
+    let page = std::fs::read_to_string(case.join("report.html")).unwrap();
+    for words in ["Where the fluid stands", "Poisson's ratio", "30 mm below the brain's highest point"] {
+        assert!(page.contains(words), "{words}");
+    }
+
+    assert_eq!(told(&["--seed", "0"]), plain, "seed 0 has the points that no seed has");
+    let (one, other) = (told(&["--seed", "5"]), told(&["--seed", "6"]));
+    assert!(one["heads"] != plain["heads"] && one["heads"] != other["heads"]);
 }
 
 #[test]

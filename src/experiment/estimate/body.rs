@@ -23,6 +23,8 @@ pub enum Unknown {
     ShearModulus(Tissue),
     /// What else the tissue's law has, its shear modulus held; the law says what that is.
     Shape(Tissue, &'static Shape),
+    /// Poisson's ratio of all tissue: ln(lambda / mu), shear moduli held.
+    PoissonRatio,
     /// Effective density of all tissue, kg/m3.
     Density,
     /// Pressure on the facets of a set, Pa: `loads.pressure` of this index, in the direction given there.
@@ -62,6 +64,7 @@ impl Unknown {
             Self::Shape(_, shape) => shape.scale.into(),
             Self::CsfLevel => Scale::Plain,
             Self::Drained(_) => Scale::Share,
+            Self::PoissonRatio => Scale::LameRatio,
             Self::ShearModulus(_) | Self::Density | Self::Pressure(_) | Self::Gap(_) => Scale::Logarithm,
         }
     }
@@ -84,6 +87,7 @@ impl Unknown {
         match self {
             Self::ShearModulus(tissue) => format!("shear_modulus_pa of {}", tissue.name),
             Self::Shape(tissue, shape) => format!("{} of {}", shape.name, tissue.name),
+            Self::PoissonRatio => "Poisson's ratio".to_owned(),
             Self::Density => "effective density_kg_per_m3".to_owned(),
             Self::Pressure(n) => format!("pressure_pa number {}", n + 1),
             Self::CsfLevel => "level_mm of the fluid".to_owned(),
@@ -246,7 +250,11 @@ impl<'a> Body<'a> {
         let mut loads = self.template.loads.clone();
         for (unknown, &value) in self.unknowns.iter().zip(parameters) {
             match unknown {
-                Unknown::ShearModulus(_) | Unknown::Shape(..) | Unknown::GravityTurn(_) | Unknown::Gap(_) => {}
+                Unknown::ShearModulus(_)
+                | Unknown::Shape(..)
+                | Unknown::PoissonRatio
+                | Unknown::GravityTurn(_)
+                | Unknown::Gap(_) => {}
                 Unknown::Density => loads.density_kg_per_m3 = value.exp(),
                 Unknown::CsfLevel => {
                     if let Some(csf) = &mut loads.csf {
@@ -384,6 +392,7 @@ impl<'a> Body<'a> {
                     by.extend((0..3).map(|axis| (By::Gravity(axis), n, gravity[axis])));
                 }
                 Unknown::Density => by.push((By::Load(Load::Weight), n, 1.0)),
+                Unknown::PoissonRatio => by.push((By::LameRatio, n, 1.0)),
                 Unknown::CsfLevel => by.push((By::CsfLevel, n, 1.0)),
                 // By the level itself.
                 Unknown::Drained(levels) => by.push((By::CsfLevel, n, levels.at_number(log_parameters[n])[1])),
@@ -500,6 +509,14 @@ fn materials(
 ) -> Result<Materials, BodyError> {
     // Tissues that are not estimated keep the template's.
     let mut materials = template.materials.clone();
+    let drawn = unknowns.iter().zip(log_parameters).find(|(unknown, _)| **unknown == Unknown::PoissonRatio);
+    let drawn = drawn.map(|(unknown, number)| unknown.scale().value(*number));
+    if let Some(ratio) = drawn {
+        for material in materials.values_mut() {
+            *material = material.clone().with_poisson_ratio(ratio);
+        }
+    }
+    let poisson_ratio = drawn.unwrap_or(poisson_ratio);
     for (unknown, log) in unknowns.iter().zip(log_parameters) {
         if let Unknown::ShearModulus(tissue) = unknown {
             let shape = unknowns.iter().zip(log_parameters).find_map(|(other, value)| match other {

@@ -95,6 +95,8 @@ pub enum Scale {
     Plain,
     /// The logarithm of the odds of a share between 0 and 1.
     Share,
+    /// ln(lambda / mu), shown as Poisson's ratio: whatever it is, that lies between 0 and 1/2.
+    LameRatio,
 }
 
 impl Scale {
@@ -105,6 +107,7 @@ impl Scale {
             Self::Angle => number.to_degrees(),
             Self::Plain => number,
             Self::Share => 1.0 / (1.0 + (-number).exp()),
+            Self::LameRatio => 0.5 / (1.0 + (-number).exp()),
         }
     }
 
@@ -112,7 +115,7 @@ impl Scale {
     ///
     /// ```
     /// # use hgm::experiment::estimate::Scale;
-    /// for scale in [Scale::Logarithm, Scale::Angle, Scale::Plain, Scale::Share] {
+    /// for scale in [Scale::Logarithm, Scale::Angle, Scale::Plain, Scale::Share, Scale::LameRatio] {
     ///     assert!((scale.number(scale.value(0.7)) - 0.7).abs() < 1e-12);
     /// }
     /// ```
@@ -122,6 +125,7 @@ impl Scale {
             Self::Angle => value.to_radians(),
             Self::Plain => value,
             Self::Share => (value / (1.0 - value)).ln(),
+            Self::LameRatio => (value / (0.5 - value)).ln(),
         }
     }
 }

@@ -34,8 +34,13 @@ impl Posed {
 
     /// How many steps [`forecast`] tells of.
     pub fn steps(&self, (draws, checks): (usize, usize)) -> usize {
-        let path = Path::new(&self.uncertainty, self.has_walls());
+        let path = self.path();
         path.points(&self.uncertainty).len() + path.beside(&self.uncertainty) + self.solved_of(draws) + checks
+    }
+
+    /// The path of its surface.
+    fn path(&self) -> Path {
+        Path::new(&self.uncertainty, self.has_walls()).in_fluid(self.scenario.loads.csf.is_some())
     }
 
     /// How many of so many draws are solved instead of read from the surface.
@@ -99,7 +104,7 @@ pub fn forecast(
         SolvedState { at, displacement_mm: found.outcome.displacement_mm, slopes_mm: found.sensitivities }
     };
     // From stiff and light to soft and heavy, each from the one before it.
-    let path = Path::new(uncertainty, posed.has_walls());
+    let path = posed.path();
     let mut states = Vec::new();
     for at in path.points(uncertainty) {
         let found = rough.solve(&at).map_err(refused)?;
@@ -150,9 +155,9 @@ pub fn forecast(
 
 #[cfg(test)]
 mod tests {
-    use super::super::uncertain::{Cause, Uncertain};
+    use super::super::uncertain::{Cause, Reading, Uncertain};
     use super::*;
-    use crate::experiment::estimate::{Turn, Unknown};
+    use crate::experiment::estimate::{Scale, Turn, Unknown};
     use crate::experiment::phantom::block;
     use crate::experiment::sample::Tissue;
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -166,7 +171,7 @@ mod tests {
         .unwrap();
         let unknown = |unknown: Unknown, mean: f64, sd: f64, cause| {
             let prior = unknown.prior(mean, sd);
-            Uncertain { unknown, prior, cause, levels_mm: Vec::new() }
+            Uncertain { unknown, prior, cause, reading: Reading::Itself }
         };
         let mut list: Vec<Uncertain> = Tissue::grey_and_white()
             .into_iter()
@@ -203,7 +208,7 @@ mod tests {
         let posed = Posed { scenario: Scenario::from_toml(&text).unwrap(), ..posed(1.0) };
         let unknown = Unknown::Gap(0);
         let prior = unknown.prior(0.3f64.ln(), 0.5);
-        let room = Uncertain { unknown, prior, cause: Cause::Room, levels_mm: Vec::new() };
+        let room = Uncertain { unknown, prior, cause: Cause::Room, reading: Reading::Itself };
         let list = posed.uncertainty.list.iter().cloned().chain(wall.then_some(room)).collect();
         Posed { uncertainty: Uncertainty::new(list), ..posed }
     }
@@ -231,6 +236,68 @@ mod tests {
         let heaviest = (0..16).max_by(|&a, &b| load(a).total_cmp(&load(b))).unwrap();
         let read = |n: usize| ended.response.at(&walled.uncertainty.draw(n)) == ended.draws_mm[n];
         assert!((0..16).all(|n| read(n) == (n != heaviest)));
+    }
+
+    /// A block of one tissue that is pressed on top and can give way along z alone.
+    fn confined() -> Posed {
+        let mut mesh = block(3);
+        mesh.set_nodes("all", (0..mesh.nodes_mm().len() as u32).collect()).unwrap();
+        let text = "fixed = ['base']\n[[prescribed]]\nset = 'all'\ndisplacement_mm = [0.0, 0.0, 0.0]\ncomponents = [true, true, false]\n\
+                    [[loads.pressure]]\nset = 'superior'\npressure_pa = 1.0\n[solver]\nelement = 'tet4'\n";
+        let list = [
+            (Unknown::ShearModulus(Tissue::whole_brain().remove(0)), 1000f64.ln(), 0.4, Cause::Stiffness),
+            (Unknown::PoissonRatio, Scale::LameRatio.number(0.45), 0.7, Cause::Poisson),
+        ];
+        let uncertain = |(unknown, mean, sd, cause): (Unknown, f64, f64, Cause)| {
+            let prior = unknown.prior(mean, sd);
+            Uncertain { unknown, prior, cause, reading: Reading::Itself }
+        };
+        let uncertainty = Uncertainty::new(list.into_iter().map(uncertain).collect());
+        let scenario = Scenario::from_toml(text).unwrap();
+        Posed { supports: "fixed".to_owned(), weight: 1.0, mesh, scenario, poisson_ratio: 0.45, uncertainty }
+    }
+
+    #[test]
+    fn draws_of_poissons_ratio_move_a_confined_column_as_its_modulus_has_it() {
+        let posed = confined();
+        let nodes = posed.mesh.nodes_mm().len();
+        let found = forecast(&posed, nodes, (64, 64), &|| ()).unwrap();
+        // 30 mm under 1 Pa give way by 30 / M mm with M = mu (lambda / mu + 2) = E (1 - nu) / ((1 + nu) (1 - 2 nu)).
+        let formula = |n: usize| {
+            let point = posed.uncertainty.draw(n);
+            30.0 / (point[0].exp() * (point[1].exp() + 2.0))
+        };
+        let pairs: Vec<_> = (0..64)
+            .map(|n| {
+                let top = found.draws_mm[n][nodes - 1];
+                (vec![top], vec![[0.0, 0.0, -formula(n)]])
+            })
+            .collect();
+        let against = checked("fixed", &pairs);
+        assert!(against.mean_off_95.unwrap() < 0.03 && against.sd_off_95.unwrap() < 0.08, "{against:?}");
+        // Solved whole the column is the formula, but for strains that are not quite small.
+        let check = found.check.unwrap();
+        let (told, formula) = (check.mean_off_95.unwrap(), against.mean_off_95.unwrap());
+        assert!((told - formula).abs() < 1e-3, "{check:?} {against:?}");
+    }
+
+    /// The block with its lower half in fluid whose level is not known.
+    fn half_in_fluid() -> Posed {
+        let text = "fixed = ['base']\n[loads]\ngravity_m_per_s2 = [0.0, 0.0, -9.81]\ndensity_kg_per_m3 = 1040.0\n[loads.csf]\n\
+                    density_kg_per_m3 = 1007.0\nlevel_mm = 30.0\n[solver]\nelement = 'tet4-nodal'\n";
+        let posed = Posed { scenario: Scenario::from_toml(text).unwrap(), ..posed(0.5) };
+        let unknown = Unknown::CsfLevel;
+        let prior = unknown.prior(10.0, 1.5);
+        let level = Uncertain { unknown, prior, cause: Cause::Load, reading: Reading::Below(40.0) };
+        let known = posed.uncertainty.list.iter().filter(|u| u.cause != Cause::Load).cloned();
+        Posed { uncertainty: Uncertainty::new(known.chain([level]).collect()), ..posed }
+    }
+
+    #[test]
+    fn draws_of_a_level_under_gravity_that_turns_are_those_of_full_solves() {
+        let posed = half_in_fluid();
+        let check = forecast(&posed, posed.mesh.nodes_mm().len(), (32, 32), &|| ()).unwrap().check.unwrap();
+        assert!(check.mean_off_95.unwrap() < 0.06 && check.sd_off_95.unwrap() < 0.08, "{check:?}");
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Quasi-random numbers: Halton's sequence and the normal law's quantiles. The same numbers every time, on any machine.
 
-/// Bases of the dimensions.
-const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
+use crate::material::random::CounterRng;
 
-/// Number `index` (from 0) of Halton's sequence in one dimension (0 to 15), above 0 and below 1: the digits of the number
+/// Bases of the dimensions: two draws of up to twelve unknowns.
+const PRIMES: [u32; 24] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
+
+/// Number `index` (from 0) of Halton's sequence in one dimension (0 to 23), above 0 and below 1: the digits of the number
 /// mirrored at the point (Halton, Numerische Mathematik 2, 1960). Point 0, the origin, is left out.
 pub fn halton(index: usize, dimension: usize) -> f64 {
     let base = PRIMES[dimension % PRIMES.len()] as usize;
@@ -63,7 +65,18 @@ pub fn inverse_normal(probability: f64) -> f64 {
 
 /// Standard normal numbers of one draw, in the dimensions from `first` on.
 pub fn normals(index: usize, first: usize, dimensions: usize) -> Vec<f64> {
-    (first..first + dimensions).map(|d| inverse_normal(halton(index, d))).collect()
+    normals_of(0, index, first, dimensions)
+}
+
+/// The same of a seed. Seed 0 has Halton's own points, any other those turned in every dimension by a part of the whole that it
+/// draws (Cranley and Patterson, SIAM Journal on Numerical Analysis 13, 1976): as evenly spread, and independent of each other's.
+pub fn normals_of(seed: u64, index: usize, first: usize, dimensions: usize) -> Vec<f64> {
+    let turned = |d: usize| match seed {
+        0 => halton(index, d),
+        // A normal variable has no number at either end.
+        seed => (halton(index, d) + CounterRng::new(seed, d as u64).uniform(0)).fract().clamp(1e-12, 1.0 - 1e-12),
+    };
+    (first..first + dimensions).map(|d| inverse_normal(turned(d))).collect()
 }
 
 #[cfg(test)]
@@ -87,6 +100,20 @@ mod tests {
         ] {
             assert!((inverse_normal(p) - z).abs() < 1e-8, "{p}: {}", inverse_normal(p));
             assert!((inverse_normal(p) + inverse_normal(1.0 - p)).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn a_seed_turns_the_points_and_leaves_them_as_even_and_none_is_haltons() {
+        assert_eq!(normals_of(0, 5, 2, 3), normals(5, 2, 3));
+        let of = |seed: u64| (0..256).map(|n| normals_of(seed, n, 0, 7)).collect::<Vec<_>>();
+        assert!(of(1) == of(1) && of(1) != of(2) && of(1) != of(0));
+        for draws in [of(1), of(2)] {
+            let mean = |f: &dyn Fn(&[f64]) -> f64| draws.iter().map(|z| f(z)).sum::<f64>() / 256.0;
+            for a in 0..7 {
+                assert!(mean(&|z| z[a]).abs() < 0.1 && (mean(&|z| z[a] * z[a]) - 1.0).abs() < 0.1, "{a}");
+                assert!((0..a).all(|b| mean(&|z| z[a] * z[b]).abs() < 0.12), "{a}");
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::check::Check;
 use super::cut::Planned;
+use super::fluid::FluidOfHead;
 use super::heads::HeadComparison;
 use super::shares::Shares;
 use super::support::SupportWeight;
@@ -61,6 +62,9 @@ pub struct HeadPrediction {
     pub over_threshold_cc: f64,
     /// Which unknown contributes how much to the variance.
     pub shares: Shares,
+    /// Where the fluid stands, where that was known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fluid: Option<FluidOfHead>,
     /// Equilibria that were solved for it, checks apart.
     pub states_solved: usize,
     /// How the brain is supported in its draws, and how much that counts: a way without an equilibrium is left out.

@@ -24,7 +24,7 @@ impl Kind {
             Unknown::ShearModulus(_) => Self::Modulus(share),
             Unknown::Density => Self::Density,
             Unknown::Gap(_) => Self::Room,
-            Unknown::CsfLevel | Unknown::Drained(_) => Self::Other { curved: true },
+            Unknown::CsfLevel | Unknown::Drained(_) | Unknown::PoissonRatio => Self::Other { curved: true },
             Unknown::GravityTurn(_) => Self::Turn,
             Unknown::Shape(..) | Unknown::Pressure(_) => Self::Other { curved: false },
         }
@@ -40,6 +40,8 @@ pub struct Path {
     pub(super) of_load: f64,
     /// There are walls.
     walls: bool,
+    /// There is a fluid whose surface turns with gravity.
+    pub(super) fluid: bool,
 }
 
 /// Standard deviations of t from the centre at which the states of a body without walls lie: the outer nodes of Gauss and
@@ -72,7 +74,13 @@ impl Path {
             false => &FREE,
         };
         let of_load = if spread > 0.0 { load / spread } else { 1.0 };
-        Self { knots: places.iter().map(|place| place * spread.sqrt()).collect(), of_load, walls }
+        Self { knots: places.iter().map(|place| place * spread.sqrt()).collect(), of_load, walls, fluid: false }
+    }
+
+    /// The same for a body in fluid, or in none.
+    #[must_use]
+    pub fn in_fluid(self, fluid: bool) -> Self {
+        Self { fluid, ..self }
     }
 
     /// Its points in the order of t. For the load over stiffness only moduli are changed, where they are not known: a body of
@@ -105,7 +113,8 @@ impl Path {
     /// States lie to both sides in such a number.
     pub(super) fn bends(&self, kind: Kind) -> bool {
         match kind {
-            Kind::Turn => self.walls,
+            // Weight alone turns exactly as the surface has it.
+            Kind::Turn => self.walls || self.fluid,
             Kind::Other { curved } => curved,
             Kind::Modulus(_) | Kind::Density | Kind::Room => false,
         }

@@ -2,7 +2,7 @@
 
 use super::outcome::{Prediction, UnknownOutcome};
 use super::settings::PredictSettings;
-use super::uncertain::{Cause, Uncertain, Uncertainty};
+use super::uncertain::{Cause, Reading, Uncertain, Uncertainty};
 use crate::experiment::estimate::{LogPrior, Scale, Turn, Unknown, Z_95};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
 use crate::experiment::resection::{CsfSettings, ResectionSettings, Supports};
@@ -24,7 +24,11 @@ impl PredictSettings {
     #[must_use]
     pub fn resection(&self, own: &ResectionSettings, gravity: [f64; 3], supports: Supports) -> ResectionSettings {
         let mut settings = ResectionSettings { supports, gravity_m_per_s2: gravity, ..own.clone() };
-        if let Some(drained) = self.drained {
+        if self.fluid_level.is_some() {
+            // Its level is that of the head (`known_fluid`), whatever part of the fluid that leaves.
+            settings.csf = None;
+            settings.density_kg_per_m3 = self.tissue_density_kg_per_m3;
+        } else if let Some(drained) = self.drained {
             settings.csf = Some(CsfSettings { drained, ..own.csf.clone().unwrap_or_default() });
             settings.density_kg_per_m3 = self.tissue_density_kg_per_m3;
         }
@@ -56,12 +60,12 @@ impl PredictSettings {
     ) -> Result<Uncertainty, PriorError> {
         let mut list = Vec::new();
         let mut add = |unknown: Unknown, prior: LogPrior, cause| {
-            list.push(Uncertain { unknown, prior, cause, levels_mm: Vec::new() });
+            list.push(Uncertain { unknown, prior, cause, reading: Reading::Itself });
         };
         for (unknown, prior) in law_priors(&self.tissue_list(), &prior.for_predictions())? {
             add(unknown, prior, Cause::Stiffness);
         }
-        if own.csf.is_none() {
+        if own.csf.is_none() && self.fluid_level.is_none() {
             let density = Unknown::Density.prior(own.density_kg_per_m3.ln(), self.density_log_sd);
             add(Unknown::Density, prior.learnt(density), Cause::Load);
         }
@@ -70,34 +74,49 @@ impl PredictSettings {
             let prior = unknown.prior(0.0, self.direction_sd_deg.to_radians());
             add(unknown, prior, Cause::Direction);
         }
+        if let Some(sd) = self.poisson_log_sd {
+            let unknown = Unknown::PoissonRatio;
+            add(unknown.clone(), unknown.prior(unknown.scale().number(own.poisson_ratio), sd), Cause::Poisson);
+        }
         if own.supports == Supports::Sliding && own.skull.gap_mm > 0.0 {
             let prior = Unknown::Gap(0).prior(own.skull.gap_mm.ln(), own.skull.gap_log_sd);
             add(Unknown::Gap(0), prior, Cause::Room);
         }
-        if let Some(csf) = &own.csf {
+        let fluid = if let Some(csf) = &own.csf {
             let levels_mm = levels_when_drained(labels, own.gravity_m_per_s2);
             let prior = LogPrior {
                 name: "part of the fluid that has drained".to_owned(),
                 scale: Scale::Logarithm,
                 ..Unknown::CsfLevel.prior(csf.drained.ln(), self.drained_log_sd)
             };
-            // Right behind the stiffness, so that draws of it are the same for every way of supporting the brain.
-            let place = list.iter().position(|u| u.cause != Cause::Stiffness).unwrap_or(list.len());
-            if let Some(levels_mm) = levels_mm {
-                list.insert(place, Uncertain { unknown: Unknown::CsfLevel, prior, cause: Cause::Load, levels_mm });
-            }
-        }
-        Ok(Uncertainty::new(list))
+            let drained = |levels_mm| Uncertain {
+                unknown: Unknown::CsfLevel,
+                prior,
+                cause: Cause::Load,
+                reading: Reading::Drained(levels_mm),
+            };
+            levels_mm.map(drained)
+        } else {
+            self.known_fluid(None, labels, own.gravity_m_per_s2).map(|(_, uncertain)| uncertain)
+        };
+        // Right behind the stiffness, so that draws of it are the same for every way of supporting the brain.
+        let place = list.iter().position(|u| u.cause != Cause::Stiffness).unwrap_or(list.len());
+        list.splice(place..place, fluid);
+        Ok(Uncertainty::new(list).with_seed(self.seed))
     }
 }
 
 impl UnknownOutcome {
-    /// The prior of an unknown in its own unit, as draws have it: no more than all of the fluid drains.
+    /// The prior of an unknown in its own unit, as draws have it: no more than all of the fluid drains, and none stands above the brain.
     pub fn of(uncertain: &Uncertain) -> Self {
         let prior = &uncertain.prior;
         let sd = prior.sd.unwrap_or(0.0);
-        let most = if uncertain.levels_mm.is_empty() { f64::INFINITY } else { 1.0 };
-        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd).min(most));
+        let [least, most] = match uncertain.reading {
+            Reading::Itself => [f64::NEG_INFINITY, f64::INFINITY],
+            Reading::Drained(_) => [0.0, 1.0],
+            Reading::Below(_) => [0.0, f64::INFINITY],
+        };
+        let at = |z: f64| rounded(prior.scale.value(prior.mean + z * sd).clamp(least, most));
         Self { name: prior.name.clone(), cause: uncertain.cause, median: at(0.0), interval_95: [at(-Z_95), at(Z_95)] }
     }
 }
@@ -116,6 +135,7 @@ pub fn assumptions(
     let mut said = vec![
         "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
+            _ if settings.fluid_level.is_some() => level_in_words(settings, found),
             Some(part) => format!(
                 "About {:.0} % of the fluid drains from the top, give or take a factor of {:.1} and never more than all; tissue above its \
                  level has its own weight.",
@@ -135,6 +155,16 @@ pub fn assumptions(
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
+    if let Some(sd) = settings.poisson_log_sd {
+        let at = |z: f64| Scale::LameRatio.value(Scale::LameRatio.number(own.poisson_ratio) + z * sd);
+        said.push(format!(
+            "How little tissue yields to a change of volume is not known either: Poisson's ratio is about {} (95 % between {:.2} and {:.3}), the \
+             same in all tissue, and does not depend on how stiff the brain is.",
+            own.poisson_ratio,
+            at(-Z_95),
+            at(Z_95)
+        ));
+    }
     said.extend(found.supports_in_words());
     if found.slides() && own.skull.gap_mm > 0.0 {
         said.push(format!(
@@ -146,8 +176,26 @@ pub fn assumptions(
     said
 }
 
+/// Where the fluid is known to stand, and what part of it has drained then.
+fn level_in_words(settings: &PredictSettings, found: &Prediction) -> String {
+    let Some(level) = &settings.fluid_level else { return String::new() };
+    let of_heads: Vec<String> = found
+        .heads
+        .iter()
+        .filter_map(|h| Some(format!("{} with the head {}", h.fluid.as_ref()?.drained_in_words(), h.head)))
+        .collect();
+    format!(
+        "The fluid stands {} mm below the brain's highest point, give or take {} mm, along gravity of the way the head lies; tissue above \
+         has its own weight. Of the fluid on the scan so much has drained then: {}.",
+        level.below_top_mm,
+        level.sd_mm,
+        of_heads.join(", ")
+    )
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::known_level::KnownLevel;
     use super::super::support::SupportWeight;
     use super::*;
     use crate::geometry::Mni;
@@ -172,8 +220,31 @@ mod tests {
         let held = [Stiffness, Stiffness, Load, Direction, Direction];
         assert_eq!(causes(&settings, Supports::Fixed), held);
         assert_eq!(causes(&settings, Supports::Sliding), [&held[..], &[Room]].concat());
-        let drained = PredictSettings { drained: Some(0.3), ..settings };
+        let drained = PredictSettings { drained: Some(0.3), ..settings.clone() };
         assert_eq!(causes(&drained, Supports::Fixed), held);
+        // Before the room, so that its draws are the same for every way of supporting the brain.
+        let poisson = PredictSettings { poisson_log_sd: Some(0.7), ..settings };
+        assert_eq!(causes(&poisson, Supports::Fixed), [&held[..], &[Cause::Poisson]].concat());
+        assert_eq!(causes(&poisson, Supports::Sliding), [&held[..], &[Cause::Poisson, Room]].concat());
+    }
+
+    #[test]
+    fn poissons_ratio_is_drawn_around_the_patients_and_never_reaches_a_half() {
+        let settings = PredictSettings { poisson_log_sd: Some(2.0), ..PredictSettings::default() };
+        for ratio in [0.35, 0.45, 0.49] {
+            let own = ResectionSettings { poisson_ratio: ratio, ..ResectionSettings::default() };
+            let own = settings.resection(&own, [0.0, -9.81, 0.0], Supports::Fixed);
+            let drawn = settings.uncertainty(&own, &PriorSettings::default(), &labels()).unwrap();
+            let place = drawn.of(Cause::Poisson)[0];
+            let told = UnknownOutcome::of(&drawn.list[place]);
+            assert!((told.median - ratio).abs() < 1e-9 && told.interval_95[1] < 0.5, "{told:?}");
+            let of = |z: f64| Scale::LameRatio.value(drawn.point(&[z; 6])[place]);
+            assert!([-6.0, -2.0, 2.0, 6.0].iter().all(|z| of(*z) > 0.0 && of(*z) < 0.5));
+        }
+        // What the setting says of its own spread.
+        let usual = Scale::LameRatio.number(0.45);
+        let [low, high] = [-Z_95, Z_95].map(|z| Scale::LameRatio.value(usual + 0.7 * z));
+        assert!((low - 0.35).abs() < 5e-3 && (high - 0.49).abs() < 5e-3, "{low} {high}");
     }
 
     #[test]
@@ -213,6 +284,17 @@ mod tests {
         assert!(
             told(Supports::Fixed, &drained)
                 .contains("30 % of the fluid drains from the top, give or take a factor of 1.5")
+        );
+        assert!(!sliding.contains("Poisson"));
+        let poisson = PredictSettings { poisson_log_sd: Some(0.7), ..PredictSettings::default() };
+        assert!(
+            told(Supports::Fixed, &poisson).contains("Poisson's ratio is about 0.45 (95 % between 0.35 and 0.486)")
+        );
+        let fluid_level = Some(KnownLevel { below_top_mm: 25.0, sd_mm: 5.0 });
+        let level = told(Supports::Fixed, &PredictSettings { fluid_level, ..PredictSettings::default() });
+        assert!(
+            level.contains("25 mm below the brain's highest point, give or take 5 mm")
+                && !level.contains("is not known: the tissue")
         );
     }
 

@@ -61,7 +61,7 @@ impl Coordinates {
     }
 
     /// Where states are needed besides the path: to both sides of what is curved, before walls of gravity's direction as well
-    /// (there the slopes by the direction alone), without them with the tissues apart.
+    /// (there the slopes by the direction alone, unless there is a fluid), without them with the tissues apart.
     pub fn beside(&self) -> Vec<Beside> {
         let mut points = Vec::new();
         let mut add = |changes: &[(usize, f64)], slopes: Vec<bool>| {
@@ -79,7 +79,7 @@ impl Coordinates {
         }
         for n in (0..self.kinds.len()).filter(|&n| self.path.bends(self.kinds[n])) {
             let turns = || self.kinds.iter().map(|kind| *kind == Kind::Turn).collect();
-            let slopes = if self.kinds[n] == Kind::Turn { turns() } else { all.clone() };
+            let slopes = if self.kinds[n] == Kind::Turn && !self.path.fluid { turns() } else { all.clone() };
             for side in [1.0, -1.0] {
                 add(&[(n, side)], slopes.clone());
             }
@@ -233,7 +233,7 @@ impl Response {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::uncertain::tests::of_two_tissues;
-    use super::super::uncertain::{Cause, Uncertain};
+    use super::super::uncertain::{Cause, Reading, Uncertain};
     use super::*;
 
     /// A formula as a body: nodes that grey matter, white matter or both let move, under gravity that turns.
@@ -333,7 +333,7 @@ pub(super) mod tests {
         let of_spread = |sd: f64| {
             let unknown = Unknown::Gap(0);
             let prior = unknown.prior(0.0, 0.5 * sd);
-            let room = Uncertain { unknown, prior, cause: Cause::Room, levels_mm: Vec::new() };
+            let room = Uncertain { unknown, prior, cause: Cause::Room, reading: Reading::Itself };
             Uncertainty::new(of_two_tissues(sd).list.into_iter().chain([room]).collect())
         };
         let uncertainty = of_spread(1.0);

@@ -1,6 +1,7 @@
 //! How a prediction is made; the table `[predict]` of the settings.
 
 use super::head::Head;
+use super::known_level::KnownLevel;
 use crate::experiment::resection::{CsfSettings, TISSUE_KG_PER_M3};
 use crate::experiment::setting::{SettingError, first_broken};
 use schemars::JsonSchema;
@@ -40,6 +41,24 @@ pub struct PredictSettings {
     pub fixed_weight: f64,
     /// How probable it is that the brain slides on the skull.
     pub sliding_weight: f64,
+    /// Draws Poisson's ratio as well, one for all tissue, with the shear moduli held: standard deviation of ln(lambda / mu)
+    /// around that of `poisson_ratio` of `[resection]`, so that none lies outside 0 to 0.5. Around 0.45, 0.7 puts 95 % between 0.35, as
+    /// tissue whose fluid may leave has been given (Kaczmarek et al., Bulletin of Mathematical Biology 59, 1997), and 0.49, as tissue
+    /// whose fluid may not (Wittek et al., Biomechanics and Modeling in Mechanobiology 8, 2009). Left out: it is taken as known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_log_sd: Option<f64>,
+    /// Seed of the points that draws are made from. 0: Halton's own; any other: the same turned, for draws that are independent of
+    /// these.
+    #[serde(skip_serializing_if = "is_first")]
+    pub seed: u64,
+    /// Where the fluid will stand, where that is known, in place of `drained`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fluid_level: Option<KnownLevel>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands it so")]
+fn is_first(seed: &u64) -> bool {
+    *seed == 0
 }
 
 impl Default for PredictSettings {
@@ -57,6 +76,9 @@ impl Default for PredictSettings {
             direction_sd_deg: 10.0,
             fixed_weight: 0.5,
             sliding_weight: 0.5,
+            poisson_log_sd: None,
+            seed: 0,
+            fluid_level: None,
         }
     }
 }
@@ -71,7 +93,12 @@ impl PredictSettings {
         let weights = [self.fixed_weight, self.sliding_weight];
         let weigh = weights.iter().all(|w| *w >= 0.0 && w.is_finite()) && weights.iter().sum::<f64>() > 0.0;
         let part = self.drained.is_none_or(|part| part > 0.0 && part <= 1.0);
+        let poisson = self.poisson_log_sd.is_none_or(|sd| sd > 0.0 && sd <= 2.0);
+        let one_of_both = self.fluid_level.is_none() || self.drained.is_none();
         let apart = (0..self.heads.len()).all(|n| !self.heads[..n].iter().any(|head| head.is_same_as(&self.heads[n])));
+        if let Some(level) = &self.fluid_level {
+            level.check()?;
+        }
         first_broken(&[
             ("heads", &self.heads, !self.heads.is_empty() && apart, "one or more ways to lie, none twice"),
             (
@@ -98,6 +125,13 @@ impl PredictSettings {
                 (0.0..=30.0).contains(&self.direction_sd_deg),
                 "0 to 30 degrees",
             ),
+            ("poisson_log_sd", &self.poisson_log_sd.unwrap_or_default(), poisson, "above 0, at most 2"),
+            (
+                "fluid_level.below_top_mm",
+                &self.fluid_level.as_ref().map_or(0.0, |level| level.below_top_mm),
+                one_of_both,
+                "left out where `drained` says how much of the fluid will have drained: give one of the two",
+            ),
             ("fixed_weight and sliding_weight", &weights, weigh, "0 or more, and not both 0"),
         ])
     }
@@ -117,13 +151,15 @@ mod tests {
         assert_eq!(of(&|_| ()), Ok(()));
         type Change<'a> = &'a dyn Fn(&mut PredictSettings);
         let downward = |y: f64| Head::Down([0.0, y, 0.0]);
-        let cases: [(&str, Change<'_>); 8] = [
+        let cases: [(&str, Change<'_>); 10] = [
             ("`heads`", &|s| s.heads = Vec::new()),
             ("`heads` is [left, left]", &|s| s.heads = vec![Head::Left, Head::Left]),
             ("`heads` is [0,-1,0, 0,-2,0]", &|s| s.heads = vec![downward(-1.0), downward(-2.0)]),
             ("`draws`", &|s| s.draws = 3),
             ("`drained` is 0.0:", &|s| s.drained = Some(0.0)),
             ("`drained` is NaN:", &|s| s.drained = Some(f64::NAN)),
+            ("`poisson_log_sd` is 0.0:", &|s| s.poisson_log_sd = Some(0.0)),
+            ("`poisson_log_sd` is NaN:", &|s| s.poisson_log_sd = Some(f64::NAN)),
             ("`threshold_mm`", &|s| s.threshold_mm = f64::NAN),
             ("`fixed_weight and sliding_weight`", &|s| (s.fixed_weight, s.sliding_weight) = (0.0, 0.0)),
         ];

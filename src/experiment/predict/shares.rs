@@ -3,7 +3,6 @@
 //! The share of X is Var(E[u | X]) / Var(u) (Sobol, Mathematics and Computers in Simulation 55, 2001), variances summed over
 //! components and nodes. What is missing to one is what unknowns do only together.
 
-use super::low_discrepancy::normals;
 use super::response::Response;
 use super::uncertain::{Cause, Uncertainty};
 use rayon::prelude::*;
@@ -22,6 +21,9 @@ pub struct Shares {
     pub direction: f64,
     /// Of the room under the skull.
     pub room: f64,
+    /// Of Poisson's ratio, where it was drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson: Option<f64>,
     /// Of how the brain is supported.
     pub supports: f64,
     /// Of what unknowns do together.
@@ -78,14 +80,15 @@ pub fn variance_shares(models: &[Supported<'_>]) -> Shares {
         let variance = (square / count - of_mean).max(f64::MIN_POSITIVE);
         ((product / count - of_mean) / variance).clamp(0.0, 1.0)
     };
-    let [stiffness, load, direction, room] = Cause::ALL.map(share);
+    let [stiffness, load, direction, room, poisson] = Cause::ALL.map(share);
     let supports = share_of_supports(models, weights, &firsts);
     // Found from draws, they may be a hair more than all there is.
-    let sum = (stiffness + load + direction + room + supports).max(1.0);
-    let [stiffness, load, direction, room, supports] =
-        [stiffness, load, direction, room, supports].map(|share| share / sum);
-    let together = (1.0 - stiffness - load - direction - room - supports).max(0.0);
-    Shares { stiffness, load, direction, room, supports, together }
+    let sum = (stiffness + load + direction + room + supports + poisson).max(1.0);
+    let [stiffness, load, direction, room, supports, poisson] =
+        [stiffness, load, direction, room, supports, poisson].map(|share| share / sum);
+    let together = (1.0 - stiffness - load - direction - room - supports - poisson).max(0.0);
+    let drawn = models.iter().any(|(_, _, u)| !u.of(Cause::Poisson).is_empty());
+    Shares { stiffness, load, direction, room, poisson: drawn.then_some(poisson), supports, together }
 }
 
 /// The variance between the means of the supports.
@@ -117,8 +120,8 @@ fn share_of_supports(models: &[Supported<'_>], weights: f64, firsts: &[Drawn]) -
 
 /// A draw that has the unknowns of one cause in common with draw `n`, all others apart from it.
 fn in_common(uncertainty: &Uncertainty, cause: Cause, n: usize, dimensions: usize) -> Vec<f64> {
-    let mut z = normals(n, dimensions, uncertainty.list.len());
-    let same = normals(n, 0, uncertainty.list.len());
+    let mut z = uncertainty.normals(n, dimensions);
+    let same = uncertainty.normals(n, 0);
     for place in uncertainty.of(cause) {
         z[place] = same[place];
     }
@@ -128,17 +131,17 @@ fn in_common(uncertainty: &Uncertainty, cause: Cause, n: usize, dimensions: usiz
 #[cfg(test)]
 mod tests {
     use super::super::response::tests::{linear_body, response};
-    use super::super::uncertain::Uncertain;
     use super::super::uncertain::tests::of_two_tissues;
+    use super::super::uncertain::{Reading, Uncertain};
     use super::*;
-    use crate::experiment::estimate::Unknown;
+    use crate::experiment::estimate::{Scale, Unknown};
     use crate::experiment::sample::Tissue;
 
     /// One modulus, one density: u is lognormal, and of lognormal variables all is known.
     fn one_and_one(of_modulus: f64, of_density: f64) -> Uncertainty {
         let unknown = |unknown: Unknown, mean: f64, sd: f64, cause| {
             let prior = unknown.prior(mean, sd);
-            Uncertain { unknown, prior, cause, levels_mm: Vec::new() }
+            Uncertain { unknown, prior, cause, reading: Reading::Itself }
         };
         Uncertainty::new(vec![
             unknown(Unknown::ShearModulus(Tissue::whole_brain().remove(0)), 6.0, of_modulus, Cause::Stiffness),
@@ -161,6 +164,48 @@ mod tests {
             assert!((found.together - (1.0 - expected[0] - expected[1])).abs() < 0.02);
             assert_eq!((found.direction, found.room, found.supports), (0.0, 0.0, 0.0));
         }
+    }
+
+    /// Mean and mean square of a function of a standard normal variable.
+    fn moments(f: &dyn Fn(f64) -> f64) -> [f64; 2] {
+        let at = |n: i32| -8.0 + 0.01 * f64::from(n);
+        let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+        [1, 2].map(|power| (0..=1600).map(|n| 0.01 * density(at(n)) * f(at(n)).powi(power)).sum())
+    }
+
+    #[test]
+    fn poissons_share_of_a_confined_column_is_the_formula_within_two_points() {
+        // Pressed between walls a column gives way by its load over E (1 - nu) / ((1 + nu) (1 - 2 nu)) = mu (lambda / mu + 2).
+        let compliance = |ratio: f64| {
+            let nu = Scale::LameRatio.value(ratio);
+            let young = 2.0 * (1.0 + nu);
+            (1.0 + nu) * (1.0 - 2.0 * nu) / (young * (1.0 - nu))
+        };
+        for (of_modulus, of_density, of_ratio) in [(0.35, 0.56, 0.7), (0.5, 0.2, 0.4), (0.2, 0.1, 0.7)] {
+            let middle = Scale::LameRatio.number(0.45);
+            let prior = Unknown::PoissonRatio.prior(middle, of_ratio);
+            let (unknown, reading) = (Unknown::PoissonRatio, Reading::Itself);
+            let ratio = Uncertain { unknown, prior, cause: Cause::Poisson, reading };
+            let list = one_and_one(of_modulus, of_density).list.into_iter().chain([ratio]).collect();
+            let uncertainty = Uncertainty::new(list);
+            let body = |p: &[f64]| vec![[0.0, 40.0 * (p[1] - p[0]).exp() * compliance(p[2]), 0.0]];
+            let surface = response(&body, &uncertainty);
+            let found = variance_shares(&[(1.0, &surface, &uncertainty)]);
+            let lognormal = |sd: f64| [(0.5 * sd * sd).exp(), (2.0 * sd * sd).exp()];
+            let factors =
+                [lognormal(of_modulus), lognormal(of_density), moments(&|z| compliance(middle + z * of_ratio))];
+            let all = |n: usize| factors.iter().map(|m| m[n]).product::<f64>();
+            let whole = all(1) - all(0).powi(2);
+            // The others at their means, squared.
+            let expected = factors.map(|[mean, square]| (square / (mean * mean) - 1.0) * all(0).powi(2) / whole);
+            let shares = [found.stiffness, found.load, found.poisson.unwrap()];
+            assert!(shares.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.02), "{found:?} {expected:?}");
+            assert!((found.together - (1.0 - expected.iter().sum::<f64>())).abs() < 0.02, "{found:?} {expected:?}");
+        }
+        let none = one_and_one(0.3, 0.3);
+        let body = |p: &[f64]| vec![[0.0, (p[1] - p[0]).exp(), 0.0]];
+        let surface = response(&body, &none);
+        assert_eq!(variance_shares(&[(1.0, &surface, &none)]).poisson, None, "what is not drawn has no share");
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub enum TaughtError {
     OtherTissues { taught: Vec<String>, drawn: Vec<String> },
     #[error(
         "`population` of the table [prior] was learnt under an effective density of {learnt} kg/m3, and where a part of the fluid has drained \
-         (`drained` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that part out"
+         (`drained` or `fluid_level` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that out"
     )]
     OtherWeight { learnt: f64, weighs: f64 },
 }
@@ -39,8 +39,9 @@ impl PredictSettings {
         if taught.iter().any(|tissue| !drawn.contains(tissue)) {
             return Err(TaughtError::OtherTissues { taught, drawn });
         }
-        // Without `drained` the load is what the settings were held against already.
-        let weighs = self.drained.map_or(own.density_kg_per_m3, |_| self.tissue_density_kg_per_m3);
+        // Where nothing is said of the fluid the load is what the settings were held against already.
+        let fluid = self.drained.is_some() || self.fluid_level.is_some();
+        let weighs = if fluid { self.tissue_density_kg_per_m3 } else { own.density_kg_per_m3 };
         if population.is_under(weighs) {
             return Ok(());
         }
@@ -76,6 +77,7 @@ fn in_words(tissues: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::known_level::KnownLevel;
     use super::*;
     use crate::experiment::population::{LearntPrior, PopulationPrior};
 
@@ -115,6 +117,9 @@ mod tests {
         let drained = PredictSettings { tissues: 1, drained: Some(0.3), ..PredictSettings::default() };
         let said = refused(&drained, &["brain"]).unwrap();
         assert!(said.contains("100 kg/m3") && said.contains("1040 kg/m3") && said.contains("`drained`"), "{said}");
+        let fluid_level = Some(KnownLevel { below_top_mm: 20.0, sd_mm: 5.0 });
+        let level = PredictSettings { drained: None, fluid_level, ..drained.clone() };
+        assert!(refused(&level, &["brain"]).unwrap().contains("`fluid_level`"));
         assert_eq!(refused(&PredictSettings { tissue_density_kg_per_m3: 100.0, ..drained }, &["brain"]), None);
     }
 }

@@ -1,6 +1,6 @@
 //! What is not known before an operation, with what is known of it.
 
-use super::low_discrepancy::normals;
+use super::low_discrepancy::normals_of;
 use crate::experiment::estimate::{LogPrior, Unknown, joint_precision};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -18,11 +18,25 @@ pub enum Cause {
     Direction,
     /// How far the skull stands off.
     Room,
+    /// How little the tissue yields to a change of volume: Poisson's ratio.
+    Poisson,
 }
 
 impl Cause {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Stiffness, Self::Load, Self::Direction, Self::Room];
+    pub const ALL: [Self; 5] = [Self::Stiffness, Self::Load, Self::Direction, Self::Room, Self::Poisson];
+}
+
+/// What a prior's variable is of the solver's number.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Reading {
+    /// The number itself.
+    #[default]
+    Itself,
+    /// ln(part of the fluid that has drained) of a level, by the levels (mm) when 0, 1/n, 2/n ... 1 of it has.
+    Drained(Vec<f64>),
+    /// How far a level is below this one, mm.
+    Below(f64),
 }
 
 /// One unknown.
@@ -30,12 +44,12 @@ impl Cause {
 pub struct Uncertain {
     /// What it is to the solver.
     pub unknown: Unknown,
-    /// What is known of it: of its number, or of ln(part drained) where there are `levels`.
+    /// What is known of it.
     pub prior: LogPrior,
     /// What it belongs to.
     pub cause: Cause,
-    /// Level of the fluid (mm) when 0, 1/n, 2/n ... 1 of it has drained, where the number is that level.
-    pub levels_mm: Vec<f64>,
+    /// What the prior is of.
+    pub reading: Reading,
 }
 
 impl Uncertain {
@@ -45,11 +59,17 @@ impl Uncertain {
 
     /// The solver's number where the prior's variable has this value.
     fn number(&self, value: f64) -> f64 {
-        let Some(last) = self.levels_mm.len().checked_sub(1) else { return value };
+        let levels_mm = match &self.reading {
+            Reading::Itself => return value,
+            // Fluid above carries no more.
+            Reading::Below(top_mm) => return top_mm - value.max(0.0),
+            Reading::Drained(levels_mm) => levels_mm,
+        };
+        let Some(last) = levels_mm.len().checked_sub(1) else { return value };
         let place = value.exp().clamp(0.0, 1.0) * last as f64;
         let low = (place as usize).min(last.saturating_sub(1));
         let high = (low + 1).min(last);
-        self.levels_mm[low] + (place - low as f64) * (self.levels_mm[high] - self.levels_mm[low])
+        levels_mm[low] + (place - low as f64) * (levels_mm[high] - levels_mm[low])
     }
 }
 
@@ -60,6 +80,8 @@ pub struct Uncertainty {
     pub list: Vec<Uncertain>,
     /// L of the covariance L L^T of the prior's variables.
     factor: DMatrix<f64>,
+    /// Of the points that draws are made from.
+    seed: u64,
 }
 
 impl Uncertainty {
@@ -70,13 +92,19 @@ impl Uncertainty {
         let apart = || DMatrix::from_diagonal(&DVector::from_iterator(list.len(), list.iter().map(Uncertain::sd)));
         let joint = joint_precision(&priors).try_inverse().and_then(DMatrix::cholesky);
         let factor = joint.map_or_else(apart, |cholesky| cholesky.l());
-        Self { list, factor }
+        Self { list, factor, seed: 0 }
+    }
+
+    /// The same with draws from the points of this seed.
+    #[must_use]
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
     }
 
     /// The same without what belongs to one cause: a body held at its base has no room.
     #[must_use]
     pub fn without(&self, cause: Cause) -> Self {
-        Self::new(self.list.iter().filter(|u| u.cause != cause).cloned().collect())
+        Self::new(self.list.iter().filter(|u| u.cause != cause).cloned().collect()).with_seed(self.seed)
     }
 
     /// The unknowns as the solver takes them.
@@ -92,7 +120,12 @@ impl Uncertainty {
 
     /// The numbers of one draw.
     pub fn draw(&self, index: usize) -> Vec<f64> {
-        self.point(&normals(index, 0, self.list.len()))
+        self.point(&self.normals(index, 0))
+    }
+
+    /// The standard normal variables of one draw, one for each unknown, in the dimensions from `first` on.
+    pub(super) fn normals(&self, index: usize, first: usize) -> Vec<f64> {
+        normals_of(self.seed, index, first, self.list.len())
     }
 
     /// The numbers in the middle of the prior.
@@ -125,7 +158,7 @@ pub(super) mod tests {
 
     fn unknown(unknown: Unknown, mean: f64, sd: f64, cause: Cause) -> Uncertain {
         let prior = unknown.prior(mean, sd);
-        Uncertain { unknown, prior, cause, levels_mm: Vec::new() }
+        Uncertain { unknown, prior, cause, reading: Reading::Itself }
     }
 
     /// Two tissues, a density and two turns.
@@ -159,11 +192,14 @@ pub(super) mod tests {
     #[test]
     fn the_level_falls_with_what_has_drained() {
         let level = Uncertain {
-            levels_mm: vec![60.0, 40.0, 0.0],
+            reading: Reading::Drained(vec![60.0, 40.0, 0.0]),
             ..unknown(Unknown::CsfLevel, 0.25f64.ln(), 0.4, Cause::Load)
         };
         let all = Uncertainty::new(vec![level]);
         assert!((all.centre()[0] - 50.0).abs() < 1e-9);
         assert!(all.point(&[1.0])[0] < 50.0 && all.point(&[9.0])[0] == 0.0 && all.sds()[0] > 1.0);
+        let known = Uncertain { reading: Reading::Below(60.0), ..unknown(Unknown::CsfLevel, 20.0, 3.0, Cause::Load) };
+        let all = Uncertainty::new(vec![known]);
+        assert_eq!((all.centre()[0], all.point(&[1.0])[0], all.sds()[0]), (40.0, 37.0, 3.0));
     }
 }

@@ -50,15 +50,18 @@ fn most(shares: &Shares) -> String {
 }
 
 /// Shares by what they are called to a reader.
-fn named(shares: &Shares) -> [(&'static str, f64); 6] {
-    [
+fn named(shares: &Shares) -> Vec<(&'static str, f64)> {
+    let poisson = shares.poisson.map(|share| ("how compressible the tissue is (Poisson's ratio)", share));
+    let mut named = vec![
         ("how stiff the tissue is", shares.stiffness),
         ("how much fluid drains", shares.load),
         ("how exactly the head lies", shares.direction),
         ("the room under the skull", shares.room),
         ("how the skull holds the brain", shares.supports),
         ("several of these together", shares.together),
-    ]
+    ];
+    named.splice(4..4, poisson);
+    named
 }
 
 fn heads(prediction: &Prediction) -> Markup {
@@ -69,20 +72,46 @@ fn heads(prediction: &Prediction) -> Markup {
         (false, words([h.head.clone()].into_iter().chain(figures.map(|x| number(x, 3)))))
     };
     let rows: Vec<Row> = prediction.heads.iter().map(row).collect();
-    let shared = ["Head"].into_iter().chain(named(&Shares::default()).map(|n| n.0)).map(str::to_owned);
-    let shared: Vec<String> = shared.collect();
+    let names = prediction.heads.first().map_or_else(Vec::new, |h| named(&h.shares));
+    let shared: Vec<String> = ["Head"].into_iter().chain(names.iter().map(|n| n.0)).map(str::to_owned).collect();
     let shares: Vec<Row> = prediction
         .heads
         .iter()
         .map(|h| {
-            let parts = named(&h.shares).map(|(_, share)| format!("{} %", fixed(100.0 * share, 0)));
+            let parts = named(&h.shares).into_iter().map(|(_, share)| format!("{} %", fixed(100.0 * share, 0)));
             (false, words([h.head.clone()].into_iter().chain(parts)))
         })
         .collect();
     html! {
         (table("How the head lies, side by side", &head, &rows))
+        @if prediction.heads.iter().any(|h| h.fluid.is_some()) { (levels(prediction)) }
         (table("What the spread comes from (shares of the variance)", &shared, &shares))
     }
+}
+
+/// Where the fluid stands with each head.
+fn levels(prediction: &Prediction) -> Markup {
+    let head = [
+        "Head",
+        "Below the brain's highest point (mm)",
+        "95 % between",
+        "Highest point at x, y, z (mm)",
+        "Drained then",
+    ];
+    let row = |h: &HeadPrediction| -> Option<Row> {
+        let fluid = h.fluid.as_ref()?;
+        let [low, high] = fluid.interval_95_mm.map(|mm| fixed(mm, 0));
+        let place = fluid.top_at_mm.map(|x| fixed(x, 0)).join(", ");
+        let below = number(fluid.below_top_mm, 3);
+        let cells = [h.head.clone(), below, format!("{low} to {high}"), place, fluid.drained_in_words()];
+        Some((false, words(cells)))
+    };
+    let rows: Vec<Row> = prediction.heads.iter().filter_map(row).collect();
+    table(
+        "Where the fluid stands, and how much of the fluid on the scan has drained then",
+        &head.map(str::to_owned),
+        &rows,
+    )
 }
 
 fn targets(prediction: &Prediction, head: &HeadPrediction) -> Markup {
@@ -167,7 +196,7 @@ fn checks(checks: &[Check]) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::predict::{HeadComparison, TargetPrediction};
+    use crate::experiment::predict::{FluidOfHead, HeadComparison, TargetPrediction};
 
     fn prediction() -> Prediction {
         let head = |name: &str, cc: f64| HeadPrediction {
@@ -208,6 +237,22 @@ mod tests {
         let said = in_a_sentence(&prediction());
         for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."] {
             assert!(said.contains(words), "{words}: {said}");
+        }
+    }
+
+    #[test]
+    fn poissons_share_and_the_fluids_level_are_shown_where_they_were_drawn_and_known() {
+        let plain = section(&prediction(), None).into_string();
+        assert!(!plain.contains("Poisson") && !plain.contains("Where the fluid stands"));
+        let mut found = prediction();
+        found.heads[0].shares.poisson = Some(0.123);
+        found.heads[1].shares.poisson = Some(0.0);
+        let (drained, drained_95) = (Some(0.05), Some([0.02, 0.08]));
+        let fluid = FluidOfHead { below_top_mm: 25.0, drained, drained_95, ..FluidOfHead::default() };
+        found.heads[0].fluid = Some(fluid);
+        let page = section(&found, None).into_string();
+        for words in ["Poisson's ratio", "12 %", "Where the fluid stands", "5 % (2 to 8 %)"] {
+            assert!(page.contains(words), "{words}");
         }
     }
 

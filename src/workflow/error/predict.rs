@@ -1,6 +1,6 @@
 //! Why no prediction can be made.
 
-use crate::experiment::predict::{Head, PlannedError, TaughtError};
+use crate::experiment::predict::{Head, LevelError, PlannedError, TaughtError};
 use crate::mesh::OpenSurface;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -13,6 +13,13 @@ pub enum PredictError {
     Plan(#[from] PlannedError),
     #[error(transparent)]
     Taught(#[from] TaughtError),
+    #[error(
+        "`poisson_ratio` of the table [resection] is 0, and Poisson's ratio is to be drawn around it (`poisson_log_sd` of the table [predict]): \
+         give one above 0, or leave that out"
+    )]
+    RatioAtEnd,
+    #[error(transparent)]
+    Level(#[from] LevelError),
     #[error("nothing is said of what is to be taken: give a mask in the scan's grid, or an ellipsoid")]
     NoPlan,
     #[error("`{given}` is no ellipsoid: give six numbers x,y,z,rx,ry,rz (mm, scanner, RAS+), the half axes above 0")]
@@ -65,7 +72,7 @@ pub enum PredictError {
     TargetOutside { file: String, target: usize, at_mm: [f64; 3] },
     #[error(
         "the brain finds no equilibrium under these loads, however it is supported ({reason}); lower `density_kg_per_m3` in the \
-         table [resection] or the part that has drained"
+         table [resection] or the part that has drained, or raise the fluid's level"
     )]
     NoEquilibrium { reason: String },
     #[error("{}: {file} is not there: an earlier version has made this prediction", folder.display())]

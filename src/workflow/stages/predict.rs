@@ -10,12 +10,14 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, DrawnState, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes, PREDICTED,
-    Planned, Posed, Prediction, Spread, SupportWeight, TargetPlace, TargetPrediction, UnknownOutcome, assumptions,
-    compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast, spread, variance_shares,
+    Check, DrawnState, FluidOfHead, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes,
+    PREDICTED, Planned, Posed, PredictSettings, Prediction, Spread, SupportWeight, TargetPlace, TargetPrediction,
+    UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast, spread,
+    variance_shares,
 };
 use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
+use crate::image::LabelMap;
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
 use crate::layout::{
     NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
@@ -32,7 +34,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -179,6 +181,10 @@ impl<'a> Patient<'a> {
             let own = settings.predict.resection(&settings.resection, gravity, supports);
             let scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), &self.head.labels)?;
             let (mut scenario, _) = with_held_tissues(work, self.input.mesh.2, scenario)?;
+            let csf = settings.resection.csf.as_ref();
+            if let Some((level, _)) = settings.predict.known_fluid(csf, &self.head.labels, gravity) {
+                scenario.loads.csf = Some(level);
+            }
             let mesh = own.supported_mesh(self.input.mesh.0.clone(), &scenario)?;
             scenario.solver.element = settings.estimate.element;
             let uncertainty = settings.predict.uncertainty(&own, &settings.prior, &self.head.labels)?;
@@ -256,6 +262,7 @@ struct Lying {
     spread: Spread,
     checks: Vec<Check>,
     shares: crate::experiment::predict::Shares,
+    fluid: Option<FluidOfHead>,
     states: usize,
     supports: Vec<SupportWeight>,
 }
@@ -307,7 +314,8 @@ impl Lying {
             told.extend(forecast.check);
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
-        Ok(Self { draws, named, spread, checks: told, shares, states, supports })
+        let fluid = fluid_of_head(settings, head, &patient.head.labels, &patient.mni_from_pre)?;
+        Ok(Self { draws, named, spread, checks: told, shares, fluid, states, supports })
     }
 
     /// The draws as they are kept.
@@ -347,6 +355,7 @@ impl Lying {
             farthest_95_mm: Some(rounded(farthest(&self.draws, 0.95))),
             over_threshold_cc: rounded(over.sum()),
             shares: self.shares,
+            fluid: self.fluid.clone(),
             states_solved: self.states,
             supports: self.supports.clone(),
             targets: (0..patient.targets.len()).map(|n| self.target(patient, n)).collect(),
@@ -380,6 +389,19 @@ impl Lying {
         told.over_threshold = rounded(over.min(1.0));
         told
     }
+}
+
+/// Where the fluid stands with one head, in the scanner's frame, where that is known.
+pub(crate) fn fluid_of_head(
+    settings: &PredictSettings,
+    head: &Head,
+    labels: &LabelMap<Mni>,
+    mni_from_pre: &RigidTransform<Pre, Mni>,
+) -> Result<Option<FluidOfHead>, WorkflowError> {
+    let found =
+        settings.fluid_of_head(head, labels, head.gravity_m_per_s2(mni_from_pre)).map_err(PredictError::Level)?;
+    let at = |top: Position<Mni>| <[f64; 3]>::from(mni_from_pre.inverse().apply(top).mm).map(rounded);
+    Ok(found.map(|(fluid, top)| FluidOfHead { top_at_mm: at(top), ..fluid }))
 }
 
 /// Micrometres: more than any use needs.

@@ -49,6 +49,7 @@ fn all() -> Vec<By> {
         By::Gravity(0),
         By::Gravity(2),
         By::AllLoads,
+        By::LameRatio,
     ]
 }
 
@@ -59,6 +60,12 @@ fn changed(scenario: &Scenario, by: &By, factor: f64) -> Scenario {
         By::Material { name, parameter } => {
             let material = s.materials[name].scaled(*parameter, factor).unwrap();
             s.materials.insert(name.clone(), material);
+        }
+        By::LameRatio => {
+            for material in s.materials.values_mut() {
+                let ratio = factor * material.lame_lambda_pa() / material.shear_modulus_pa();
+                *material = material.clone().with_poisson_ratio(0.5 * ratio / (1.0 + ratio));
+            }
         }
         By::Load(Load::Weight) => s.loads.gravity_m_per_s2 = s.loads.gravity_m_per_s2.map(|g| g * factor),
         By::Load(Load::Patch(n)) => s.loads.patch[*n].force_n = s.loads.patch[*n].force_n.map(|f| f * factor),
