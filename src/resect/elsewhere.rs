@@ -153,10 +153,10 @@ mod tests {
     use super::*;
     use crate::image::{Grid, LabelMap};
     use crate::register::deformable::{DeformableQuality, DisplacementField};
-    use nalgebra::Point3;
+    use nalgebra::{Point3, Vector3};
 
     /// A ball of folded tissue of radius 40 mm with a ventricle of 8 mm in it, in voxels of 1 mm; `gone` says what is fluid on the
-    /// second scan, `moved_mm` how far everything has moved along x on it.
+    /// second scan, `moved_mm` how far what lies around the sulcus has moved along x on it.
     struct Head {
         pre: Volume<f32, Mni>,
         labels: LabelMap<Mni>,
@@ -168,6 +168,11 @@ mod tests {
     /// A sheet of fluid of 4 mm, as thick as a deep sulcus.
     fn sulcus(p: Point3<f64>) -> bool {
         (p.x - 16.0).abs() < 2.0 && p.y.abs() < 16.0 && p.z.abs() < 16.0
+    }
+
+    /// Displacement of what lies around the sulcus.
+    fn sagged(p: Point3<f64>, by_mm: f64) -> Vector3<f64> {
+        Vector3::new(if p.x > 12.0 { by_mm } else { 0.0 }, 0.0, 0.0)
     }
 
     fn head(gone: impl Fn(Point3<f64>) -> bool + Sync + Send, moved_mm: f64) -> Head {
@@ -184,7 +189,7 @@ mod tests {
             _ => 25.0,
         };
         let gone = Mask::from_fn(grid, |n| label_at(at(n)) == label::WHITE_MATTER && gone(at(n)));
-        let before = |n: usize| at(n) - nalgebra::Vector3::new(moved_mm, 0.0, 0.0);
+        let before = |n: usize| at(n) - sagged(at(n), moved_mm);
         Head {
             pre: Volume::from_data(grid, (0..grid.len()).map(|n| value_at(at(n))).collect()),
             labels: LabelMap::from_data(grid, (0..grid.len()).map(|n| label_at(at(n))).collect()),
@@ -197,7 +202,7 @@ mod tests {
         }
     }
 
-    fn found(h: &Head, sag_mm: f32) -> Result<CavityFinding, PairError> {
+    fn found(h: &Head, sag_mm: f64) -> Result<CavityFinding, PairError> {
         let known = h.brain.map(|_| true);
         let pair = CavityPair {
             pre: &h.pre,
@@ -209,7 +214,11 @@ mod tests {
             grey_mean: 95.0,
             grey_white_contrast: 30.0,
         };
-        let by = |x: f32| DisplacementField::from_displacement(&Volume::filled(h.pre.grid, [x, 0.0, 0.0]));
+        let by = |x: f64| {
+            let grid = h.pre.grid;
+            let moved = |n: usize| sagged(grid.position(grid.voxel(n).map(|c| c as f64).into()).mm, x);
+            DisplacementField::from_displacement(&Volume::from_fn(grid, |n| [moved(n).x as f32, 0.0, 0.0]))
+        };
         let fit = |_: &Mask<Mni>| {
             let quality = DeformableQuality {
                 correlation: [1.0; 2],
@@ -254,7 +263,7 @@ mod tests {
         let lost = found(&h, 0.0).unwrap().cavity;
         let moved = Mask::from_fn(lost.grid, |n| {
             let p = lost.grid.position(lost.grid.voxel(n).map(|c| c as f64).into()).mm;
-            sulcus(p - nalgebra::Vector3::new(4.0, 0.0, 0.0))
+            sulcus(p - sagged(p, 4.0))
         });
         assert!(both(&lost, &moved).count() * 10 > 9 * lost.count(), "the sulcus where it is now");
     }
