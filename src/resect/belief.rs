@@ -54,7 +54,7 @@ const FOLDS_KEPT: f64 = 0.6;
 const LEAST_LOSS: f64 = 0.5;
 /// A candidate with this share of its surface at the ventricles and no thicker than [`LAYER_MM`] is their growth.
 const AT_VENTRICLE: f64 = 0.3;
-const LAYER_MM: f64 = 4.0;
+pub(super) const LAYER_MM: f64 = 4.0;
 /// Windows reach this far, mm.
 const MARGIN_MM: f64 = 9.0;
 /// Windows in which the folds of both scans are compared, standard deviation in mm.

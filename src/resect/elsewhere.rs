@@ -5,13 +5,13 @@
 //! have opened or moved would be taken for one. Once the sag is known, what it explains is no loss, and what remains may
 //! be thin.
 
-use super::belief::Evidence;
+use super::belief::{Evidence, LAYER_MM};
 use super::cavity::{CavityFinding, CavitySettings, ResectError, grow, settled, side_of, with_fluid_of};
 use super::cavity_pair::CavityPair;
-use super::pair::PairError;
 use super::sets::{both, either, without};
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, components};
+use crate::image::distance::distance_mm;
 use crate::image::morphology::{dilate, erode, open};
 use crate::image::{Mask, Volume};
 use crate::register::deformable::AtlasFit;
@@ -23,6 +23,9 @@ const THREAD_MM: f64 = 1.0;
 const BESIDE_MM: f64 = 1.0;
 /// Smaller parts are not looked at, cc: a cut that noise or a vessel has parted is larger.
 const LEAST_PART_CC: f64 = 0.25;
+/// A part that lies this shallow in the brain (median) and is no thicker than a layer on the ventricles may be is brain that
+/// has sunk, or fluid that stands, further from the skull than the sag says, mm.
+const SHALLOW_MM: f32 = 6.0;
 /// How often the sag is fitted again without what was found: a cut that takes part in a fit is partly explained away.
 const MOST_FITS: usize = 3;
 
@@ -64,11 +67,14 @@ fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: 
     let parts = components(&thick, Connectivity::Corners);
     let voxel_cc = pair.pre.grid.voxel_volume_mm3() / 1000.0;
     let labels = Volume::from_fn(pair.pre.grid, |n| if carried.ventricle.data[n] { label::VENTRICLE } else { 0 });
+    let depth_mm = distance_mm(&carried.brain.map(|inside| !inside));
     let sagged = CavityPair { pre: &carried.t1, pre_labels: &labels, pre_brain: &carried.brain, ..*pair };
     let mut believed: Vec<(u32, Evidence)> = Vec::new();
     for (part, _) in (1..).zip(&parts.voxels).filter(|(_, voxels)| **voxels as f64 * voxel_cc >= LEAST_PART_CC) {
         let evidence = Evidence::of(&parts.mask(part), &sagged);
-        if evidence.doubt().is_none() {
+        let own = parts.labels.data.iter().zip(&depth_mm.data).filter(|(of, _)| **of == part);
+        let at_skull = evidence.radius_mm < LAYER_MM && middle(own.map(|(_, depth)| *depth)) < SHALLOW_MM;
+        if evidence.doubt().is_none() && !at_skull {
             believed.push((part, evidence));
         }
     }
@@ -78,6 +84,12 @@ fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: 
     let seed = holding(&lost, &seed);
     let seed_cc = seed.volume_cc();
     (seed_cc >= settings.smallest_cc).then_some(Loss { seed, evidence: Evidence { seed_cc, ..largest } })
+}
+
+fn middle(values: impl Iterator<Item = f32>) -> f32 {
+    let mut values: Vec<f32> = values.collect();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// The connected parts of a mask that hold any of the seed.
@@ -99,26 +111,31 @@ fn dark(pair: &CavityPair<'_>, and: impl Fn(usize) -> bool + Sync + Send) -> Mas
     Mask::from_fn(pair.pre.grid, |n| pair.post_known.data[n] && pair.post.data[n] < border && and(n))
 }
 
-/// The cavity with what is gone elsewhere, and the sag around all of it. Where no cavity was seen at all (not where one was
-/// doubted), a thin cut alone is one.
+/// The cavity with what is gone elsewhere, the sag around all of it, and how much is gone elsewhere still, cc. Where no cavity was
+/// seen at all (not where one was doubted), a thin cut alone is one.
 ///
 /// # Errors
 /// That of `found`, or of `fit`, which fits the sag around a cavity.
-pub(super) fn with_losses_elsewhere(
+pub(super) fn with_losses_elsewhere<E: From<ResectError>>(
     found: Result<CavityFinding, ResectError>,
     pair: &CavityPair<'_>,
-    fit: impl Fn(&Mask<Mni>) -> Result<AtlasFit<Mni>, PairError>,
+    fit: impl Fn(&Mask<Mni>) -> Result<AtlasFit<Mni>, E>,
     settings: &CavitySettings,
-) -> Result<(CavityFinding, AtlasFit<Mni>), PairError> {
+) -> Result<(CavityFinding, AtlasFit<Mni>, Option<f64>), E> {
     let (mut cavity, mut evidence, unseen) = match found {
         Ok(CavityFinding { cavity, evidence, .. }) => (cavity, evidence, None),
         Err(none @ ResectError::NoOperation { doubt: None, .. }) => (pair.pre_brain.map(|_| false), None, Some(none)),
         Err(other) => return Err(other.into()),
     };
     let mut sag = fit(&cavity)?;
-    for _ in 0..MOST_FITS {
+    let mut fits = 0;
+    let left = loop {
         let carried = Carried::of(pair, &sag);
-        let Some(more) = loss(pair, &carried, &cavity, settings) else { break };
+        let Some(more) = loss(pair, &carried, &cavity, settings) else { break None };
+        if fits == MOST_FITS {
+            break Some(more.evidence.seed_cc);
+        }
+        fits += 1;
         let way = dark(pair, |n| carried.tissue.data[n] && carried.brain.data[n]);
         let grown = grow(&more.seed, &way, settings.growth_mm);
         let whole = settled(&either(&cavity, &grown), &carried.brain, settings.closing_mm);
@@ -126,14 +143,14 @@ pub(super) fn with_losses_elsewhere(
         cavity = either(&cavity, &without(&whole, &carried.ventricle));
         evidence = evidence.or(Some(more.evidence));
         sag = fit(&cavity)?;
-    }
+    };
     if let (Some(unseen), None) = (unseen, evidence) {
         return Err(unseen.into());
     }
     let ventricle = pair.pre_labels.map(|l| l == label::VENTRICLE);
     let resected = without(&both(&cavity, pair.pre_brain), &ventricle);
     let side = side_of(&cavity);
-    Ok((CavityFinding { cavity, resected, side, evidence }, sag))
+    Ok((CavityFinding { cavity, resected, side, evidence }, sag, left))
 }
 
 /// How much tissue is gone elsewhere than in this cavity, cc; `None` where nothing to speak of.
@@ -202,7 +219,7 @@ mod tests {
         }
     }
 
-    fn found(h: &Head, sag_mm: f64) -> Result<CavityFinding, PairError> {
+    fn found(h: &Head, sag_mm: f64) -> Result<CavityFinding, ResectError> {
         let known = h.brain.map(|_| true);
         let pair = CavityPair {
             pre: &h.pre,
@@ -230,7 +247,7 @@ mod tests {
             Ok(AtlasFit { atlas_from_subject: by(-sag_mm), subject_from_atlas: by(sag_mm), quality })
         };
         let settings = CavitySettings::default();
-        with_losses_elsewhere(find_cavity(&pair, &settings), &pair, fit, &settings).map(|(found, _)| found)
+        with_losses_elsewhere(find_cavity(&pair, &settings), &pair, fit, &settings).map(|(found, ..)| found)
     }
 
     fn cut(p: Point3<f64>) -> bool {
@@ -259,24 +276,33 @@ mod tests {
     #[test]
     fn what_the_sag_explains_is_no_loss_and_what_it_does_not_is() {
         let h = head(|_| false, 4.0);
-        assert!(matches!(found(&h, 4.0), Err(PairError::Resect(ResectError::NoOperation { doubt: None, .. }))));
+        assert!(matches!(found(&h, 4.0), Err(ResectError::NoOperation { doubt: None, .. })));
         let lost = found(&h, 0.0).unwrap().cavity;
-        let moved = Mask::from_fn(lost.grid, |n| {
-            let p = lost.grid.position(lost.grid.voxel(n).map(|c| c as f64).into()).mm;
-            sulcus(p - sagged(p, 4.0))
-        });
-        assert!(both(&lost, &moved).count() * 10 > 9 * lost.count(), "the sulcus where it is now");
+        let fluid = |moved_mm: f64| {
+            Mask::from_fn(lost.grid, |n| {
+                let p = lost.grid.position(lost.grid.voxel(n).map(|c| c as f64).into()).mm;
+                sulcus(p - sagged(p, moved_mm))
+            })
+        };
+        // Where the sulcus is now; where it was, beside that, fluid belongs to what is lost around it.
+        let (now, before) = (fluid(4.0), fluid(0.0));
+        assert!(both(&lost, &now).count() * 10 > 9 * now.count());
+        assert!(both(&lost, &either(&now, &before)).count() * 10 > 9 * lost.count());
+    }
+
+    #[test]
+    fn fluid_under_the_skull_where_the_brain_has_sunk_further_than_the_sag_says_is_no_cut() {
+        let h = head(|p| p.z > 0.0 && (33.5..37.5).contains(&p.coords.norm()), 0.0);
+        assert!(h.gone.volume_cc() > 10.0);
+        assert!(matches!(found(&h, 0.0), Err(ResectError::NoOperation { .. })));
     }
 
     #[test]
     fn what_was_doubted_stays_doubted_and_ventricles_that_have_grown_a_little_are_no_cut() {
         let grown = |r: f64| head(move |p| p.coords.norm() < r, 0.0);
         let thick = found(&grown(12.0), 0.0).map(|f| f.cavity.count()).unwrap_err();
-        assert!(
-            matches!(thick, PairError::Resect(ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. })),
-            "{thick}"
-        );
+        assert!(matches!(thick, ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. }), "{thick}");
         let thin = found(&grown(10.5), 0.0).map(|f| f.cavity.count()).unwrap_err();
-        assert!(matches!(thin, PairError::Resect(ResectError::NoOperation { .. })), "{thin}");
+        assert!(matches!(thin, ResectError::NoOperation { .. }), "{thin}");
     }
 }

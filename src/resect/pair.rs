@@ -244,14 +244,14 @@ pub fn take_pair_apart(
         let fit = fit_sag(&scans, &settings.sag);
         fit.map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })
     };
-    let (mut finding, sag) = if computed {
+    let (mut finding, sag, lost_elsewhere_cc) = if computed {
         with_losses_elsewhere(found, &pair, fit_around, &settings.cavity)?
     } else {
         let finding = found?;
         let sag = fit_around(&finding.cavity)?;
-        (finding, sag)
+        let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, &settings.cavity);
+        (finding, sag, cc)
     };
-    let lost_elsewhere_cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, &settings.cavity);
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
