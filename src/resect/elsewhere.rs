@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn fluid_under_the_skull_where_the_brain_has_sunk_further_than_the_sag_says_is_no_cut() {
-        let h = head(|p| p.z > 0.0 && (33.5..37.5).contains(&p.coords.norm()), 0.0);
+        let h = head(|p| p.z > 0.0 && (34.5..37.5).contains(&p.coords.norm()), 0.0);
         assert!(h.gone.volume_cc() > 10.0);
         assert!(matches!(found(&h, 0.0), Err(ResectError::NoOperation { .. })));
     }
