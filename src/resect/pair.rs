@@ -15,7 +15,7 @@ use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementFiel
 use crate::segment::native::labels_on;
 use crate::segment::{
     HeadError, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, carried_priors,
-    fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors,
+    fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors, without_gaps,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -182,6 +182,10 @@ pub fn take_pair_apart(
     settings: &PairSettings,
     step: impl Fn(&'static str),
 ) -> Result<OperatedBrain, PairError> {
+    // The slices that one scan has lost are no tissue that the patient has.
+    let (filled, gaps) = without_gaps(post.t1).unzip();
+    let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &post.mni_from_t1));
+    let post = filled.as_ref().unwrap_or(post);
     let likeness = likeness(pre.t1, post.t1, &pre.mni_from_t1, &post.mni_from_t1);
     let by_hand = given.cavity.is_some() || given.resected.is_some();
     if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
@@ -287,6 +291,7 @@ pub fn take_pair_apart(
         segment_with_priors(post, &post_priors, &SegmentOverrides::default(), &settings.segment)
             .map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })?
     };
+    after.warnings.extend(gaps.unwrap_or_default());
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
     after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
     if given.resected.is_none() {

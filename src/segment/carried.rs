@@ -251,6 +251,13 @@ impl<F: Frame> BrainSearch<'_, F> {
     }
 }
 
+/// The scan with slices that show nothing between others filled, and what to say of them; `None` where there are none.
+pub fn without_gaps<F: Frame>(t1: &Volume<f32, F>) -> Option<(Volume<f32, F>, Vec<SegmentWarning>)> {
+    let gaps = blank_slices(t1, WIDEST_GAP_MM);
+    let told = || gaps.iter().map(|gap| SegmentWarning::blank(gap, &t1.grid)).collect();
+    (!gaps.is_empty()).then(|| (with_filled(t1, &gaps), told()))
+}
+
 /// Labels of a head that has been registered rigidly to the template: fits the template, then [`super::segment_with_priors`].
 /// Slices that show nothing between others are filled first.
 ///
@@ -263,8 +270,7 @@ pub fn segment_head<F: Frame>(
     settings: &SegmentSettings,
 ) -> Result<(Segmentation<F>, AtlasFit<Mni>), HeadError> {
     settings.check()?;
-    let gaps = blank_slices(scan.t1, WIDEST_GAP_MM);
-    let filled = (!gaps.is_empty()).then(|| with_filled(scan.t1, &gaps));
+    let (filled, gaps) = without_gaps(scan.t1).unzip();
     let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &scan.mni_from_t1));
     let scan = filled.as_ref().unwrap_or(scan);
     let carried = Carried::onto(scan, deformable)?;
@@ -286,7 +292,7 @@ pub fn segment_head<F: Frame>(
     let mut segmentation = labelled(scan, found, &priors, overrides, settings)?;
     let on_template = |p| carried.fit.atlas_from_subject.apply(p);
     segmentation.regions = evidence(&segmentation.labels_mni, &segmentation.t1_mni, on_template);
-    segmentation.warnings.extend(gaps.iter().map(|gap| SegmentWarning::blank(gap, &scan.t1.grid)));
+    segmentation.warnings.extend(gaps.unwrap_or_default());
     if overrides.brain.is_some() {
         return Ok((segmentation, carried.fit));
     }

@@ -30,7 +30,7 @@ pub use crate::anatomy::label;
 pub use agreement::{Disagreement, disagreement};
 pub use bias::LogBias;
 pub use brain::BrainSettings;
-pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head};
+pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head, without_gaps};
 pub use confidence::RegionEvidence;
 pub use import::{ImportError, ImportedLabels, import_labels};
 pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
