@@ -285,19 +285,12 @@ pub fn apart_from(mask: &Mask<Mni>, other: &Mask<Mni>, margin_mm: f64) -> Mask<M
 
 #[cfg(test)]
 mod tests {
+    use super::super::cavity_pair::MadePair;
     use super::*;
     use crate::image::{Grid, Volume};
 
     /// A ball of white matter of radius 40 mm with a ventricle, and a second scan with other gain and a hole.
-    struct Head {
-        pre: Volume<f32, Mni>,
-        labels: LabelMap<Mni>,
-        brain: Mask<Mni>,
-        post: Volume<f32, Mni>,
-        hole: Mask<Mni>,
-    }
-
-    fn head(hole_radius_mm: f64) -> Head {
+    fn head(hole_radius_mm: f64) -> MadePair {
         let grid = Grid::axis_aligned([60, 60, 60], [1.5; 3], [-44.25; 3]);
         let at = |n: usize| grid.position(grid.voxel(n).map(|c| c as f64).into()).mm;
         let far = |n: usize, c: [f64; 3]| (at(n) - nalgebra::Point3::from(c)).norm();
@@ -312,28 +305,15 @@ mod tests {
         let dark = |n: usize| if hole.data[n] { 25.0 } else { value(n) };
         let post = Volume::from_data(grid, (0..grid.len()).map(|n| 2.5 * dark(n)).collect());
         let post = super::super::on_the_scale_of(&pre, &post, &brain, 25.0);
-        Head { pre, labels, brain, post, hole }
-    }
-
-    fn pair<'a>(h: &'a Head, known: &'a Mask<Mni>) -> CavityPair<'a> {
-        CavityPair {
-            pre: &h.pre,
-            pre_labels: &h.labels,
-            pre_brain: &h.brain,
-            post: &h.post,
-            post_known: known,
-            csf_grey_border: 60.0,
-            grey_mean: 100.0,
-            grey_white_contrast: 30.0,
-        }
+        MadePair { pre, labels, brain, post, gone: hole }
     }
 
     #[test]
     fn the_hole_is_found_whole_on_its_side() {
         let h = head(12.0);
         let known = h.brain.map(|_| true);
-        let found = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap();
-        assert!(found.cavity.dice(&h.hole) > 0.95, "{}", found.cavity.dice(&h.hole));
+        let found = find_cavity(&h.pair(&known), &CavitySettings::default()).unwrap();
+        assert!(found.cavity.dice(&h.gone) > 0.95, "{}", found.cavity.dice(&h.gone));
         assert_eq!(found.side, Side::Left);
     }
 
@@ -341,7 +321,7 @@ mod tests {
     fn without_a_hole_nothing_is_found_and_the_message_says_what_to_do() {
         let h = head(0.0);
         let known = h.brain.map(|_| true);
-        let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
+        let error = find_cavity(&h.pair(&known), &CavitySettings::default()).unwrap_err();
         assert!(error.to_string().contains("no operation is seen") && error.to_string().contains("give a cavity mask"));
     }
 
@@ -349,7 +329,7 @@ mod tests {
     fn a_hole_that_was_there_before_is_no_operation() {
         let h = head(12.0);
         let known = h.brain.map(|_| true);
-        let old = CavityPair { pre: &h.post, ..pair(&h, &known) };
+        let old = CavityPair { pre: &h.post, ..h.pair(&known) };
         assert!(matches!(find_cavity(&old, &CavitySettings::default()), Err(ResectError::NoOperation { .. })));
     }
 
@@ -369,14 +349,14 @@ mod tests {
             1.0 - 0.65 * (-0.5 * (far_mm / 25.0).powi(2)).exp() as f32
         };
         let shadow = Volume::from_fn(pre.grid, |n| pre.data[n] * shade(n));
-        let shaded = CavityPair { pre: &pre, post: &shadow, ..pair(&h, &known) };
+        let shaded = CavityPair { pre: &pre, post: &shadow, ..h.pair(&known) };
         let error = find_cavity(&shaded, &CavitySettings::default()).unwrap_err();
         let ResectError::NoOperation { doubt: Some(Doubt::FoldsKept { correlation }), .. } = error else {
             panic!("{error}")
         };
         assert!(correlation > 0.7, "{correlation}");
-        let hole = Volume::from_fn(pre.grid, |n| if h.hole.data[n] { 25.0 } else { pre.data[n] });
-        let operated = CavityPair { pre: &pre, post: &hole, ..pair(&h, &known) };
+        let hole = Volume::from_fn(pre.grid, |n| if h.gone.data[n] { 25.0 } else { pre.data[n] });
+        let operated = CavityPair { pre: &pre, post: &hole, ..h.pair(&known) };
         assert!(find_cavity(&operated, &CavitySettings::default()).is_ok());
     }
 
@@ -390,7 +370,7 @@ mod tests {
         };
         let grown = Volume::from_fn(h.pre.grid, |n| if far(n) < 12.0 { 25.0 } else { h.pre.data[n] });
         h.post = grown;
-        let error = find_cavity(&pair(&h, &known), &CavitySettings::default()).unwrap_err();
+        let error = find_cavity(&h.pair(&known), &CavitySettings::default()).unwrap_err();
         assert!(matches!(error, ResectError::NoOperation { doubt: Some(Doubt::Ventricle { .. }), .. }), "{error}");
     }
 
@@ -399,10 +379,10 @@ mod tests {
         let h = head(12.0);
         let known = h.brain.map(|_| true);
         let mut labels = h.labels.clone();
-        for (l, _) in labels.data.iter_mut().zip(&h.hole.data).filter(|(_, hole)| **hole) {
+        for (l, _) in labels.data.iter_mut().zip(&h.gone.data).filter(|(_, hole)| **hole) {
             *l = label::CSF;
         }
-        let swapped = CavityPair { pre: &h.post, post: &h.pre, pre_labels: &labels, ..pair(&h, &known) };
+        let swapped = CavityPair { pre: &h.post, post: &h.pre, pre_labels: &labels, ..h.pair(&known) };
         let error = find_cavity(&swapped, &CavitySettings::default()).unwrap_err();
         assert!(matches!(error, ResectError::Swapped { before_cc, .. } if before_cc > 5.0), "{error}");
         assert!(error.to_string().contains("swapped"));
@@ -411,22 +391,21 @@ mod tests {
     #[test]
     fn what_the_second_scan_does_not_show_is_no_cavity() {
         let h = head(12.0);
-        let known = h.hole.map(|inside| !inside);
-        let unseen = Head { post: h.post.map(|_| 0.0), ..head(12.0) };
-        assert!(find_cavity(&pair(&unseen, &h.hole.map(|_| false)), &CavitySettings::default()).is_err());
-        assert!(find_cavity(&pair(&h, &known), &CavitySettings::default()).is_err());
+        let known = h.gone.map(|inside| !inside);
+        let unseen = MadePair { post: h.post.map(|_| 0.0), ..head(12.0) };
+        assert!(find_cavity(&unseen.pair(&h.gone.map(|_| false)), &CavitySettings::default()).is_err());
+        assert!(find_cavity(&h.pair(&known), &CavitySettings::default()).is_err());
     }
 
     #[test]
     fn where_the_second_scan_ends_within_the_brain_no_operation_seen_says_how_much_it_does_not_show() {
         let h = head(12.0);
-        let told =
-            |known: &Mask<Mni>| find_cavity(&pair(&h, known), &CavitySettings::default()).unwrap_err().to_string();
-        let hidden = told(&h.hole.map(|inside| !inside));
-        let percent = 100.0 * both(&h.hole, &h.brain).count() as f64 / h.brain.count() as f64;
+        let told = |known: &Mask<Mni>| find_cavity(&h.pair(known), &CavitySettings::default()).unwrap_err().to_string();
+        let hidden = told(&h.gone.map(|inside| !inside));
+        let percent = 100.0 * both(&h.gone, &h.brain).count() as f64 / h.brain.count() as f64;
         assert!(hidden.contains(&format!("{percent:.0} % of the brain lies outside")), "{hidden}");
         let whole = head(0.0);
-        let seen = find_cavity(&pair(&whole, &whole.brain.map(|_| true)), &CavitySettings::default()).unwrap_err();
+        let seen = find_cavity(&whole.pair(&whole.brain.map(|_| true)), &CavitySettings::default()).unwrap_err();
         assert!(!seen.to_string().contains("field of view"), "{seen}");
     }
 
@@ -435,8 +414,8 @@ mod tests {
         let h = head(12.0);
         let outside = h.brain.map(|inside| !inside);
         assert!(matches!(subtract(Some(outside), None, &h.brain, &h.labels), Err(ResectError::OutsideBrain { .. })));
-        let given = subtract(Some(h.hole.clone()), None, &h.brain, &h.labels).unwrap().unwrap();
-        assert!(given.resected.dice(&h.hole) > 0.99);
+        let given = subtract(Some(h.gone.clone()), None, &h.brain, &h.labels).unwrap().unwrap();
+        assert!(given.resected.dice(&h.gone) > 0.99);
         assert_eq!(subtract(None, None, &h.brain, &h.labels).unwrap().map(|f| f.side), None);
     }
 }

@@ -23,3 +23,31 @@ pub struct CavityPair<'a> {
     /// White matter's mean intensity less grey matter's.
     pub grey_white_contrast: f64,
 }
+
+/// Two scans of a made head.
+#[cfg(test)]
+pub(super) struct MadePair {
+    pub pre: Volume<f32, Mni>,
+    pub labels: LabelMap<Mni>,
+    pub brain: Mask<Mni>,
+    pub post: Volume<f32, Mni>,
+    /// What was taken out.
+    pub gone: Mask<Mni>,
+}
+
+#[cfg(test)]
+impl MadePair {
+    /// Fluid of 25, tissue around 100.
+    pub fn pair<'a>(&'a self, known: &'a Mask<Mni>) -> CavityPair<'a> {
+        CavityPair {
+            pre: &self.pre,
+            pre_labels: &self.labels,
+            pre_brain: &self.brain,
+            post: &self.post,
+            post_known: known,
+            csf_grey_border: 60.0,
+            grey_mean: 100.0,
+            grey_white_contrast: 30.0,
+        }
+    }
+}

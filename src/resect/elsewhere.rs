@@ -5,7 +5,7 @@
 //! have opened or moved would be taken for one. Once the sag is known, what it explains is no loss, and what remains may
 //! be thin.
 
-use super::belief::{Evidence, LAYER_MM};
+use super::belief::{Evidence, LAYER_MM, median};
 use super::cavity::{CavityFinding, CavitySettings, ResectError, grow, settled, side_of, with_fluid_of};
 use super::cavity_pair::CavityPair;
 use super::sets::{both, either, without};
@@ -23,9 +23,6 @@ const THREAD_MM: f64 = 1.0;
 const BESIDE_MM: f64 = 1.0;
 /// Smaller parts are not looked at, cc: a cut that noise or a vessel has parted is larger.
 const LEAST_PART_CC: f64 = 0.25;
-/// A part that lies this shallow in the brain (median) and is no thicker than a layer on the ventricles may be is brain that
-/// has sunk, or fluid that stands, further from the skull than the sag says, mm.
-const SHALLOW_MM: f32 = 6.0;
 /// How often the sag is fitted again without what was found: a cut that takes part in a fit is partly explained away.
 const MOST_FITS: usize = 3;
 
@@ -72,8 +69,10 @@ fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: 
     let mut believed: Vec<(u32, Evidence)> = Vec::new();
     for (part, _) in (1..).zip(&parts.voxels).filter(|(_, voxels)| **voxels as f64 * voxel_cc >= LEAST_PART_CC) {
         let evidence = Evidence::of(&parts.mask(part), &sagged);
+        // A layer right under the rim: brain that has sunk, or fluid that stands, further from the skull than the sag says.
         let own = parts.labels.data.iter().zip(&depth_mm.data).filter(|(of, _)| **of == part);
-        let at_skull = evidence.radius_mm < LAYER_MM && middle(own.map(|(_, depth)| *depth)) < SHALLOW_MM;
+        let depth = median(own.map(|(_, depth)| f64::from(*depth)).collect()).unwrap_or(0.0);
+        let at_skull = evidence.radius_mm < LAYER_MM && depth < settings.rim_mm + LAYER_MM;
         if evidence.doubt().is_none() && !at_skull {
             believed.push((part, evidence));
         }
@@ -84,12 +83,6 @@ fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: 
     let seed = holding(&lost, &seed);
     let seed_cc = seed.volume_cc();
     (seed_cc >= settings.smallest_cc).then_some(Loss { seed, evidence: Evidence { seed_cc, ..largest } })
-}
-
-fn middle(values: impl Iterator<Item = f32>) -> f32 {
-    let mut values: Vec<f32> = values.collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// The connected parts of a mask that hold any of the seed.
@@ -166,6 +159,7 @@ pub(super) fn lost_elsewhere_cc(
 #[cfg(test)]
 mod tests {
     use super::super::belief::Doubt;
+    use super::super::cavity_pair::MadePair;
     use super::super::find_cavity;
     use super::*;
     use crate::image::{Grid, LabelMap};
@@ -174,14 +168,6 @@ mod tests {
 
     /// A ball of folded tissue of radius 40 mm with a ventricle of 8 mm in it, in voxels of 1 mm; `gone` says what is fluid on the
     /// second scan, `moved_mm` how far what lies around the sulcus has moved along x on it.
-    struct Head {
-        pre: Volume<f32, Mni>,
-        labels: LabelMap<Mni>,
-        brain: Mask<Mni>,
-        post: Volume<f32, Mni>,
-        gone: Mask<Mni>,
-    }
-
     /// A sheet of fluid of 4 mm, as thick as a deep sulcus.
     fn sulcus(p: Point3<f64>) -> bool {
         (p.x - 16.0).abs() < 2.0 && p.y.abs() < 16.0 && p.z.abs() < 16.0
@@ -192,7 +178,7 @@ mod tests {
         Vector3::new(if p.x > 12.0 { by_mm } else { 0.0 }, 0.0, 0.0)
     }
 
-    fn head(gone: impl Fn(Point3<f64>) -> bool + Sync + Send, moved_mm: f64) -> Head {
+    fn head(gone: impl Fn(Point3<f64>) -> bool + Sync + Send, moved_mm: f64) -> MadePair {
         let grid = Grid::axis_aligned([90; 3], [1.0; 3], [-44.5; 3]);
         let at = |n: usize| grid.position(grid.voxel(n).map(|c| c as f64).into()).mm;
         let label_at = |p: Point3<f64>| match p.coords.norm() {
@@ -207,7 +193,7 @@ mod tests {
         };
         let gone = Mask::from_fn(grid, |n| label_at(at(n)) == label::WHITE_MATTER && gone(at(n)));
         let before = |n: usize| at(n) - sagged(at(n), moved_mm);
-        Head {
+        MadePair {
             pre: Volume::from_data(grid, (0..grid.len()).map(|n| value_at(at(n))).collect()),
             labels: LabelMap::from_data(grid, (0..grid.len()).map(|n| label_at(at(n))).collect()),
             brain: Mask::from_data(grid, (0..grid.len()).map(|n| label_at(at(n)) != label::BACKGROUND).collect()),
@@ -219,18 +205,9 @@ mod tests {
         }
     }
 
-    fn found(h: &Head, sag_mm: f64) -> Result<CavityFinding, ResectError> {
+    fn found(h: &MadePair, sag_mm: f64) -> Result<CavityFinding, ResectError> {
         let known = h.brain.map(|_| true);
-        let pair = CavityPair {
-            pre: &h.pre,
-            pre_labels: &h.labels,
-            pre_brain: &h.brain,
-            post: &h.post,
-            post_known: &known,
-            csf_grey_border: 60.0,
-            grey_mean: 95.0,
-            grey_white_contrast: 30.0,
-        };
+        let pair = h.pair(&known);
         let by = |x: f64| {
             let grid = h.pre.grid;
             let moved = |n: usize| sagged(grid.position(grid.voxel(n).map(|c| c as f64).into()).mm, x);

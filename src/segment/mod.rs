@@ -25,6 +25,7 @@ mod scan_quality;
 mod segmentation;
 mod sulci;
 mod ventricle;
+mod warning;
 
 pub use crate::anatomy::label;
 pub use agreement::{Disagreement, disagreement};
@@ -40,8 +41,8 @@ pub use priors::AtlasPriors;
 pub use region::Region;
 pub use scan_quality::{Air, RegionQuality, ScanQualities, ScanQuality, scan_quality};
 pub use segmentation::{
-    SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, TissueVolumes, segment_t1,
-    segment_with_priors,
+    SegmentError, SegmentOverrides, SegmentSettings, Segmentation, TissueVolumes, segment_t1, segment_with_priors,
 };
 pub use sulci::{SULCUS_MM, with_closed_sulci};
 pub use ventricle::VentricleSettings;
+pub use warning::SegmentWarning;

@@ -5,6 +5,8 @@ use crate::made::synthetic_patient;
 use hgm::image::Volume;
 use hgm::image::nifti::{ReadOptions, decode, encode_f32};
 use std::path::Path;
+use std::process::Output;
+use tempfile::TempDir;
 
 /// A head again from another receive coil: another gain, bias and noise, nothing taken out.
 fn again(scan: &Path, copy: &Path) {
@@ -52,17 +54,23 @@ fn slow_two_heads_are_not_one_person() {
     answered(&pre, &sample("post.nii.gz"), "not-one-person", "do not show one person");
 }
 
-/// A patient of `hgm synth` with this fault of the second scan, and how `hgm prep --no-mesh` of its scans ends, with what is said.
-fn prepared_with(fault: &str, lobe: &str, seed: &str) -> (Option<i32>, String, bool) {
+/// A patient of `hgm synth` with these options and settings, and how `hgm prep --no-mesh` of its scans ends; in the folder are
+/// `patient` and `case`.
+fn prepared(asked: &[&str], settings: &str) -> (TempDir, Output) {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    std::fs::write(at("faults.toml"), format!("[synth.post]\n{fault}\n")).unwrap();
-    let (faults, patient, case) = (at("faults.toml"), at("patient"), at("case"));
-    let made =
-        output(&["synth", "--lobe", lobe, "--seed", seed, "--spacing-mm", "2", "--config", &faults, "-o", &patient]);
+    let (patient, case, config) = (at("patient"), at("case"), at("settings.toml"));
+    std::fs::write(&config, settings).unwrap();
+    let made = output(&[&["synth", "--config", &config, "-o", &patient], asked].concat());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    let (pre, post) = (at("patient/pre.nii.gz"), at("patient/post.nii.gz"));
-    let ended = output(&["prep", "--no-mesh", &pre, &post, "-o", &case]);
+    let ended = output(&["prep", "--no-mesh", &at("patient/pre.nii.gz"), &at("patient/post.nii.gz"), "-o", &case]);
+    (folder, ended)
+}
+
+/// With this fault of the second scan: exit code, what is said, whether the cavity is kept.
+fn prepared_with(fault: &str, lobe: &str, seed: &str) -> (Option<i32>, String, bool) {
+    let asked = ["--lobe", lobe, "--seed", seed, "--spacing-mm", "2"];
+    let (folder, ended) = prepared(&asked, &format!("[synth.post]\n{fault}\n"));
     let kept = folder.path().join("case/anat/post_space-MNI_label-cavity_mask.nii.gz").exists();
     (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned(), kept)
 }
@@ -86,13 +94,7 @@ fn slow_one_head_in_two_weightings_is_not_called_two_people() {
 
 /// Dice of the cavity that `hgm prep` finds on a patient of `hgm synth` with these options.
 fn cavity_found(asked: &[&str], settings: &str) -> f64 {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (patient, case, config) = (at("patient"), at("case"), at("settings.toml"));
-    std::fs::write(&config, settings).unwrap();
-    let made = output(&[&["synth", "--config", &config, "-o", &patient], asked].concat());
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    let ended = output(&["prep", "--no-mesh", &at("patient/pre.nii.gz"), &at("patient/post.nii.gz"), "-o", &case]);
+    let (folder, ended) = prepared(asked, settings);
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     let mask = |name: &str| {
         let bytes = std::fs::read(folder.path().join(name)).unwrap();

@@ -25,9 +25,10 @@ mod re_registration;
 mod rigid_remainder;
 mod solve;
 mod spread;
+mod unknown;
 mod verdict_of_fit;
 
-pub use body::{Body, BodyError, Observation, Solved, Turn, Unknown, material};
+pub use body::{Body, BodyError, Observation, Solved, material};
 pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
 pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, STRONG, Unexplained, weights};
@@ -46,6 +47,7 @@ pub use process::{Factor, Process, spread_out};
 pub use re_registration::{Instrument, InstrumentError, MovedNode, ReRegistration, Shown, moved_by};
 pub use rigid_remainder::RigidModes;
 pub use solve::solve_problem;
+pub use unknown::{Turn, Unknown};
 
 use crate::material::law::ShapeScale;
 use schemars::JsonSchema;

@@ -5,8 +5,9 @@
 //! the outline is estimated along with the moduli: out or in by one amount everywhere, and by amounts that change from side to
 //! side. What they do is found on a coarse mesh of the body, moved so far and solved again.
 
-use super::body::{Body, Observation, Unknown};
+use super::body::{Body, Observation};
 use super::mesh_error::at_places;
+use super::unknown::Unknown;
 use super::{LogPrior, Scale};
 use crate::fem::Scenario;
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};

@@ -1,9 +1,10 @@
 //! What an estimate starts from: a body, what is not known of it, and what was observed.
 
 use super::LogPrior;
-use super::body::{Observation, Unknown};
+use super::body::Observation;
 use super::correlated::CorrelatedErrors;
 use super::re_registration::Instrument;
+use super::unknown::Unknown;
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
 

@@ -1,6 +1,6 @@
 //! From a posed problem to the estimate that is reported.
 
-use super::body::{Body, Observation, Solved, Unknown};
+use super::body::{Body, Observation, Solved};
 use super::correlated;
 use super::findings::ProblemError;
 use super::fluid::FluidOutcome;
@@ -10,6 +10,7 @@ use super::outcome::{Estimate, EstimateOutcome};
 use super::outline::Outline;
 use super::problem::{Errors, Problem};
 use super::spread::spread;
+use super::unknown::Unknown;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{EstimateSettings, LogPrior, laplace};
 use crate::experiment::sample::Tissue;

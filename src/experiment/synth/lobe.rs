@@ -22,7 +22,7 @@ pub enum Lobe {
     /// Around the middle of the insula.
     Insular,
     /// A cut around the central core (insula, basal ganglia, thalamus), as of a functional hemispherotomy: the hemisphere
-    /// stays, disconnected. The volume says how wide the cut is: 35 cc about 4.5 mm.
+    /// stays, disconnected. The volume says how wide the cut is (docs/evidence/synthetic-faults.md).
     Hemisphere,
 }
 

@@ -11,6 +11,7 @@ pub mod pvd;
 pub mod stl;
 mod vtk_array;
 pub mod vtu;
+mod vtu_file;
 
 use super::{MeshError, TET_FACES, TetMesh};
 use crate::segment::label;

@@ -16,7 +16,7 @@ pub use air::Air;
 use super::confidence::{RegionEvidence, unsure_below_percent};
 use super::posed_scan::PosedScan;
 use super::region::Region;
-use super::segmentation::SegmentWarning;
+use super::warning::SegmentWarning;
 use crate::geometry::{Frame, Mni};
 use crate::image::LabelMap;
 use crate::register::deformable::DisplacementField;

@@ -1,0 +1,142 @@
+//! What is told of a segmentation that does not stop the work.
+
+use super::overhang::VaultPart;
+use super::region::Region;
+use crate::geometry::Frame;
+use crate::image::{BlankSlices, Grid};
+use thiserror::Error;
+
+/// Findings that do not stop the work.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, Error)]
+#[serde(rename_all = "kebab-case")]
+pub enum SegmentWarning {
+    /// The field of view ends inside the brain.
+    #[error("{percent:.0} % of the expected brain lies outside the field of view: nothing is said about that part")]
+    CroppedBrain {
+        /// Share of the template's brain outside the image, in percent.
+        percent: f64,
+    },
+    /// The field of view cuts parts of the brain.
+    #[error("{}: nothing is said about that", in_words(parts, "lies outside the scan"))]
+    RegionsOutside {
+        /// The parts and how much of each lies outside, percent.
+        parts: Vec<(Region, f64)>,
+    },
+    /// What is known of the labels speaks less for them than elsewhere.
+    #[error(
+        "{}: look at the labels there before relying on them, and give a brain mask or a label map where they are wrong",
+        in_words(parts, "of the labels are expected to be right")
+    )]
+    UnsureRegions {
+        /// The parts and how much of each is expected to be right, percent.
+        parts: Vec<(Region, f64)>,
+    },
+    /// A surface coil saw parts of the brain much brighter than others.
+    #[error(
+        "parts of the brain are {times:.1} times as bright as others (a surface coil): taken out, but the outline is less sure \
+         where it is brightest, the crown as a rule; the scanner's normalised reconstruction of the scan is better"
+    )]
+    StrongGain {
+        /// How many times.
+        times: f64,
+    },
+    /// Some slices show nothing, between others that do.
+    #[error(
+        "the scan is blank from slice {first} to {last} of voxel axis {axis} ({thickness_mm:.1} mm): filled from the slices on \
+         either side, so what lies there is a guess"
+    )]
+    BlankSlices {
+        /// Index of the first, from 0.
+        first: usize,
+        /// Index of the last.
+        last: usize,
+        /// The voxel axis across them, 0 to 2.
+        axis: usize,
+        /// How thick they are together.
+        thickness_mm: f64,
+    },
+    /// Much of what lies just outside the fitted template under the vault looks like brain.
+    #[error(
+        "{percent:.0} % of what lies 2 to 4.5 mm outside the fitted template under the vault{} looks like brain: the outline may \
+         cut the crown, or take in bone or dura there; look at it, and give a brain mask where it is wrong",
+        place.map(|place| format!(" (most of it at the {place})")).unwrap_or_default()
+    )]
+    BeyondTemplate {
+        /// Share of that layer, in percent.
+        percent: f64,
+        /// The part of the vault where most of it does, if there is one.
+        place: Option<VaultPart>,
+    },
+    /// Much of what lies just inside the fitted template does not look like brain.
+    #[error(
+        "at the {place} {percent:.0} % of what lies 2 to 4.5 mm inside the fitted template does not look like brain: a lesion or \
+         wide sulci, or the outline cuts the brain there; look at it, and give a brain mask where it is wrong"
+    )]
+    ShortOfTemplate {
+        /// The part of the vault.
+        place: VaultPart,
+        /// Share of that layer there, in percent.
+        percent: f64,
+    },
+    /// A cavity drawn by hand holds tissue.
+    #[error(
+        "{percent:.0} % of the tissue under the cavity mask looks as it did before the operation: is the mask of this scan, and on \
+         the right side?"
+    )]
+    UnchangedCavity {
+        /// Share of that tissue, in percent.
+        percent: f64,
+    },
+    /// The cavity ends where the scan does.
+    #[error(
+        "{percent:.0} % of the cavity's outside borders on brain that the post-operative scan does not show: the cavity and what was \
+         resected run on beyond it and are found too small"
+    )]
+    CavityAtEdge {
+        /// Share of the cavity's outside, in percent.
+        percent: f64,
+    },
+    /// Tissue is gone elsewhere than in the cavity.
+    #[error(
+        "{cc:.1} cc of tissue are fluid after the operation elsewhere than in the cavity: a second cavity, a cut or a new lesion; \
+         look at the post-operative scan, and give a cavity mask that holds all of what was taken"
+    )]
+    LostElsewhere {
+        /// Volume, cc.
+        cc: f64,
+    },
+    /// No ventricle was found.
+    #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
+    NoVentricle,
+    /// Grey and white matter are hard to tell apart.
+    #[error("grey and white matter differ by only {ratio:.1} standard deviations: is this a T1-weighted image?")]
+    LowContrast {
+        /// Difference of the means over the mean of the deviations.
+        ratio: f64,
+    },
+}
+
+/// So much of a cavity's outside at the scan's edge hides a tenth of the cavity and more, percent: of a ball, the disc where a
+/// plane cuts that part off.
+const HIDDEN_PERCENT: f64 = 16.0;
+
+impl SegmentWarning {
+    /// The warning of a gap in a scan of this grid.
+    pub(super) fn blank<F: Frame>(gap: &BlankSlices, grid: &Grid<F>) -> Self {
+        let thickness_mm = gap.slices.len() as f64 * grid.spacing_mm()[gap.axis];
+        Self::BlankSlices { first: gap.slices.start, last: gap.slices.end - 1, axis: gap.axis, thickness_mm }
+    }
+
+    /// Whether the cavity, and what was resected, cannot be believed for it.
+    pub fn belies_the_cavity(&self) -> bool {
+        matches!(self, Self::CavityAtEdge { percent } if *percent >= HIDDEN_PERCENT)
+    }
+}
+
+/// "left temporal lobe: 18 % lies outside the scan (cerebellum: 7 %)".
+fn in_words(parts: &[(Region, f64)], what: &str) -> String {
+    let of = |(region, percent): &(Region, f64)| format!("{region}: {percent:.0} %");
+    let others: Vec<String> = parts.iter().skip(1).map(of).collect();
+    let first = parts.first().map(|first| format!("{} {what}", of(first))).unwrap_or_default();
+    if others.is_empty() { first } else { format!("{first} ({})", others.join(", ")) }
+}
