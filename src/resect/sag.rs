@@ -1,13 +1,11 @@
 //! The sag of the brain from one scan to the other.
 
 use super::sets::both;
-use crate::geometry::{AffineTransform, Mni};
+use crate::geometry::Mni;
 use crate::image::morphology::dilate;
 use crate::image::{Mask, Volume};
-use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, DisplacementField, fit_atlas};
+use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, DisplacementField, fit_scan};
 
-/// Width of skull and scalp around the brain that takes part in the fit of one scan to the other, mm.
-const RIM_MM: f64 = 3.0;
 /// The cavity's own edge is nowhere on the pre-operative scan, mm.
 const EDGE_MM: f64 = 1.5;
 
@@ -31,13 +29,13 @@ pub struct SagScans<'a> {
 /// # Errors
 /// [`DeformableError`] when too little of the brain is known on the post-operative scan.
 pub fn fit_sag(scans: &SagScans<'_>, settings: &DeformableSettings) -> Result<AtlasFit<Mni>, DeformableError> {
-    // The rim of skull and scalp, which does not move, holds the map at the brain's surface.
-    let near = dilate(scans.pre_brain, RIM_MM);
-    let pre = scans.pre.data.iter().zip(&near.data).map(|(t1, near)| if *near { t1.max(1e-3) } else { 0.0 });
-    let post =
-        scans.post.data.iter().zip(&scans.post_known.data).map(|(t1, known)| if *known { *t1 } else { f32::NAN });
-    let (pre, post) = (Volume::from_data(near.grid, pre.collect()), Volume::from_data(near.grid, post.collect()));
-    fit_atlas(&post, &pre, &AffineTransform::identity(), Some(&dilate(scans.cavity, EDGE_MM)), settings)
+    // Skull and scalp, which do not move, hold the map at the brain's surface where both scans show them: not where one of them
+    // was stripped or defaced.
+    let shown = |n: usize| scans.pre_brain.data[n] || (scans.pre.data[n] > 0.0 && scans.post.data[n] > 0.0);
+    let pre = Volume::from_fn(scans.pre.grid, |n| if shown(n) { scans.pre.data[n] } else { f32::NAN });
+    let post = |n: usize| if shown(n) && scans.post_known.data[n] { scans.post.data[n] } else { f32::NAN };
+    let post = Volume::from_fn(scans.post.grid, post);
+    fit_scan(&post, &pre, scans.pre_brain, Some(&dilate(scans.cavity, EDGE_MM)), settings)
 }
 
 /// The pre-operative scan as it would look had its brain moved: `rest_from_moved` says where the tissue at a point was.

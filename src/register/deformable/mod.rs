@@ -131,16 +131,59 @@ pub fn fit_atlas<F: Frame>(
     left_out: Option<&Mask<F>>,
     settings: &DeformableSettings,
 ) -> Result<AtlasFit<F>, DeformableError> {
-    settings.check()?;
     let brain = atlas.map(|x| x > 0.0);
+    fit(subject, atlas, &brain, Outside::Empty, start, left_out, settings)
+}
+
+/// Deforms one scan of a head onto another scan of it: as [`fit_atlas`], but both show what surrounds the brain, which is
+/// compared as far as the settings' rim goes, and the map keeps up with its surroundings where nothing is known. Voxels of
+/// `scan` that are not finite say nothing either. Both scans and the mask lie on one grid.
+///
+/// # Errors
+/// Those of [`fit_atlas`].
+pub fn fit_scan<F: Frame>(
+    subject: &Volume<f32, F>,
+    scan: &Volume<f32, F>,
+    brain: &Mask<F>,
+    left_out: Option<&Mask<F>>,
+    settings: &DeformableSettings,
+) -> Result<AtlasFit<F>, DeformableError> {
+    fit(subject, scan, brain, Outside::Shown, &AffineTransform::identity(), left_out, settings)
+}
+
+/// What a fitted image has around the brain.
+#[derive(Clone, Copy, PartialEq)]
+enum Outside {
+    /// Nothing, as an atlas.
+    Empty,
+    /// The head.
+    Shown,
+}
+
+fn fit<F: Frame>(
+    subject: &Volume<f32, F>,
+    atlas: &Volume<f32, F>,
+    brain: &Mask<F>,
+    outside: Outside,
+    start: &AffineTransform<F, F>,
+    left_out: Option<&Mask<F>>,
+    settings: &DeformableSettings,
+) -> Result<AtlasFit<F>, DeformableError> {
+    settings.check()?;
     let brain_box = brain.bounding_box().ok_or(DeformableError::EmptyAtlas)?;
     // Room for the rim and for the velocity to fade.
     let around = brain_box.grown(&atlas.grid, settings.margin_mm + 8.0);
     let atlas: Volume<f32, Native> = atlas.cropped(&around).relabelled();
     let brain: Mask<Native> = brain.cropped(&around).relabelled();
-    let [region, judged, wide] = morphology::dilations(&brain, [settings.margin_mm, JUDGED_MM, WIDE_MM]);
+    let [mut region, judged, wide] = morphology::dilations(&brain, [settings.margin_mm, JUDGED_MM, WIDE_MM]);
+    region.data.iter_mut().zip(&atlas.data).filter(|(_, x)| !x.is_finite()).for_each(|(seen, _)| *seen = false);
+    let atlas = atlas.map(|x| if x.is_finite() { x } else { 0.0 });
 
-    let subject: Volume<f32, Native> = subject.clone().relabelled();
+    let subject: Volume<f32, Native> = match outside {
+        Outside::Empty => subject.clone().relabelled(),
+        // Reduced alike, so that two scans that are the same stay so at every resolution.
+        Outside::Shown => subject.cropped(&around).relabelled(),
+    };
     let left_out = left_out.map(|m| on_grid_of(&m.clone().relabelled(), &subject));
     let is_known = |n: usize| subject.data[n].is_finite() && left_out.as_ref().is_none_or(|m| !m.data[n]);
     let known: Mask<Native> = Volume::from_fn(subject.grid, is_known);
@@ -150,7 +193,10 @@ pub fn fit_atlas<F: Frame>(
 
     let mut velocity: Option<VectorField> = None;
     let finest_mm = settings.levels_mm.iter().copied().fold(f64::INFINITY, f64::min);
-    let near_subject = reduced_to(&subject, finest_mm);
+    let near_subject = match outside {
+        Outside::Empty => reduced_to(&subject, finest_mm),
+        Outside::Shown => subject,
+    };
     let mut quality = DeformableQuality {
         correlation: [0.0; 2],
         smallest_jacobian: 0.0,
@@ -160,8 +206,13 @@ pub fn fit_atlas<F: Frame>(
     };
     for (level, (&spacing_mm, &iterations)) in settings.levels_mm.iter().zip(&settings.iterations).enumerate() {
         let fixed = reduced_to(&atlas, spacing_mm);
-        let near = near_brain(&near_subject, &wide, velocity.as_ref(), &linear, &shift);
-        let moving = reduced_to(&near, spacing_mm);
+        let moving = match outside {
+            Outside::Empty => {
+                let near = near_brain(&near_subject, &wide, velocity.as_ref(), &linear, &shift);
+                reduced_to(&near, spacing_mm)
+            }
+            Outside::Shown => reduced_to(&near_subject, spacing_mm),
+        };
         let inside = on_grid_of(&region, &fixed);
         let judged = on_grid_of(&judged, &fixed);
         let grid = fixed.grid;
@@ -209,8 +260,12 @@ pub fn fit_atlas<F: Frame>(
             if iteration == iterations || stalled {
                 break;
             }
-            let update = update.smoothed(settings.update_sigma_voxels * spacing_mm);
-            v.add(&update);
+            let sigma_mm = settings.update_sigma_voxels * spacing_mm;
+            let update = update.smoothed(sigma_mm);
+            v.add(&match outside {
+                Outside::Empty => update,
+                Outside::Shown => update.over(&weight, sigma_mm),
+            });
             v = v.smoothed(settings.velocity_sigma_voxels * spacing_mm);
         }
         quality.iterations.push(course.len().saturating_sub(1));
@@ -366,6 +421,76 @@ mod tests {
         let around = fit_atlas(&subject, &atlas, &larger(), Some(&left_out), &settings).unwrap();
         let error = mean_error_mm(&atlas, &around, hole);
         assert!(error < 0.8, "{error} mm {:?}", around.quality);
+    }
+
+    /// One head twice, the second time at another gain and with 6 mm of a bulge in it, as [`fit_scan`] takes them with the brain.
+    fn two_scans(bulge_mm: f64) -> (Volume<f32, Mni>, Volume<f32, Mni>, Mask<Mni>) {
+        let (atlas, _) = atlas_and_subject();
+        let before = imaged(&atlas.grid, head_value);
+        let after = imaged(&atlas.grid, |p| 1.2 * head_value(p - bulge_at(p, bulge_mm)) + 5.0);
+        (before, after, atlas.map(|x| x > 0.0))
+    }
+
+    /// Fades well within the brain.
+    fn bulge_at(p: Point3<f64>, by_mm: f64) -> Vector3<f64> {
+        Vector3::new(0.0, -by_mm, 0.0) * (-(p - BULGE).norm_squared() / 500.0).exp()
+    }
+
+    const BULGE: Point3<f64> = Point3::new(-20.0, 10.0, 20.0);
+
+    fn of_one_head() -> DeformableSettings {
+        DeformableSettings {
+            margin_mm: 4.0,
+            update_sigma_voxels: 3.0,
+            least_gain: 0.0,
+            ..DeformableSettings::default()
+        }
+    }
+
+    /// Mean distance of what a fit says of the places from where the second scan shows them, mm.
+    fn off_mm(fit: &AtlasFit<Mni>, grid: &Grid<Mni>, bulge_mm: f64, of: impl Fn(Point3<f64>) -> bool) -> f64 {
+        let errors = (0..grid.len()).step_by(7).filter_map(|n| {
+            let p = grid.centre(grid.voxel(n));
+            let came_from = p.mm - bulge_at(p.mm, bulge_mm);
+            of(p.mm).then(|| (fit.atlas_from_subject.apply(p).mm - came_from).norm())
+        });
+        let (sum, count) = errors.fold((0.0, 0.0), |(s, c), e| (s + e, c + 1.0));
+        sum / count
+    }
+
+    #[test]
+    fn the_surface_of_a_brain_that_has_not_moved_stays_where_it_is() {
+        let (before, after, brain) = two_scans(0.0);
+        let surface = morphology::erode(&brain, 3.0);
+        let of = |p: Point3<f64>| {
+            let at = Position::from_point(p);
+            brain.nearest(at).unwrap_or(false) && !surface.nearest(at).unwrap_or(true)
+        };
+        let fit = fit_scan(&after, &before, &brain, None, &of_one_head()).unwrap();
+        let shown = off_mm(&fit, &before.grid, 0.0, of);
+        // With the skull taken from one of them the other's is brought into the brain.
+        let stripped = Volume::from_fn(before.grid, |n| if brain.data[n] { before.data[n] } else { 0.0 });
+        let fit = fit_atlas(&after, &stripped, &AffineTransform::identity(), None, &of_one_head()).unwrap();
+        let bare = off_mm(&fit, &before.grid, 0.0, of);
+        assert!(shown < 0.05 && shown < 0.2 * bare, "{shown} and {bare} mm");
+    }
+
+    #[test]
+    fn the_map_keeps_up_beside_what_is_left_out() {
+        let (before, mut after, brain) = two_scans(6.0);
+        let hole = |p: Point3<f64>| (p - BULGE - Vector3::new(0.0, 0.0, 16.0)).norm() < 14.0;
+        let left_out = imaged(&after.grid, |p| f64::from(u8::from(hole(p)))).map(|x| x > 0.5);
+        for (x, _) in after.data.iter_mut().zip(&left_out.data).filter(|(_, out)| **out) {
+            *x = 100.0;
+        }
+        let beside = |p: Point3<f64>| !hole(p) && (p - BULGE - Vector3::new(0.0, 0.0, 16.0)).norm() < 18.0;
+        let fit = fit_scan(&after, &before, &brain, Some(&left_out), &of_one_head()).unwrap();
+        let kept_up = off_mm(&fit, &before.grid, 6.0, beside);
+        let rest = DisplacementField::from_displacement(&Volume::filled(before.grid, [0f32; 3]));
+        let still =
+            AtlasFit { atlas_from_subject: rest.clone(), subject_from_atlas: rest, quality: fit.quality.clone() };
+        let moved = off_mm(&still, &before.grid, 6.0, beside);
+        assert!(kept_up < 0.2 * moved, "{kept_up} of {moved} mm");
     }
 
     #[test]

@@ -70,6 +70,9 @@ impl Cell {
     }
 }
 
+/// Far from everything that is known the map fades: where less than this of the surroundings is.
+const LEAST_SHARE: f32 = 0.1;
+
 impl VectorField {
     pub(super) fn zeros(grid: &Grid<Native>) -> Self {
         let component = || vec![0f32; grid.len()];
@@ -81,6 +84,16 @@ impl VectorField {
         let grid = self.grid;
         let components = self.components.map(|c| gaussian(&Volume::from_data(grid, c), sigma_mm).data);
         Self { grid, components }
+    }
+
+    /// A field smoothed by `sigma_mm` over the share of its surroundings that was known (normalised convolution: Knutsson and
+    /// Westin 1993): what was not known has not held it back.
+    pub(super) fn over(mut self, weight: &[f32], sigma_mm: f64) -> Self {
+        let share = gaussian(&Volume::from_data(self.grid, weight.to_vec()), sigma_mm);
+        for c in &mut self.components {
+            c.par_iter_mut().zip(&share.data).for_each(|(x, share)| *x /= share.max(LEAST_SHARE));
+        }
+        self
     }
 
     pub(super) fn scaled(mut self, factor: f32) -> Self {
