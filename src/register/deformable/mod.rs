@@ -160,6 +160,7 @@ enum Outside {
     Shown,
 }
 
+/// [`fit_atlas`] and [`fit_scan`], by what the atlas or scan has `outside` the brain.
 fn fit<F: Frame>(
     subject: &Volume<f32, F>,
     atlas: &Volume<f32, F>,
@@ -423,7 +424,7 @@ mod tests {
         assert!(error < 0.8, "{error} mm {:?}", around.quality);
     }
 
-    /// One head twice, the second time at another gain and with 6 mm of a bulge in it, as [`fit_scan`] takes them with the brain.
+    /// One head twice, the second time at another gain and with a bulge of `bulge_mm` in it; and its brain.
     fn two_scans(bulge_mm: f64) -> (Volume<f32, Mni>, Volume<f32, Mni>, Mask<Mni>) {
         let (atlas, _) = atlas_and_subject();
         let before = imaged(&atlas.grid, head_value);
