@@ -1,4 +1,5 @@
-//! Whether a cavity ends where the scan does: then more of it lies where nothing can be seen.
+//! Whether a cavity ends where the scan does, and more of it lies where nothing can be seen; and whether it runs on into the
+//! fluid above a brain that has sunk.
 
 use super::sets::{both, without};
 use crate::geometry::Mni;
@@ -13,6 +14,12 @@ pub(super) fn at_edge_percent(cavity: &Mask<Mni>, brain: &Mask<Mni>, known: &Mas
     let layer = both(&without(&dilate(cavity, LAYER_MM), cavity), brain);
     let all = layer.count();
     if all == 0 { 0.0 } else { 100.0 * without(&layer, known).count() as f64 / all as f64 }
+}
+
+/// How much of a cavity lies outside the brain once the brain's sag is undone, percent.
+pub(super) fn outside_percent(undone_cavity: &Mask<Mni>, brain: &Mask<Mni>) -> f64 {
+    let all = undone_cavity.count();
+    if all == 0 { 0.0 } else { 100.0 * without(undone_cavity, brain).count() as f64 / all as f64 }
 }
 
 #[cfg(test)]
@@ -37,5 +44,14 @@ mod tests {
         let cut = of(&seen_to(21));
         assert!((cut - 33.0).abs() < 6.0, "{cut}");
         assert_eq!(at_edge_percent(&hole.map(|_| false), &brain, &brain), 0.0);
+    }
+
+    #[test]
+    fn a_cavity_reaches_out_of_the_brain_by_its_part_beyond_it() {
+        let grid = Grid::<Mni>::axis_aligned([10; 3], [1.0; 3], [0.0; 3]);
+        let below = |k: usize| Mask::from_fn(grid, |n| grid.voxel(n)[2] < k);
+        assert_eq!(outside_percent(&below(4), &below(4)), 0.0);
+        assert_eq!(outside_percent(&below(8), &below(6)), 25.0);
+        assert_eq!(outside_percent(&below(0), &below(6)), 0.0);
     }
 }

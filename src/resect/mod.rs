@@ -24,4 +24,4 @@ pub use pair::{
     GivenMasks, HeadApart, OperatedBrain, PairError, PairSettings, take_head_apart, take_pair_apart,
     template_correlation,
 };
-pub use sag::{SagScans, fit_sag, moved_scan};
+pub use sag::{SagScans, fit_sag, moved_scan, skull_is_shown};

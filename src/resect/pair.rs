@@ -1,7 +1,7 @@
 //! A pre- and a post-operative scan taken apart together.
 
 use super::blood::{SaggedPair, with_blood};
-use super::edge::at_edge_percent;
+use super::edge::{at_edge_percent, outside_percent};
 use super::elsewhere::{lost_elsewhere_cc, with_losses_elsewhere};
 use super::sag::{SagScans, fit_sag};
 use super::sets::both;
@@ -187,6 +187,9 @@ pub fn take_pair_apart(
     let (filled, gaps) = without_gaps(post.t1).unzip();
     let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &post.mni_from_t1));
     let post = filled.as_ref().unwrap_or(post);
+    let (filled, pre_gaps) = without_gaps(pre.t1).unzip();
+    let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &pre.mni_from_t1));
+    let pre = filled.as_ref().unwrap_or(pre);
     let likeness = likeness(pre.t1, post.t1, &pre.mni_from_t1, &post.mni_from_t1);
     let by_hand = given.cavity.is_some() || given.resected.is_some();
     if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
@@ -199,14 +202,8 @@ pub fn take_pair_apart(
     }
 
     step("pre-operative tissue");
-    let apart = |(pre, template, scale): (_, AtlasFit<Mni>, _)| {
-        let template_correlation = template_correlation(given, &template);
-        HeadApart { pre, template_from_patient: template.atlas_from_subject, scale, template_correlation }
-    };
-    let HeadApart { pre: before, template_from_patient, scale, template_correlation } = match &given.head {
-        Some(head) => head.clone(),
-        None => apart(take_head_apart(pre, given, settings)?),
-    };
+    let HeadApart { pre: before, template_from_patient, scale, template_correlation } =
+        if let Some(head) = &given.head { head.clone() } else { head_apart(pre, pre_gaps, given, settings)? };
 
     step("cavity");
     let (post_raw, post_known) = (post.on_template(), post.known());
@@ -273,8 +270,9 @@ pub fn take_pair_apart(
         };
         finding.cavity.paste(&with_blood(&cavity, &pair, &settings.cavity), &near);
     }
+    let filled_before = undone(&finding.cavity, &sag);
     if given.resected.is_none() {
-        finding.resected = refilled(&finding.cavity, &sag, &before);
+        finding.resected = both(&filled_before, &before.brain_mni);
     }
     if finding.resected.count() == 0 {
         return Err(PairError::NothingResected);
@@ -295,6 +293,10 @@ pub fn take_pair_apart(
     after.warnings.extend(gaps.unwrap_or_default());
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
     after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
+    if computed {
+        let percent = outside_percent(&filled_before, &before.brain_mni);
+        after.warnings.extend((percent > NOTED_ABOVE_BRAIN).then_some(SegmentWarning::AboveSunkBrain { percent }));
+    }
     if given.resected.is_none() {
         let percent = at_edge_percent(&finding.cavity, &before.brain_mni, post_known);
         after.warnings.extend((percent > NOTED_AT_EDGE).then_some(SegmentWarning::CavityAtEdge { percent }));
@@ -315,6 +317,19 @@ pub fn take_pair_apart(
         post_ventricle,
         post_brain,
     })
+}
+
+/// [`take_head_apart`], with what is told of the slices that its scan had lost.
+fn head_apart(
+    pre: &PosedScan<'_, Pre>,
+    gaps: Option<Vec<SegmentWarning>>,
+    given: &GivenMasks,
+    settings: &PairSettings,
+) -> Result<HeadApart, PairError> {
+    let (mut pre, template, scale) = take_head_apart(pre, given, settings)?;
+    pre.warnings.extend(gaps.unwrap_or_default());
+    let template_correlation = template_correlation(given, &template);
+    Ok(HeadApart { pre, template_from_patient: template.atlas_from_subject, scale, template_correlation })
 }
 
 /// Labels the pre-operative scan with the template's maps carried onto the head, or by a label map that was given; with the
@@ -371,6 +386,8 @@ pub fn template_correlation(given: &GivenMasks, fit: &AtlasFit<Mni>) -> Option<f
 const NEAR_MM: f64 = 25.0;
 /// More of a cavity's surroundings outside the scan than this is told, percent.
 const NOTED_AT_EDGE: f64 = 2.0;
+/// More of a cavity where, by the sag, no brain was is told, percent (docs/evidence/choices.md).
+const NOTED_ABOVE_BRAIN: f64 = 12.0;
 
 /// The box around a mask with a margin; the whole grid for an empty mask.
 fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {
@@ -387,11 +404,11 @@ fn labels_through(labels: &LabelMap<Mni>, sag: &AtlasFit<Mni>) -> LabelMap<Mni> 
     })
 }
 
-/// The tissue that filled the cavity: what lies there once the sag is undone.
-fn refilled(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>, before: &Segmentation<Pre>) -> Mask<Mni> {
+/// Where the cavity lies once the sag is undone: what of it was brain filled it.
+fn undone(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>) -> Mask<Mni> {
     let near = around(cavity, NEAR_MM);
     let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid.cropped(&near));
-    both(&undone.map(|share| share >= 0.5).within(&cavity.grid, false), &before.brain_mni)
+    undone.map(|share| share >= 0.5).within(&cavity.grid, false)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

@@ -96,6 +96,15 @@ pub enum SegmentWarning {
         /// Share of the cavity's outside, in percent.
         percent: f64,
     },
+    /// The cavity runs on into the fluid above a brain that has sunk.
+    #[error(
+        "{percent:.0} % of the cavity lies where, the brain's sag undone, no brain was: the brain has sunk beside the cavity, and the \
+         fluid above it is taken for a part of it, which is found too large; look at it, and give a cavity mask where it is wrong"
+    )]
+    AboveSunkBrain {
+        /// Share of the cavity, in percent.
+        percent: f64,
+    },
     /// Tissue is gone elsewhere than in the cavity.
     #[error(
         "{cc:.1} cc of tissue are fluid after the operation elsewhere than in the cavity: a second cavity, a cut or a new lesion; \

@@ -28,6 +28,16 @@ pub fn data() -> Option<std::path::PathBuf> {
     std::env::var_os("HGM_BENCH_DATA").map(Into::into)
 }
 
+/// The numbers of a list such as `3,7` or `20-39,41`.
+pub fn numbers(list: &str) -> Vec<u64> {
+    let number = |text: &str| text.parse::<u64>().unwrap_or_else(|_| panic!("`{text}` of `{list}` is no number"));
+    let range = |text: &str| {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        number(first)..=number(last)
+    };
+    list.split(',').flat_map(range).collect()
+}
+
 /// Processor seconds of this process so far (user and system).
 pub fn cpu_seconds() -> f64 {
     ticks("/proc/self/stat").unwrap_or(f64::NAN)

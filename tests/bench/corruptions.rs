@@ -4,7 +4,7 @@
 //! `HGM_BENCH_MISHAPS` names others than the usual ones, heads with their seeds: `child3y:3,7 gap:20-39`. In the folder
 //! `HGM_BENCH_KEEP` the hurt scans and the labels found on them are kept to be looked at.
 
-use crate::bar::{Bar, data};
+use crate::bar::{Bar, data, numbers};
 use crate::heads::segmented;
 use hgm::geometry::{Native, Position, RigidTransform};
 use hgm::image::nifti::{ReadOptions, decode, encode_f32};
@@ -73,15 +73,9 @@ fn wanted() -> Vec<(String, Vec<u64>)> {
     let Ok(words) = std::env::var("HGM_BENCH_MISHAPS") else {
         return HEADS.map(|head| (head.to_owned(), (0..EACH).collect())).to_vec();
     };
-    let number =
-        |text: &str| text.parse::<u64>().unwrap_or_else(|_| panic!("`{text}` in HGM_BENCH_MISHAPS is no seed"));
-    let range = |text: &str| {
-        let (first, last) = text.split_once('-').unwrap_or((text, text));
-        number(first)..=number(last)
-    };
     let of_head = |word: &str| {
         let (head, seeds) = word.split_once(':').expect("HGM_BENCH_MISHAPS: HEAD:SEEDS");
-        (head.to_owned(), seeds.split(',').flat_map(range).collect())
+        (head.to_owned(), numbers(seeds))
     };
     words.split_whitespace().map(of_head).collect()
 }

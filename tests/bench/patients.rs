@@ -1,7 +1,8 @@
 //! Bars of sixteen synthetic patients, from their images alone: what was put in must come out, and whether the skull held the
-//! brain must be told. Patients on other heads than the template's need `HGM_BENCH_DATA`.
+//! brain must be told. Patients on other heads than the template's need `HGM_BENCH_DATA`; `HGM_BENCH_PATIENTS` names some of them
+//! (`7,11-13`), whose figures are printed, with bars for so many.
 
-use crate::bar::{Bar, data, run_hgm};
+use crate::bar::{Bar, data, numbers, run_hgm};
 use hgm::experiment::outcome::ExperimentOutcome;
 use std::path::Path;
 
@@ -58,10 +59,11 @@ const PATIENTS: [Patient; 16] = [
 pub fn bars() -> Vec<Bar> {
     let folder = tempfile::tempdir().unwrap();
     let there = |patient: &&Patient| patient.head.is_none() || data().is_some();
-    let wanted: Vec<&Patient> = PATIENTS.iter().filter(there).collect();
-    if wanted.len() < PATIENTS.len() {
-        let left_out = PATIENTS.len() - wanted.len();
-        println!("patients: {left_out} of {} need heads of HGM_BENCH_DATA; skipped", PATIENTS.len());
+    let named = std::env::var("HGM_BENCH_PATIENTS").ok().map(|text| numbers(&text));
+    let is_asked = |patient: &&Patient| named.as_ref().is_none_or(|seeds| seeds.contains(&patient.seed));
+    let (wanted, left_out): (Vec<&Patient>, Vec<&Patient>) = PATIENTS.iter().filter(is_asked).partition(there);
+    if !left_out.is_empty() {
+        println!("patients: {} of {} need heads of HGM_BENCH_DATA; skipped", left_out.len(), PATIENTS.len());
     }
     println!(
         "patient  supports  grey, white Pa (true)  found by  grey [95 %]           white [95 %]          explained"

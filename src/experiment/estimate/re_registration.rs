@@ -13,7 +13,7 @@ use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
 use crate::register::{RegisterError, RigidSettings, register_two_scans_near};
-use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of};
+use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of, skull_is_shown};
 use nalgebra::Vector3;
 use thiserror::Error;
 
@@ -80,6 +80,8 @@ pub struct ReRegistration<'a> {
     pub tissue: &'a Mask<Mni>,
     /// How smooth the ratio of the two is, see [`on_the_scale_of`].
     pub scale_sigma_mm: f64,
+    /// Post-operative intensities, for whether that scan shows more than the brain.
+    pub post: &'a Volume<f32, Mni>,
     /// Where the post-operative scan looked.
     pub post_known: &'a Mask<Mni>,
     /// The cavity on the post-operative scan.
@@ -113,7 +115,16 @@ impl ReRegistration<'_> {
         let back: Vec<[f64; 3]> = displacement_mm.iter().map(|u| u.map(|v| -v)).collect();
         let back = on_grid(mesh.tets(), &moved, &back, like.grid());
         let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
-        let moved = moved_scan(self.pre, self.pre_brain, self.fluid, &rest_from_moved);
+        // Where a scan of the patient has no skull, rigid registration followed the brain, and has to here.
+        let scans = SagScans {
+            pre: self.pre,
+            pre_brain: self.pre_brain,
+            post: self.post,
+            post_known: self.post_known,
+            cavity: self.cavity,
+        };
+        let fluid = skull_is_shown(&scans).then_some(self.fluid);
+        let moved = moved_scan(self.pre, self.pre_brain, fluid, &rest_from_moved);
         // Rigid registration follows a part of the shift, and the patient's scans went through it too; its search for where to begin
         // would find what is known here.
         let rigid = register_two_scans_near(&moved, self.pre, &RigidTransform::identity(), self.rigid)?;
@@ -122,14 +133,7 @@ impl ReRegistration<'_> {
         // Their intensities were brought onto one scale before the shift was known, too: where tissue has given way to fluid their
         // ratio is no gain.
         let post = on_the_scale_of(self.pre, &post.map(|x| x.max(0.0)), self.tissue, self.scale_sigma_mm);
-        let scans = SagScans {
-            pre: self.pre,
-            pre_brain: self.pre_brain,
-            post: &post,
-            post_known: self.post_known,
-            cavity: self.cavity,
-        };
-        Ok((fit_sag(&scans, self.settings)?.subject_from_atlas, rigid))
+        Ok((fit_sag(&SagScans { post: &post, ..scans }, self.settings)?.subject_from_atlas, rigid))
     }
 }
 
@@ -137,4 +141,48 @@ impl ReRegistration<'_> {
 pub fn moved_by(field: &DisplacementField<Mni>, x: [f64; 3]) -> [f64; 3] {
     let x = Position::new(x[0], x[1], x[2]);
     (field.apply(x).mm - x.mm).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::block;
+    use crate::resect::PairSettings;
+    use crate::segment::atlas::mean_head;
+
+    /// How far rigid registration follows a brain that has moved by 2 mm to the back, where the later scan is this one, mm.
+    fn followed_mm(post: &Volume<f32, Mni>) -> f64 {
+        let head = mean_head();
+        let (all, none) = (head.brain.map(|_| true), head.brain.map(|_| false));
+        let unit = block(2);
+        // Around the whole brain.
+        let nodes_mm = unit.nodes_mm().iter().map(|x| x.map(|v| 12.0 * v - 120.0)).collect();
+        let mesh = TetMesh::new(nodes_mm, unit.tets().to_vec(), unit.labels().to_vec()).unwrap();
+        let displacement = vec![[0.0, -2.0, 0.0]; mesh.nodes_mm().len()];
+        let rest = DisplacementField::from_displacement(&Volume::filled(head.t1.grid, [0f32; 3]));
+        let registration = ReRegistration {
+            pre: &head.t1,
+            pre_brain: &head.brain,
+            tissue: &head.brain,
+            scale_sigma_mm: 25.0,
+            post,
+            post_known: &all,
+            cavity: &none,
+            fluid: 40.0,
+            rigid: &RigidSettings::default(),
+            settings: &DeformableSettings { iterations: vec![1], levels_mm: vec![8.0], ..PairSettings::default().sag },
+        };
+        let (_, taken_up) = registration.sees(&mesh, &displacement, &rest).unwrap();
+        let middle = taken_up.apply(Position::new(0.0, -20.0, 10.0)).mm;
+        middle.y + 20.0
+    }
+
+    #[test]
+    fn rigid_registration_follows_a_brain_where_a_scan_shows_no_skull_and_stays_with_the_skull_where_both_do() {
+        let head = mean_head();
+        let bare = Volume::from_fn(head.t1.grid, |n| if head.brain.data[n] { head.t1.data[n] } else { 0.0 });
+        let (with_skull, without) = (followed_mm(&head.t1), followed_mm(&bare));
+        assert!(with_skull.abs() < 0.5, "{with_skull}");
+        assert!((without - 2.0).abs() < 0.5, "{without}");
+    }
 }

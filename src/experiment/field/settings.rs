@@ -51,7 +51,7 @@ impl Default for FieldSettings {
             fall_mm: 3.0,
             jacobian_least: 0.05,
             seen_noise_mm: 0.3,
-            seen_border_noise_mm: 1.0,
+            seen_border_noise_mm: 0.6,
             seen_border_mm: 5.0,
             seen_corrected_noise_mm: 0.055,
             seen_corrected_correlation_mm: 10.0,

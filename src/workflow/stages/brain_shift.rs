@@ -8,7 +8,7 @@ use crate::image::morphology::erode;
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::{Interpolation, resample};
 use crate::image::{LabelMap, Mask, Volume};
-use crate::layout::{POST_NATIVE_BRAIN, PRE_BRAIN, PRE_EVEN_T1};
+use crate::layout::{POST_NATIVE_BRAIN, POST_T1, PRE_BRAIN, PRE_EVEN_T1};
 use crate::register::RigidSettings;
 use crate::register::deformable::{DeformableSettings, DisplacementField};
 use crate::segment::label;
@@ -31,6 +31,7 @@ pub(crate) struct SeenShift {
     pre_brain: Mask<Mni>,
     tissue: Mask<Mni>,
     scale_sigma_mm: f64,
+    post: Volume<f32, Mni>,
     post_known: Mask<Mni>,
     cavity: Mask<Mni>,
     fluid: f32,
@@ -50,10 +51,12 @@ impl SeenShift {
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
         let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
+        let post: Volume<f32, Mni> = nifti::decode(&case.read(POST_T1)?, POST_T1, &options)?.volume.relabelled();
         Ok(Self {
             fluid: fluid_in_ventricles(&pre, &anatomy.labels),
             tissue: Mask::from_fn(pre.grid, |n| label::is_tissue(anatomy.labels.data[n]) && post_known.data[n]),
             scale_sigma_mm: settings.anat.cavity.bias_sigma_mm,
+            post,
             pre,
             pre_brain: pre_brain.relabelled(),
             post_known,
@@ -71,6 +74,7 @@ impl SeenShift {
             pre_brain: &self.pre_brain,
             tissue: &self.tissue,
             scale_sigma_mm: self.scale_sigma_mm,
+            post: &self.post,
             post_known: &self.post_known,
             cavity: &self.cavity,
             fluid: self.fluid,
