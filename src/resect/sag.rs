@@ -43,7 +43,7 @@ pub fn fit_sag(scans: &SagScans<'_>, settings: &DeformableSettings) -> Result<At
 const SKULL_MM: [f64; 2] = [4.0, 10.0];
 /// What is as bright as this share of the brain is no background.
 const LEAST_BRIGHT: f64 = 0.25;
-/// A scan that shows less of skull and scalp than this share is stripped; one that is defaced shows more.
+/// A scan that shows less of skull and scalp than this share is stripped; one that is defaced shows more (docs/evidence/patients.md).
 const LEAST_SHOWN: f64 = 0.3;
 
 /// Whether both scans show what surrounds the brain: neither is stripped.

@@ -28,9 +28,12 @@ fn machine() -> String {
     format!("{cores} cores, {}", model.unwrap_or("processor not named"))
 }
 
+/// What a page of a benchmark begins with.
+const WRITTEN: &str = "Written by `./run bench";
+
 /// The page of a room.
 fn page(room: &str, with_data: bool, bars: &[Bar]) -> String {
-    let mut text = format!("# Evidence: {room}\nWritten by `./run bench {room}` at {}; {}. ", commit(), machine());
+    let mut text = format!("# Evidence: {room}\n{WRITTEN} {room}` at {}; {}. ", commit(), machine());
     text += if with_data {
         "With the measuring data (`HGM_BENCH_DATA`).\n"
     } else {
@@ -45,11 +48,15 @@ fn page(room: &str, with_data: bool, bars: &[Bar]) -> String {
     text
 }
 
-/// Writes the page of a room.
+/// Writes the page of a room, unless there is one that was written by hand.
 pub fn write(room: &str, with_data: bool, bars: &[Bar]) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/evidence");
     std::fs::create_dir_all(&folder).expect("docs/ can be written");
-    std::fs::write(folder.join(format!("{room}.md")), page(room, with_data, bars))
-        .expect("docs/evidence can be written");
+    let path = folder.join(format!("{room}.md"));
+    if std::fs::read_to_string(&path).is_ok_and(|text| !text.contains(WRITTEN)) {
+        println!("docs/evidence/{room}.md was written by hand and stays as it is");
+        return;
+    }
+    std::fs::write(path, page(room, with_data, bars)).expect("docs/evidence can be written");
     println!("written to docs/evidence/{room}.md");
 }

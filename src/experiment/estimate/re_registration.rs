@@ -13,7 +13,7 @@ use crate::image::{Mask, Volume};
 use crate::mesh::TetMesh;
 use crate::register::deformable::{DeformableError, DeformableSettings, DisplacementField};
 use crate::register::{RegisterError, RigidSettings, register_two_scans_near};
-use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of, skull_is_shown};
+use crate::resect::{SagScans, fit_sag, moved_scan, on_the_scale_of};
 use nalgebra::Vector3;
 use thiserror::Error;
 
@@ -80,14 +80,14 @@ pub struct ReRegistration<'a> {
     pub tissue: &'a Mask<Mni>,
     /// How smooth the ratio of the two is, see [`on_the_scale_of`].
     pub scale_sigma_mm: f64,
-    /// Post-operative intensities, for whether that scan shows more than the brain.
-    pub post: &'a Volume<f32, Mni>,
     /// Where the post-operative scan looked.
     pub post_known: &'a Mask<Mni>,
     /// The cavity on the post-operative scan.
     pub cavity: &'a Mask<Mni>,
     /// Intensity of fluid on the pre-operative scan.
     pub fluid: f32,
+    /// Whether both scans show the skull, see [`crate::resect::skull_is_shown`].
+    pub skull_is_shown: bool,
     /// The rigid registration of the two scans.
     pub rigid: &'a RigidSettings,
     /// The deformable one after it.
@@ -116,14 +116,7 @@ impl ReRegistration<'_> {
         let back = on_grid(mesh.tets(), &moved, &back, like.grid());
         let rest_from_moved = DisplacementField::from_displacement(&back.map(|d| d.map(|v| v as f32)));
         // Where a scan of the patient has no skull, rigid registration followed the brain, and has to here.
-        let scans = SagScans {
-            pre: self.pre,
-            pre_brain: self.pre_brain,
-            post: self.post,
-            post_known: self.post_known,
-            cavity: self.cavity,
-        };
-        let fluid = skull_is_shown(&scans).then_some(self.fluid);
+        let fluid = self.skull_is_shown.then_some(self.fluid);
         let moved = moved_scan(self.pre, self.pre_brain, fluid, &rest_from_moved);
         // Rigid registration follows a part of the shift, and the patient's scans went through it too; its search for where to begin
         // would find what is known here.
@@ -133,7 +126,14 @@ impl ReRegistration<'_> {
         // Their intensities were brought onto one scale before the shift was known, too: where tissue has given way to fluid their
         // ratio is no gain.
         let post = on_the_scale_of(self.pre, &post.map(|x| x.max(0.0)), self.tissue, self.scale_sigma_mm);
-        Ok((fit_sag(&SagScans { post: &post, ..scans }, self.settings)?.subject_from_atlas, rigid))
+        let scans = SagScans {
+            pre: self.pre,
+            pre_brain: self.pre_brain,
+            post: &post,
+            post_known: self.post_known,
+            cavity: self.cavity,
+        };
+        Ok((fit_sag(&scans, self.settings)?.subject_from_atlas, rigid))
     }
 }
 
@@ -150,8 +150,8 @@ mod tests {
     use crate::resect::PairSettings;
     use crate::segment::atlas::mean_head;
 
-    /// How far rigid registration follows a brain that has moved by 2 mm to the back, where the later scan is this one, mm.
-    fn followed_mm(post: &Volume<f32, Mni>) -> f64 {
+    /// How far rigid registration follows a brain that has moved by 2 mm to the back, mm.
+    fn followed_mm(skull_is_shown: bool) -> f64 {
         let head = mean_head();
         let (all, none) = (head.brain.map(|_| true), head.brain.map(|_| false));
         let unit = block(2);
@@ -165,10 +165,10 @@ mod tests {
             pre_brain: &head.brain,
             tissue: &head.brain,
             scale_sigma_mm: 25.0,
-            post,
             post_known: &all,
             cavity: &none,
             fluid: 40.0,
+            skull_is_shown,
             rigid: &RigidSettings::default(),
             settings: &DeformableSettings { iterations: vec![1], levels_mm: vec![8.0], ..PairSettings::default().sag },
         };
@@ -179,9 +179,7 @@ mod tests {
 
     #[test]
     fn rigid_registration_follows_a_brain_where_a_scan_shows_no_skull_and_stays_with_the_skull_where_both_do() {
-        let head = mean_head();
-        let bare = Volume::from_fn(head.t1.grid, |n| if head.brain.data[n] { head.t1.data[n] } else { 0.0 });
-        let (with_skull, without) = (followed_mm(&head.t1), followed_mm(&bare));
+        let (with_skull, without) = (followed_mm(true), followed_mm(false));
         assert!(with_skull.abs() < 0.5, "{with_skull}");
         assert!((without - 2.0).abs() < 0.5, "{without}");
     }

@@ -11,6 +11,7 @@ use crate::image::{LabelMap, Mask, Volume};
 use crate::layout::{POST_NATIVE_BRAIN, POST_T1, PRE_BRAIN, PRE_EVEN_T1};
 use crate::register::RigidSettings;
 use crate::register::deformable::{DeformableSettings, DisplacementField};
+use crate::resect::{SagScans, skull_is_shown};
 use crate::segment::label;
 use crate::workflow::Settings;
 use crate::workflow::case::Case;
@@ -31,10 +32,10 @@ pub(crate) struct SeenShift {
     pre_brain: Mask<Mni>,
     tissue: Mask<Mni>,
     scale_sigma_mm: f64,
-    post: Volume<f32, Mni>,
     post_known: Mask<Mni>,
     cavity: Mask<Mni>,
     fluid: f32,
+    skull_is_shown: bool,
     rigid: RigidSettings,
     settings: DeformableSettings,
 }
@@ -52,16 +53,19 @@ impl SeenShift {
         let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
         let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
         let post: Volume<f32, Mni> = nifti::decode(&case.read(POST_T1)?, POST_T1, &options)?.volume.relabelled();
+        let (pre_brain, cavity) = (pre_brain.relabelled(), anatomy.cavity);
+        let scans =
+            SagScans { pre: &pre, pre_brain: &pre_brain, post: &post, post_known: &post_known, cavity: &cavity };
         Ok(Self {
+            skull_is_shown: skull_is_shown(&scans),
             fluid: fluid_in_ventricles(&pre, &anatomy.labels),
             tissue: Mask::from_fn(pre.grid, |n| label::is_tissue(anatomy.labels.data[n]) && post_known.data[n]),
             scale_sigma_mm: settings.anat.cavity.bias_sigma_mm,
-            post,
             pre,
-            pre_brain: pre_brain.relabelled(),
+            pre_brain,
             post_known,
             seen: anatomy.sag,
-            cavity: anatomy.cavity,
+            cavity,
             rigid: settings.register.clone(),
             settings: settings.anat.sag.clone(),
         })
@@ -74,10 +78,10 @@ impl SeenShift {
             pre_brain: &self.pre_brain,
             tissue: &self.tissue,
             scale_sigma_mm: self.scale_sigma_mm,
-            post: &self.post,
             post_known: &self.post_known,
             cavity: &self.cavity,
             fluid: self.fluid,
+            skull_is_shown: self.skull_is_shown,
             rigid: &self.rigid,
             settings: &self.settings,
         }
