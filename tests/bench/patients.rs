@@ -79,7 +79,7 @@ pub fn bars() -> Vec<Bar> {
     let seconds = rows.iter().map(|row| row.cpu_s).sum::<f64>() / rows.len().max(1) as f64;
     println!("{seconds:.0} CPU-s a patient");
     let (patients, figures) = (wanted.len(), 2 * wanted.len());
-    let [least_told, least_inside] = [patients * 14 / 16, figures * 30 / 32];
+    let [least_told, least_inside] = [(14 * patients).div_ceil(16), (30 * figures).div_ceil(32)];
     let of = |count: usize, all: usize| format!("{count} of {all}");
     let least = |count: usize, all: usize| format!(">= {count} of {all}");
     vec![
