@@ -348,7 +348,7 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
     let first = reasons.first().map(Reason::sentence).unwrap_or_default();
     match finding {
         Finding::NoShift if bounds.is_empty() => format!("No shift seen: {first}. No stiffness is claimed."),
-        Finding::NoShift => format!("No shift seen: {first}. With the load as assumed, {bounds}."),
+        Finding::NoShift => format!("No shift seen: {first}. With the load and the supports as assumed, {bounds}."),
         Finding::Unexplained => format!(
             "The model does not explain the shift: {first}. The load or the supports may not be as assumed; no stiffness is \
              claimed."

@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 const SPACING_MM: f64 = 2.0;
 /// Windows in which the scans are compared, standard deviation in mm: a gyrus with its sulci.
 const WINDOW_MM: f64 = 4.0;
+/// How wide the gain of a coil varies, standard deviation of a window in mm.
+const COIL_MM: f64 = 15.0;
 /// The mean head's brain less a rim in which a patient's skull may lie, mm.
 const RIM_MM: f64 = 5.0;
 /// Tissue that sinks hardly changes its volume; a movement that swells or shrinks it by more than this makes one head of
@@ -80,9 +82,12 @@ pub fn likeness<A: Frame, B: Frame>(
         return Some(rigid);
     }
     let whole = resample_nearest(&brain.map(u8::from), &grid, &AffineTransform::identity(), 0);
-    let value = |n: usize| if whole.data[n] > 0 && a.inside.data[n] { a.volume.data[n].max(1e-3) } else { 0.0 };
-    let before = Volume::from_fn(grid, value);
-    let after = Volume::from_fn(grid, |n| if b.inside.data[n] { b.volume.data[n] } else { f32::NAN });
+    // Without the gain of coils, which the fit would take for movement.
+    let brain_in = |inside: &Mask<Mni>| Mask::from_fn(grid, |n| whole.data[n] > 0 && inside.data[n]);
+    let shown = brain_in(&a.inside);
+    let (level_a, level_b) = (levelled(&a.volume, &shown), levelled(&b.volume, &brain_in(&b.inside)));
+    let before = Volume::from_fn(grid, |n| if shown.data[n] { level_a.data[n].max(1e-3) } else { 0.0 });
+    let after = Volume::from_fn(grid, |n| if b.inside.data[n] { level_b.data[n] } else { f32::NAN });
     let Ok(fit) = fit_atlas(&after, &before, &AffineTransform::identity(), None, &smooth_movement()) else {
         return Some(rigid);
     };
@@ -110,6 +115,13 @@ fn smooth_movement() -> DeformableSettings {
 fn smoothed<F: Frame>(scan: &Volume<f32, F>) -> Volume<f32, F> {
     let sigma = |size_mm: f64| 0.5 * (SPACING_MM * SPACING_MM - size_mm * size_mm).max(0.0).sqrt();
     gaussian_along_axes(scan, scan.grid.spacing_mm().map(sigma))
+}
+
+/// The scan over the mean of its brain within a wide window: without the gain of a coil that is near to one side.
+fn levelled(scan: &Volume<f32, Mni>, brain: &Mask<Mni>) -> Volume<f32, Mni> {
+    let weight = gaussian(&brain.map(f32::from), COIL_MM);
+    let sum = gaussian(&Volume::from_fn(scan.grid, |n| if brain.data[n] { scan.data[n] } else { 0.0 }), COIL_MM);
+    Volume::from_fn(scan.grid, |n| scan.data[n] * weight.data[n].max(1e-6) / sum.data[n].max(1e-6))
 }
 
 fn compared(a: &Volume<f32, Mni>, b: &Volume<f32, Mni>, known: &Mask<Mni>) -> Option<Likeness> {
@@ -198,18 +210,37 @@ mod tests {
         assert!(!likeness(&one, &one, &same, &moved).unwrap().is_reversed());
     }
 
-    /// The template's brain sunk by up to 9 mm, as smoothly as brains do, is still the same brain.
+    /// The template's brain sunk by up to so much, as smoothly as brains do.
+    fn sunk(one: &Volume<f32, Mni>, most_mm: f64) -> Volume<f32, Mni> {
+        Volume::from_fn(one.grid, |n| {
+            let p = one.grid.position(one.grid.voxel(n).map(|v| v as f64).into());
+            let off = p.mm.coords - Vector3::new(20.0, -20.0, 40.0);
+            let by = most_mm * (-0.5 * off.norm_squared() / (50.0 * 50.0)).exp();
+            let from = crate::geometry::Position::from_point(p.mm + Vector3::new(0.0, 0.5 * by, by));
+            one.trilinear(from).unwrap_or(0.0)
+        })
+    }
+
     #[test]
     fn a_brain_that_has_sunk_by_the_width_of_a_sulcus_is_one_head() {
         let one = template();
-        let sunk = Volume::from_fn(one.grid, |n| {
-            let p = one.grid.position(one.grid.voxel(n).map(|v| v as f64).into());
-            let off = p.mm.coords - Vector3::new(20.0, -20.0, 40.0);
-            let by = 9.0 * (-0.5 * off.norm_squared() / (50.0 * 50.0)).exp();
-            let from = crate::geometry::Position::from_point(p.mm + Vector3::new(0.0, 0.5 * by, by));
-            one.trilinear(from).unwrap_or(0.0)
-        });
-        assert!(folds(&one, &sunk) > 0.9, "{}", folds(&one, &sunk));
+        let folds = folds(&one, &sunk(&one, 9.0));
+        assert!(folds > 0.9, "{folds}");
+    }
+
+    #[test]
+    fn a_sunk_brain_beside_a_surface_coil_is_one_head() {
+        let one = template();
+        let coil = |scan: Volume<f32, Mni>, axis: usize, per_mm: f64| {
+            Volume::from_fn(scan.grid, |n| {
+                let p = scan.grid.position(scan.grid.voxel(n).map(|v| v as f64).into());
+                scan.data[n] * (per_mm * p.mm[axis]).exp() as f32
+            })
+        };
+        // Four times as bright on the left as on the right, and at the back as in front.
+        let (pre, post) = (coil(one.clone(), 1, -4.0f64.ln() / 170.0), coil(sunk(&one, 6.0), 0, -4.0f64.ln() / 140.0));
+        let folds = folds(&pre, &post);
+        assert!(folds > 0.9, "{folds}");
     }
 
     #[test]

@@ -250,6 +250,17 @@ fn above_noise(seen_mm: &DVector<f64>, noise: Process) -> bool {
     on_the_whole || 100 * beyond > all
 }
 
+/// The smallest multiple of what the body would do that [`above_noise`] takes for a movement; infinite where it does nothing.
+fn least_share_above_noise(pattern_mm: &DVector<f64>, noise: Process) -> f64 {
+    let on_the_whole = noise.sd_mm / root_mean_square(pattern_mm.as_slice()).unwrap_or(0.0);
+    let mut sizes: Vec<f64> =
+        pattern_mm.as_slice().chunks(3).map(|u| u.iter().map(|v| v * v).sum::<f64>().sqrt()).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    // More than one of a hundred.
+    let place = sizes.get(sizes.len() / 100).copied().unwrap_or(0.0);
+    on_the_whole.min(CONTRADICTION_SD * 3f64.sqrt() * noise.sd_mm / place)
+}
+
 /// Root mean square distance between two states over the nodes that were seen, mm.
 fn rms_between(before: &[[f64; 3]], after: &[[f64; 3]], seen: &[MovedNode]) -> f64 {
     let squared = |n: usize| (0..3).map(|a| (after[n][a] - before[n][a]).powi(2)).sum::<f64>();
@@ -332,6 +343,8 @@ impl Fit<'_, '_> {
             let share = normal.solve(&(white.transpose() * target))[(0, 0)];
             (share, normal.inverse()[(0, 0)].sqrt())
         });
+        // What may pass for noise is not ruled out, however little of it the seen displacement looks like.
+        let passes_for_noise = least_share_above_noise(&pattern, errors.noise);
         let (remainder, outline) = descent.log_parameters[self.own..].split_at(RIGID);
         let remainder = rigid * DVector::from_column_slice(remainder);
         let residuals = &descent.linearisation.residuals_mm;
@@ -358,9 +371,31 @@ impl Fit<'_, '_> {
                 } else {
                     0.0
                 },
-                would_be_seen_mm: size.map_or(0.0, |(_, sd)| CONTRADICTION_SD * sd * largest_mm),
-                largest_share: size.filter(|_| !seen_at_all).map(|(share, sd)| share.max(0.0) + Z_95_ONE_SIDED * sd),
+                would_be_seen_mm: size.map_or(0.0, |(_, sd)| largest_mm * passes_for_noise.max(CONTRADICTION_SD * sd)),
+                largest_share: size
+                    .filter(|_| !seen_at_all)
+                    .map(|(share, sd)| passes_for_noise.max(share.max(0.0) + Z_95_ONE_SIDED * sd)),
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn what_passes_for_noise_ends_where_movement_begins(
+            pattern in prop::collection::vec(-3.0..3.0f64, 6..900), one_place in 0.0..40.0f64, sd_mm in 0.05..0.5f64,
+        ) {
+            let mut pattern = DVector::from_vec(pattern[..pattern.len() / 3 * 3].to_vec());
+            pattern[0] += one_place;
+            let noise = Process { sd_mm, length_mm: 20.0 };
+            let share = least_share_above_noise(&pattern, noise);
+            prop_assert!(above_noise(&(&pattern * (share * (1.0 + 1e-9))), noise));
+            prop_assert!(!above_noise(&(&pattern * (share * (1.0 - 1e-9))), noise));
+        }
     }
 }

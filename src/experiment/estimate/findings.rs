@@ -77,10 +77,11 @@ pub struct Shift {
     pub seen_rms_mm: f64,
     /// Share of it that the model explains; zero where nothing was seen to move.
     pub explained_share: f64,
-    /// The shift, at its largest place, that would have been seen (three standard deviations of its size), mm.
+    /// The shift, at its largest place, that would have been seen, mm: three standard deviations of its size, and more than
+    /// passes for the measurement's noise.
     pub would_be_seen_mm: f64,
-    /// Where nothing was seen to move: largest size (95 %, one-sided) of what the prior's most probable body would do under
-    /// the load, as a share of it.
+    /// Where nothing was seen to move: largest size (95 %, one-sided, and no less than passes for noise) of what the prior's
+    /// most probable body would do under the load, as a share of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_share: Option<f64>,
 }
