@@ -1,6 +1,6 @@
 //! How an estimate is posed.
 
-use crate::experiment::estimate::{DisplacementSettings, EstimateSettings};
+use crate::experiment::estimate::{DisplacementSettings, EstimateSettings, ShapeError};
 use crate::fem::ElementKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,10 @@ pub struct EstimateOptions {
     /// end to end of the head. It is estimated along with the moduli, in the mesh that `two_meshes` asks for; 0 to take it as it
     /// is (docs/evidence/estimate.md).
     pub outline_mm: f64,
+    /// How far a patient's falx may stand beside where it is meshed, mm, as between hemispheres that touch it is hardly seen:
+    /// standard deviation everywhere, and of what changes from back to front and from below to above. Estimated as `outline_mm` is;
+    /// 0 to take it as it is (docs/evidence/estimate.md).
+    pub falx_mm: f64,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -107,9 +111,10 @@ impl Default for EstimateOptions {
             element: ElementKind::TET4_NODAL,
             model_log_sd: 0.15,
             two_meshes: true,
-            labels_log_sd: 0.08,
+            labels_log_sd: 0.13,
             wall_log_sd: 0.15,
             outline_mm: 0.5,
+            falx_mm: 1.0,
             density: false,
             density_log_sd: 0.56,
             fluid: Fluid::default(),
@@ -124,6 +129,11 @@ impl Default for EstimateOptions {
 }
 
 impl EstimateOptions {
+    /// How far a patient's body may be off.
+    pub fn shape_error(&self) -> ShapeError {
+        ShapeError { outline_mm: self.outline_mm, falx_mm: self.falx_mm }
+    }
+
     /// Refuses what no estimate can be posed with.
     ///
     /// # Errors
@@ -147,6 +157,7 @@ impl EstimateOptions {
             ("labels_log_sd", self.labels_log_sd),
             ("wall_log_sd", self.wall_log_sd),
             ("outline_mm", self.outline_mm),
+            ("falx_mm", self.falx_mm),
         ];
         if let Some((name, value)) = not_below.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
             return Err(format!("`{name}` is {value}: it must be 0 or more"));

@@ -5,11 +5,11 @@ use super::body::{Body, Observation};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::nuisance::{Nuisance, Weighted};
-use super::outline::{Outline, OutlineAmounts};
 use super::process::{Factor, Process, spread_out};
 use super::projection::Projection;
 use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes};
+use super::shape::{Shape, ShapeColumns, ShapeFound};
 use super::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
 };
@@ -47,8 +47,10 @@ const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 struct Fit<'b, 'a> {
     body: &'b mut Body<'a>,
     places_mm: Vec<[f64; 3]>,
-    /// The rigid remainder, and the body's outline where it is not known.
+    /// The rigid remainder, and the body's shape where it is not known.
     nuisance: Nuisance,
+    /// What is not known of that.
+    shape: Option<ShapeColumns>,
     /// Priors of the model's own parameters and of those amounts behind them.
     prior: Vec<LogPrior>,
     own: usize,
@@ -145,7 +147,7 @@ pub(super) fn fit(
     errors: &CorrelatedErrors,
     prior: &[LogPrior],
     start: &[f64],
-    (instrument, outline): (Option<(&Instrument<'_>, usize)>, Option<&Outline<'_>>),
+    (instrument, shape): (Option<(&Instrument<'_>, usize)>, Option<&Shape<'_>>),
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
     let seen = body.observed_nodes().to_vec();
@@ -164,15 +166,15 @@ pub(super) fn fit(
     let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
     let moved = above_noise(&seen_mm, errors.noise);
     let nuisance = Nuisance::rigid(&rigid);
-    // A body moved a little that has no equilibrium says nothing of what its outline does: then it is taken as it is.
-    let outline = outline.filter(|_| moved).and_then(|o| Some((o, o.columns_mm(start, &places_mm)?)));
-    let nuisance = match &outline {
-        Some((outline, columns_mm)) => nuisance.with(columns_mm, outline.priors()),
+    // A body moved a little that has no equilibrium says nothing of what its shape does: then it is taken as it is.
+    let shape = shape.filter(|_| moved).and_then(|shape| shape.columns(start, &places_mm));
+    let nuisance = match &shape {
+        Some(shape) => nuisance.with(&shape.columns_mm, shape.priors()),
         None => nuisance,
     };
     let prior: Vec<LogPrior> = prior.iter().chain(&nuisance.priors).cloned().collect();
     let amounts = nuisance.count();
-    let mut fit = Fit { body, places_mm, nuisance, prior, own };
+    let mut fit = Fit { body, places_mm, nuisance, shape, prior, own };
 
     let iterations = settings.iterations.min(ROUGH_ITERATIONS);
     let rough = EstimateSettings { decrement_tolerance: ROUGH, iterations, ..settings.clone() };
@@ -345,7 +347,7 @@ impl Fit<'_, '_> {
         });
         // What may pass for noise is not ruled out, however little of it the seen displacement looks like.
         let passes_for_noise = least_share_above_noise(&pattern, errors.noise);
-        let (remainder, outline) = descent.log_parameters[self.own..].split_at(RIGID);
+        let (remainder, of_shape) = descent.log_parameters[self.own..].split_at(RIGID);
         let remainder = rigid * DVector::from_column_slice(remainder);
         let residuals = &descent.linearisation.residuals_mm;
         let rms = |v: &DVector<f64>| (v.norm_squared() / seen.len() as f64).sqrt();
@@ -362,7 +364,7 @@ impl Fit<'_, '_> {
             measured_noise: errors.noise,
             odds,
             rigid_remainder_mm: rms(&remainder),
-            outline_mm: OutlineAmounts::try_from(outline).ok(),
+            shape: self.shape.as_ref().map_or_else(ShapeFound::default, |shape| shape.found(of_shape)),
             shift: Shift {
                 seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),

@@ -3,10 +3,10 @@
 use super::body::BodyError;
 use super::evidence::Unexplained;
 use super::mesh_error::made_up_by;
-use super::outline::OutlineAmounts;
 use super::process::{Factor, Process};
 use super::projection::Projection;
 use super::re_registration::InstrumentError;
+use super::shape::ShapeFound;
 use super::{Descent, EstimateError};
 use crate::geometry::{Mni, RigidTransform};
 use nalgebra::DMatrix;
@@ -96,9 +96,8 @@ pub struct Findings {
     pub odds: Odds,
     /// Size of the rigid remainder, mm.
     pub rigid_remainder_mm: f64,
-    /// How much farther out the outline is taken to be, mm: everywhere, and at the right, front and upper end; `None` where it is
-    /// taken as it is.
-    pub outline_mm: Option<OutlineAmounts>,
+    /// Where outline and falx are taken to be.
+    pub shape: ShapeFound,
     /// The shift.
     pub shift: Shift,
     /// The places that were looked at, mm, and their nodes.

@@ -3,8 +3,8 @@
 use super::evidence::Unexplained;
 use super::findings::{Odds, Shift};
 use super::fluid::FluidOutcome;
-use super::outline::OutlineAmounts;
 use super::re_registration::MovedNode;
+use super::shape::{FalxAmounts, OutlineAmounts};
 use super::{Convergence, LogPrior, Posterior, Process, Z_95};
 use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::Verdict;
@@ -90,6 +90,10 @@ pub struct EstimateOutcome {
     /// front and upper end (as much less at the other ends).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline_mm: Option<OutlineAmounts>,
+    /// How much farther to the right than meshed the falx most probably is, mm: everywhere, and on top of that at the front and
+    /// upper end (as much less at the other ends).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub falx_mm: Option<FalxAmounts>,
 }
 
 /// The estimate with the state behind it and how sure that state is.

@@ -1,100 +1,12 @@
-//! How far the body's outline may be off, and what that does to its displacement.
-//!
-//! A brain that slides on the skull has nothing but its outline to lean on: labels wider by about a millimetre made grey matter a
-//! fifth stiffer and white matter an eighth softer (docs/evidence/estimate.md). A segmentation is good to about half of that, so
-//! the outline is estimated along with the moduli: out or in by one amount everywhere, and by amounts that change from side to
-//! side. What they do is found on a coarse mesh of the body, moved so far and solved again.
+//! A body's outline, moved out or in.
 
-use super::body::{Body, Observation};
-use super::mesh_error::at_places;
-use super::unknown::Unknown;
-use super::{LogPrior, Scale};
-use crate::fem::Scenario;
+use super::shape::REACH_MM;
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use crate::tag::{MARGIN, VENTRICLE};
-use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
+use nalgebra::Vector3;
 
-/// How they move: everywhere by the same, or by what changes along an axis of the frame.
-const NAMES: [&str; 4] = ["everywhere", "from left to right", "from back to front", "from below to above"];
-
-/// How many they are.
-pub const OUTLINE: usize = NAMES.len();
-
-/// The amounts, mm: everywhere, and on top of that at the right, front and upper end.
-pub type OutlineAmounts = [f64; OUTLINE];
-
-/// How often a step is halved at most where a mesh does not bear it.
-const HALVINGS: i32 = 8;
-
-/// Tissue deeper than this stays where it is, mm.
-const DEPTH_MM: f64 = 10.0;
-
-/// A body whose outline is not known exactly.
-pub struct Outline<'a> {
-    /// A coarse mesh of it, with its supports.
-    pub mesh: &'a TetMesh,
-    /// Loads, supports, solver.
-    pub template: &'a Scenario,
-    /// What is estimated of it.
-    pub unknowns: &'a [Unknown],
-    /// Poisson's ratio of every tissue.
-    pub poisson_ratio: f64,
-    /// Standard deviation of each of the amounts, mm: of the outline everywhere, or at either end of an axis.
-    pub sd_mm: f64,
-}
-
-impl Outline<'_> {
-    /// What is known of the amounts beforehand, in mm.
-    pub fn priors(&self) -> impl Iterator<Item = LogPrior> {
-        let sd = Some(self.sd_mm);
-        NAMES.into_iter().map(move |name| LogPrior {
-            name: format!("outline of the brain, mm farther out {name}"),
-            mean: 0.0,
-            sd,
-            scale: Scale::Plain,
-            correlation: Vec::new(),
-            average: None,
-        })
-    }
-
-    /// Displacement of the places per mm of each amount, three rows a place, at these parameters; `None` where the body has no
-    /// equilibrium there, before or after, or its outline cannot be moved.
-    pub fn columns_mm(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Option<DMatrix<f64>> {
-        let at = |mesh: &TetMesh| -> Option<Vec<[f64; 3]>> {
-            let nothing = Observation::Nodes(Vec::new());
-            let mut body = Body::new(mesh, self.template, self.unknowns.to_vec(), self.poisson_ratio, nothing).ok()?;
-            let found = body.equilibrium(parameters).ok()?;
-            Some(at_places(mesh, &found.displacement_mm, places_mm))
-        };
-        let surface = Surface::new(self.mesh)?;
-        let mut bodies = vec![(self.mesh.clone(), 0.0)];
-        bodies.extend((0..OUTLINE).map(|k| self.moved(&surface, k)).collect::<Option<Vec<_>>>()?);
-        let found: Vec<_> = bodies.par_iter().map(|(mesh, _)| at(mesh)).collect::<Option<_>>()?;
-        Some(DMatrix::from_fn(3 * places_mm.len(), OUTLINE, |row, k| {
-            let of = |n: usize| found[n][row / 3][row % 3];
-            (of(k + 1) - of(0)) / bodies[k + 1].1
-        }))
-    }
-
-    /// The mesh with its outline moved by an amount, and by how much of it, mm: by one standard deviation, or by less where that
-    /// would turn a tetrahedron inside out.
-    fn moved(&self, surface: &Surface, amount: usize) -> Option<(TetMesh, f64)> {
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        for x in self.mesh.nodes_mm() {
-            (low, high) = (low.inf(&Vector3::from(*x)), high.sup(&Vector3::from(*x)));
-        }
-        let share = |x: Vector3<f64>| match amount.checked_sub(1) {
-            None => 1.0,
-            Some(axis) => 2.0 * (x[axis] - low[axis]) / (high[axis] - low[axis]) - 1.0,
-        };
-        let mut steps_mm = (0..HALVINGS).map(|n| self.sd_mm * 0.5f64.powi(n));
-        steps_mm.find_map(|step_mm| Some((surface.moved(self.mesh, |x| step_mm * share(x))?, step_mm)))
-    }
-}
-
-/// The outline of a body: what it ends at, walls of a ventricle or a cavity apart.
-struct Surface {
+/// What a body ends at, walls of a ventricle or a cavity apart.
+pub(super) struct Surface {
     outside: TriMesh,
     tree: ClosestPoint,
     /// Outward, one a node of the outside.
@@ -103,7 +15,7 @@ struct Surface {
 
 impl Surface {
     /// `None` for a body without an outside.
-    fn new(mesh: &TetMesh) -> Option<Self> {
+    pub fn new(mesh: &TetMesh) -> Option<Self> {
         let facets = mesh.outside_without(&[VENTRICLE, MARGIN]);
         let (outside, nodes) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
         let normals = mesh.node_normals_mm2(&facets);
@@ -113,11 +25,11 @@ impl Surface {
 
     /// The mesh with its outline moved outwards by so many mm, what lies below it by less the deeper it lies; `None` where that
     /// turns a tetrahedron inside out.
-    fn moved(&self, mesh: &TetMesh, by_mm: impl Fn(Vector3<f64>) -> f64) -> Option<TetMesh> {
+    pub fn moved(&self, mesh: &TetMesh, by_mm: impl Fn(Vector3<f64>) -> f64) -> Option<TetMesh> {
         let corner = |n: u32| Vector3::from(self.outside.nodes_mm[n as usize]);
         let to = |x: [f64; 3]| -> [f64; 3] {
             let hit = self.tree.find(x);
-            let share = 1.0 - hit.distance_mm / DEPTH_MM;
+            let share = 1.0 - hit.distance_mm / REACH_MM;
             if share <= 0.0 {
                 return x;
             }

@@ -4,6 +4,7 @@ use super::LogPrior;
 use super::body::Observation;
 use super::correlated::CorrelatedErrors;
 use super::re_registration::Instrument;
+use super::shape::ShapeError;
 use super::unknown::Unknown;
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
@@ -39,10 +40,9 @@ pub struct Problem<'a> {
     pub model_log_sd: f64,
     /// Standard deviation of ln(modulus) that labels and supports add; 0 for a body known exactly.
     pub body_log_sd: f64,
-    /// How far its outline may be off, mm: standard deviation everywhere, and of what changes from end to end. 0 for one known
-    /// exactly; only taken where there is a coarser mesh to find out what that does.
-    pub outline_mm: f64,
-    /// The same body in a coarser mesh: what mesh, element and outline add is found from it, case by case.
+    /// How far its shape may be off; only taken where there is a coarser mesh to find out what that does.
+    pub shape: ShapeError,
+    /// The same body in a coarser mesh: what mesh, element and shape add is found from it, case by case.
     pub coarser: Option<&'a TetMesh>,
     /// Whether body and load are known exactly (a phantom's): then nothing is held against what is known of tissue.
     pub body_known: bool,
@@ -70,7 +70,7 @@ impl<'a> Problem<'a> {
             errors,
             model_log_sd: 0.0,
             body_log_sd: 0.0,
-            outline_mm: 0.0,
+            shape: ShapeError::default(),
             coarser: None,
             body_known: true,
             start: Vec::new(),

@@ -7,8 +7,8 @@ use super::fluid::FluidOutcome;
 use super::independent::fit_independent;
 use super::mesh_error::{at_places, left_of_difference};
 use super::outcome::{Estimate, EstimateOutcome};
-use super::outline::Outline;
 use super::problem::{Errors, Problem};
+use super::shape::Shape;
 use super::spread::spread;
 use super::unknown::Unknown;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
@@ -49,16 +49,16 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         body = body.within(AS_SEEN, AS_SEEN);
     }
     let start = body.start(&start);
-    let outline = problem.coarser.filter(|_| problem.outline_mm > 0.0).map(|mesh| Outline {
+    let shape = problem.coarser.map(|mesh| Shape {
         mesh,
         template: problem.template,
         unknowns: &unknown,
         poisson_ratio: problem.poisson_ratio,
-        sd_mm: problem.outline_mm,
+        error: problem.shape,
     });
     let fitted = match &problem.errors {
         Errors::Correlated(errors) => {
-            let others = (problem.instrument, outline.as_ref());
+            let others = (problem.instrument, shape.as_ref());
             correlated::fit(&mut body, errors, &prior, &start, others, settings)?
         }
         Errors::Independent { share } => {
@@ -145,7 +145,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
         rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
-        outline_mm: correlated.as_ref().and_then(|c| c.outline_mm),
+        outline_mm: correlated.as_ref().and_then(|c| c.shape.outline_mm),
+        falx_mm: correlated.as_ref().and_then(|c| c.shape.falx_mm),
         shift: correlated.map(|c| c.shift),
         posterior,
         prior,

@@ -300,6 +300,7 @@ mod tests {
             shift: None,
             rigid_remainder_mm: None,
             outline_mm: None,
+            falx_mm: None,
         }
     }
 

@@ -5,7 +5,7 @@ use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
     Errors, Estimate, EstimateOutcome, EstimateSettings, FluidLevels, Instrument, LogPrior, MovedNode, Observation,
-    Problem, SEEN_AT, SEEN_DISPLACEMENT, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
+    Problem, SEEN_AT, SEEN_DISPLACEMENT, ShapeError, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
@@ -388,7 +388,7 @@ impl Bodies {
         let problem = Problem {
             model_log_sd: if patient { options.model_log_sd } else { 0.0 },
             body_log_sd: if patient { body.log_sd(options) } else { 0.0 },
-            outline_mm: if patient { options.outline_mm } else { 0.0 },
+            shape: if patient { options.shape_error() } else { ShapeError::default() },
             coarser: coarser.as_ref(),
             body_known: !patient,
             start: rough.map_or_else(Vec::new, |found| found.numbers),

@@ -1,0 +1,236 @@
+//! How far a body's shape may be off, and what that does to its displacement.
+//!
+//! A brain that slides on the skull has nothing but its outline to lean on: labels wider by about a millimetre made grey matter a
+//! fifth stiffer and white matter an eighth softer. A falx that stands two millimetres beside where it is taken to be holds one
+//! hemisphere back and lets the other go. A segmentation is good to about half a millimetre, and the falx between two
+//! hemispheres that touch is hardly seen, so both are estimated along with the moduli: by one amount everywhere, and by amounts
+//! that change from end to end. What they do is found on a coarse mesh of the body, moved so far and solved again
+//! (docs/evidence/estimate.md).
+
+use super::body::{Body, Observation};
+use super::falx_place::Sheet;
+use super::mesh_error::at_places;
+use super::outline::Surface;
+use super::unknown::Unknown;
+use super::{LogPrior, Scale};
+use crate::fem::Scenario;
+use crate::mesh::TetMesh;
+use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+
+/// What lies farther than this from what is moved stays where it is, mm.
+pub(super) const REACH_MM: f64 = 10.0;
+
+/// How the outline moves out: everywhere by the same, or by what changes along an axis of the frame.
+const OUTLINE: [&str; 4] = ["everywhere", "from left to right", "from back to front", "from below to above"];
+
+/// How the falx moves to the right: it has no width from left to right.
+const FALX: [&str; 3] = [OUTLINE[0], OUTLINE[2], OUTLINE[3]];
+
+/// How far the outline is moved out, mm: everywhere, and on top of that at the right, front and upper end.
+pub type OutlineAmounts = [f64; OUTLINE.len()];
+
+/// How far the falx is moved to the right, mm: everywhere, and on top of that at the front and upper end.
+pub type FalxAmounts = [f64; FALX.len()];
+
+/// How many steps are tried at most.
+const TRIES: i32 = 12;
+
+/// A part of the body that may lie elsewhere, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Amount {
+    /// The outline, outwards: everywhere, or along an axis.
+    Outline(Option<usize>),
+    /// The falx, to the right.
+    Falx(Option<usize>),
+}
+
+impl Amount {
+    /// All of the outline or of the falx.
+    fn of_outline() -> impl Iterator<Item = Self> {
+        [None, Some(0), Some(1), Some(2)].into_iter().map(Self::Outline)
+    }
+
+    fn of_falx() -> impl Iterator<Item = Self> {
+        [None, Some(1), Some(2)].into_iter().map(Self::Falx)
+    }
+
+    fn name(self) -> String {
+        let way = |axis: Option<usize>| OUTLINE[axis.map_or(0, |axis| axis + 1)];
+        match self {
+            Self::Outline(axis) => format!("outline of the brain, mm farther out {}", way(axis)),
+            Self::Falx(axis) => format!("falx, mm farther to the right {}", way(axis)),
+        }
+    }
+}
+
+/// A body whose shape is not known exactly.
+pub struct Shape<'a> {
+    /// A coarse mesh of it, with its supports.
+    pub mesh: &'a TetMesh,
+    /// Loads, supports, solver.
+    pub template: &'a Scenario,
+    /// What is estimated of it.
+    pub unknowns: &'a [Unknown],
+    /// Poisson's ratio of every tissue.
+    pub poisson_ratio: f64,
+    /// How far it may be off.
+    pub error: ShapeError,
+}
+
+/// How far a body's shape may be off: standard deviation of every amount, mm; 0 for what is known exactly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShapeError {
+    /// Of the outline.
+    pub outline_mm: f64,
+    /// Of the falx, sideways.
+    pub falx_mm: f64,
+}
+
+/// What was found of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShapeFound {
+    /// Of the outline, where it was looked for.
+    pub outline_mm: Option<OutlineAmounts>,
+    /// Of the falx, where it was looked for.
+    pub falx_mm: Option<FalxAmounts>,
+}
+
+/// Displacement of places for each of the amounts that are looked for.
+pub struct ShapeColumns {
+    amounts: Vec<Amount>,
+    sd_mm: Vec<f64>,
+    /// Three rows a place, a column an amount: per mm of it.
+    pub columns_mm: DMatrix<f64>,
+}
+
+impl ShapeColumns {
+    /// What is known of the amounts beforehand, in mm.
+    pub fn priors(&self) -> impl Iterator<Item = LogPrior> {
+        self.amounts.iter().zip(&self.sd_mm).map(|(amount, sd)| LogPrior {
+            name: amount.name(),
+            mean: 0.0,
+            sd: Some(*sd),
+            scale: Scale::Plain,
+            correlation: Vec::new(),
+            average: None,
+        })
+    }
+
+    /// The amounts that came out, by what they are of.
+    pub fn found(&self, amounts_mm: &[f64]) -> ShapeFound {
+        let of = |wanted: Amount| self.amounts.iter().position(|a| *a == wanted).map(|n| amounts_mm[n]);
+        let all = |list: Vec<Option<f64>>| list.into_iter().collect::<Option<Vec<f64>>>();
+        ShapeFound {
+            outline_mm: all(Amount::of_outline().map(of).collect()).and_then(|list| list.try_into().ok()),
+            falx_mm: all(Amount::of_falx().map(of).collect()).and_then(|list| list.try_into().ok()),
+        }
+    }
+}
+
+impl Shape<'_> {
+    /// What the amounts do to the places at these parameters; `None` where nothing may be off, where the body has no equilibrium
+    /// there, or has none however little an amount moves it.
+    pub fn columns(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Option<ShapeColumns> {
+        let at = |mesh: &TetMesh| -> Option<Vec<[f64; 3]>> {
+            let nothing = Observation::Nodes(Vec::new());
+            let mut body = Body::new(mesh, self.template, self.unknowns.to_vec(), self.poisson_ratio, nothing).ok()?;
+            let found = body.equilibrium(parameters).ok()?;
+            Some(at_places(mesh, &found.displacement_mm, places_mm))
+        };
+        let ShapeError { outline_mm, falx_mm } = self.error;
+        let surface = (outline_mm > 0.0).then(|| Surface::new(self.mesh)).flatten();
+        let sheet = (falx_mm > 0.0).then(|| Sheet::new(self.mesh)).flatten();
+        let mut amounts: Vec<Amount> = surface.iter().flat_map(|_| Amount::of_outline()).collect();
+        amounts.extend(sheet.iter().flat_map(|_| Amount::of_falx()));
+        if amounts.is_empty() {
+            return None;
+        }
+        let ends = ends(self.mesh);
+        let share = |axis: Option<usize>, x: Vector3<f64>| {
+            // All of it everywhere, or from -1 to 1 along an axis.
+            axis.map_or(1.0, |axis| 2.0 * (x[axis] - ends[axis][0]) / (ends[axis][1] - ends[axis][0]) - 1.0)
+        };
+        let moved = |amount: Amount, step_mm: f64| match amount {
+            Amount::Outline(axis) => surface.as_ref()?.moved(self.mesh, |x| step_mm * share(axis, x)),
+            Amount::Falx(axis) => sheet.as_ref()?.moved(self.mesh, |x| step_mm * share(axis, x)),
+        };
+        let sd_of = |amount: &Amount| if matches!(amount, Amount::Outline(_)) { outline_mm } else { falx_mm };
+        // By one standard deviation, to the other side or by less where the mesh or the equilibrium does not bear it.
+        let found_of = |amount: Option<&Amount>| match amount {
+            None => Some((at(self.mesh)?, 0.0)),
+            Some(amount) => (0..TRIES).find_map(|n| {
+                let step_mm = sd_of(amount) * 0.5f64.powi(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
+                Some((at(&moved(*amount, step_mm)?)?, step_mm))
+            }),
+        };
+        let bodies: Vec<Option<&Amount>> = std::iter::once(None).chain(amounts.iter().map(Some)).collect();
+        let found: Vec<_> = bodies.into_par_iter().map(found_of).collect::<Option<_>>()?;
+        let columns_mm = DMatrix::from_fn(3 * places_mm.len(), amounts.len(), |row, k| {
+            let of = |n: usize| found[n].0[row / 3][row % 3];
+            (of(k + 1) - of(0)) / found[k + 1].1
+        });
+        Some(ShapeColumns { sd_mm: amounts.iter().map(sd_of).collect(), amounts, columns_mm })
+    }
+}
+
+/// Where a mesh begins and ends along every axis, mm.
+fn ends(mesh: &TetMesh) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|a| {
+        let along = mesh.nodes_mm().iter().map(|x| x[a]);
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::sample::Tissue;
+    use crate::tag;
+
+    /// A block between two outer thirds that hang on a sheet in its middle, and nothing else; what a shape does to it.
+    fn hung(error: ShapeError) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
+        let mut mesh = block(6);
+        let middle = |n: &u32| (mesh.nodes_mm()[*n as usize][0] - 30.0).abs() < 1e-9;
+        let held: Vec<u32> = (0..mesh.nodes_mm().len() as u32).filter(middle).collect();
+        mesh.node_sets.insert(tag::FALX.to_owned(), held);
+        let settings = PhantomSettings {
+            tissues: 2,
+            two_tissue_force_n: [0.0, 0.0, -0.02],
+            fixed: vec![tag::FALX.to_owned()],
+            ..PhantomSettings::default()
+        };
+        let unknowns: Vec<Unknown> = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect();
+        let template = settings.scenario();
+        let shape = Shape { mesh: &mesh, template: &template, unknowns: &unknowns, poisson_ratio: 0.45, error };
+        let places = vec![[10.0, 30.0, 30.0], [50.0, 30.0, 30.0]];
+        let found = shape.columns(&[1370f64.ln(), 990f64.ln()], &places);
+        (places, found)
+    }
+
+    #[test]
+    fn a_falx_farther_to_the_right_lets_the_left_go_and_holds_the_right() {
+        let (places, found) = hung(ShapeError { outline_mm: 0.0, falx_mm: 1.0 });
+        let found = found.unwrap();
+        assert_eq!(found.columns_mm.shape(), (3 * places.len(), 3));
+        // Pushed down: farther down is more.
+        let down = |place: usize, amount: usize| -found.columns_mm[(3 * place + 2, amount)];
+        assert!(down(0, 0) > 0.001 && down(1, 0) < -0.001, "{}", found.columns_mm);
+        // Mirrored halves answer alike, and half-way from end to end nothing is moved.
+        assert!((down(0, 0) + down(1, 0)).abs() < 0.3 * down(0, 0), "{}", found.columns_mm);
+        assert!(down(0, 1).abs() < 0.3 * down(0, 0), "{}", found.columns_mm);
+        let amounts = found.found(&[0.4, -0.1, 0.2]);
+        assert_eq!(amounts, ShapeFound { outline_mm: None, falx_mm: Some([0.4, -0.1, 0.2]) });
+    }
+
+    #[test]
+    fn what_is_known_exactly_has_no_amounts_and_what_is_not_has_each_with_its_own_spread() {
+        assert!(hung(ShapeError::default()).1.is_none());
+        let both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0 }).1.unwrap();
+        let sd: Vec<f64> = both.priors().map(|prior| prior.sd.unwrap()).collect();
+        assert_eq!(sd, [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]);
+        let found = both.found(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        assert_eq!((found.outline_mm, found.falx_mm), (Some([1.0, 2.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
+    }
+}
