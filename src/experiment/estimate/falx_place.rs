@@ -1,6 +1,6 @@
 //! The falx of a body, moved sideways with the tissue beside it.
 
-use super::shape::REACH_MM;
+use super::outline::REACH_MM;
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use crate::tag::FALX;
 use nalgebra::Vector3;

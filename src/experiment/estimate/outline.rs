@@ -1,9 +1,11 @@
 //! A body's outline, moved out or in.
 
-use super::shape::REACH_MM;
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use crate::tag::{MARGIN, VENTRICLE};
 use nalgebra::Vector3;
+
+/// What lies farther than this from what is moved stays where it is, mm.
+pub(super) const REACH_MM: f64 = 10.0;
 
 /// What a body ends at, walls of a ventricle or a cavity apart.
 pub(super) struct Surface {

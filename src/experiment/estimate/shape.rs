@@ -18,9 +18,6 @@ use crate::mesh::TetMesh;
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
-/// What lies farther than this from what is moved stays where it is, mm.
-pub(super) const REACH_MM: f64 = 10.0;
-
 /// How the outline moves out: everywhere by the same, or by what changes along an axis of the frame.
 const OUTLINE: [&str; 4] = ["everywhere", "from left to right", "from back to front", "from below to above"];
 
