@@ -5,22 +5,18 @@ use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
 use crate::tag::FALX;
 use nalgebra::Vector3;
 
-/// The falx as a sheet of facets inside a mesh.
+/// The facets of a mesh that lie in its falx.
 pub(super) struct Sheet {
     tree: ClosestPoint,
 }
 
 impl Sheet {
-    /// `None` for a mesh whose falx is no sheet, or that has none.
+    /// `None` for a mesh without a falx.
     pub fn new(mesh: &TetMesh) -> Option<Self> {
         let held = mesh.node_sets.get(FALX)?;
         let in_falx = |n: u32| held.binary_search(&n).is_ok();
-        let facets: Vec<[u32; 3]> = mesh
-            .tets()
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[b, c, d], [a, c, d], [a, b, d], [a, b, c]])
-            .filter(|facet| facet.iter().all(|&n| in_falx(n)))
-            .collect();
+        let facets = mesh.facets().into_iter().map(|(facet, ..)| facet);
+        let facets: Vec<[u32; 3]> = facets.filter(|facet| facet.iter().all(|&n| in_falx(n))).collect();
         let (sheet, _) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
         Some(Self { tree: ClosestPoint::new(&sheet)? })
     }

@@ -30,7 +30,7 @@ pub type OutlineAmounts = [f64; OUTLINE.len()];
 /// How far the falx is moved to the right, mm: everywhere, and on top of that at the front and upper end.
 pub type FalxAmounts = [f64; FALX.len()];
 
-/// How many steps are tried at most.
+/// How many steps are tried at most: to either side, halved after both.
 const TRIES: i32 = 12;
 
 /// A part of the body that may lie elsewhere, and how.
@@ -186,7 +186,7 @@ mod tests {
     use crate::experiment::sample::Tissue;
     use crate::tag;
 
-    /// A block between two outer thirds that hang on a sheet in its middle, and nothing else; what a shape does to it.
+    /// A block that hangs on a sheet in its middle and on nothing else: a place in either half, and what its shape does to them.
     fn hung(error: ShapeError) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
         let mut mesh = block(6);
         let middle = |n: &u32| (mesh.nodes_mm()[*n as usize][0] - 30.0).abs() < 1e-9;
