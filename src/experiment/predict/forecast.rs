@@ -38,14 +38,23 @@ impl Posed {
         path.points(&self.uncertainty).len() + path.beside(&self.uncertainty) + self.solved_of(draws) + checks
     }
 
+    fn is_in_fluid(&self) -> bool {
+        self.scenario.loads.csf.is_some()
+    }
+
     /// The path of its surface.
     fn path(&self) -> Path {
-        Path::new(&self.uncertainty, self.has_walls()).in_fluid(self.scenario.loads.csf.is_some())
+        Path::new(&self.uncertainty, self.has_walls()).in_fluid(self.is_in_fluid())
     }
 
     /// How many of so many draws are solved instead of read from the surface.
     fn solved_of(&self, draws: usize) -> usize {
-        if self.has_walls() { draws / SOLVED } else { 0 }
+        // A level cuts the brain now here, now there: no surface of a few states follows that (docs/evidence/prediction.md).
+        match self.has_walls() {
+            _ if self.is_in_fluid() => draws,
+            true => draws / SOLVED,
+            false => 0,
+        }
     }
 }
 
@@ -123,9 +132,8 @@ pub fn forecast(
     let mut draws_mm: Vec<Vec<[f64; 3]>> = points.par_iter().map(|point| response.at(point)).collect();
     let mut heaviest: Vec<usize> = (0..draws).collect();
     heaviest.sort_by(|&a, &b| response.load_at(&points[b]).total_cmp(&response.load_at(&points[a])));
-    heaviest.truncate(posed.solved_of(draws));
     let mut equilibria = states.len();
-    for &n in &heaviest {
+    for &n in heaviest.iter().take(posed.solved_of(draws)) {
         rough.start_from(&draws_mm[n]);
         // So heavy a draw may have none; then it is read like the others.
         if let Ok(found) = rough.equilibrium(&points[n]) {
@@ -296,8 +304,15 @@ mod tests {
     #[test]
     fn draws_of_a_level_under_gravity_that_turns_are_those_of_full_solves() {
         let posed = half_in_fluid();
-        let check = forecast(&posed, posed.mesh.nodes_mm().len(), (32, 32), &|| ()).unwrap().check.unwrap();
-        assert!(check.mean_off_95.unwrap() < 0.06 && check.sd_off_95.unwrap() < 0.08, "{check:?}");
+        let nodes = posed.mesh.nodes_mm().len();
+        let found = forecast(&posed, nodes, (32, 32), &|| ()).unwrap();
+        let check = found.check.unwrap();
+        assert!(check.mean_off_95.unwrap() < 1e-3 && check.sd_off_95.unwrap() < 1e-3, "{check:?}");
+        // The surface alone, which variance shares are read from, would be off by more.
+        let read: Vec<_> = (0..32).map(|n| found.response.at(&posed.uncertainty.draw(n))).collect();
+        let pairs: Vec<_> = read.into_iter().zip(found.draws_mm).collect();
+        let alone = checked("fixed", &pairs).mean_off_95.unwrap();
+        assert!((0.01..0.06).contains(&alone), "{alone}");
     }
 
     #[test]
