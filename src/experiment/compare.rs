@@ -3,8 +3,8 @@
 //! MacKay, "Information Theory, Inference, and Learning Algorithms", chapter 28; averaging: Hoeting, Madigan, Raftery and
 //! Volinsky, Statistical Science 14, 1999.
 
-use super::estimate::{EstimateOutcome, Knowledge, STRONG, weights};
-use super::verdict::{Claim, Finding, Reason, Verdict};
+use super::estimate::{EstimateOutcome, Knowledge, weights};
+use super::verdict::{Claim, Finding, Reason, STRONG, Verdict};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

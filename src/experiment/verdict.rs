@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 /// From how many standard deviations on two figures contradict each other (2.7 in a thousand by chance).
 pub const CONTRADICTION_SD: f64 = 3.0;
+/// Logarithm of the odds from which one of two models is taken (20 to 1: "strong" of Kass and Raftery, Journal of the
+/// American Statistical Association 90, 1995).
+pub const STRONG: f64 = 3.0;
 
 /// What it comes down to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -213,10 +216,13 @@ impl Reason {
     /// In a sentence.
     pub fn sentence(&self) -> String {
         match self {
-            Self::StillAsProbable { log_odds, would_be_seen_mm } => format!(
-                "that nothing has moved is about as probable (log odds {log_odds:.1}); a shift of {would_be_seen_mm:.1} mm at \
-                 its largest place would have been seen"
-            ),
+            Self::StillAsProbable { log_odds, would_be_seen_mm } => {
+                let how = if *log_odds < -STRONG { "more probable" } else { "about as probable" };
+                format!(
+                    "that nothing has moved is {how} (log odds of a shift {log_odds:.1}); a shift of {would_be_seen_mm:.1} mm at \
+                     its largest place would have been seen"
+                )
+            }
             Self::WithinNoise { noise_mm, would_be_seen_mm } => format!(
                 "whatever moves does so by less than the measurement's noise of {noise_mm:.2} mm; a shift of {would_be_seen_mm:.1} \
                  mm at its largest place would have been seen"
@@ -424,6 +430,8 @@ mod tests {
         let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
         let text = Verdict::new(Finding::NoShift, None, vec![bound], vec![reason]).sentence;
         assert!(text.contains("0.6 mm") && text.contains("grey matter is stiffer than 2,140 Pa"), "{text}");
+        let said = |log_odds| Reason::StillAsProbable { log_odds, would_be_seen_mm: 0.64 }.sentence();
+        assert!(said(-2.0).contains("about as probable") && said(-6.5).contains("moved is more probable"));
     }
 
     #[test]

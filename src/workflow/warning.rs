@@ -43,6 +43,11 @@ pub enum Warning {
     SampleLeftOut { sample: String },
     #[error("{model}: left out: {reason}")]
     ModelLeftOut { model: String, reason: String },
+    #[error(
+        "head {head}, supports {supports}: {unbalanced} of {draws} draws are so heavy and soft that they find no equilibrium; they are \
+         read from lighter ones, and how far the brain may move at most is less sure"
+    )]
+    UnbalancedDraws { head: String, supports: String, unbalanced: usize, draws: usize },
     #[error("{state}: tissue folds over at {voxels} voxels; the displacement field is smoothed there and not believed")]
     Folds { state: String, voxels: usize },
     #[error("the best sample is not the one nearest to the reference's moduli")]

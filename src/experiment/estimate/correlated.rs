@@ -14,7 +14,7 @@ use super::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
 };
 use crate::experiment::rmse::root_mean_square;
-use crate::experiment::verdict::CONTRADICTION_SD;
+use crate::experiment::verdict::{CONTRADICTION_SD, STRONG};
 use nalgebra::{DMatrix, DVector};
 
 /// What is known of the errors of displacements beforehand.
@@ -327,7 +327,7 @@ impl Fit<'_, '_> {
 
         // How much of what the body would do is there, and how well that is known. Of a body that has not moved only the
         // prior's most probable one says what it would do.
-        let seen_at_all = odds.moved_to_still > super::STRONG && above_noise(&seen_mm, errors.noise);
+        let seen_at_all = odds.moved_to_still > STRONG && above_noise(&seen_mm, errors.noise);
         let usual: Vec<f64> = self.prior[..self.own].iter().map(|p| p.mean).collect();
         let body = if seen_at_all { &descent.log_parameters[..self.own] } else { &usual };
         let pattern_mm = self.body.solve(body)?.outcome.displacement_mm;

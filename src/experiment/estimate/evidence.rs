@@ -15,9 +15,6 @@ pub const NOISE_LOG_SD: f64 = 0.5;
 const LENGTHS_MM: [f64; 2] = [10.0, 200.0];
 /// Sizes of a discrepancy that are looked at, mm.
 const SIZES_MM: [f64; 2] = [1e-3, 10.0];
-/// Logarithm of the odds from which one of two models is taken (20 to 1: "strong" of Kass and Raftery, Journal of the
-/// American Statistical Association 90, 1995).
-pub const STRONG: f64 = 3.0;
 
 /// What is not explained: the instrument's noise and the model's discrepancy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -174,6 +171,7 @@ pub fn weights(log_evidence: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::verdict::STRONG;
     use crate::material::random::CounterRng;
 
     const NOISE: Process = Process { sd_mm: 0.1, length_mm: 8.0 };

@@ -33,7 +33,7 @@ mod verdict_of_fit;
 pub use body::{Body, BodyError, Observation, Solved, material};
 pub use correlated::CorrelatedErrors;
 pub use displacement::DisplacementSettings;
-pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, STRONG, Unexplained, weights};
+pub use evidence::{Evidence, LinearModel, NOISE_LOG_SD, Unexplained, weights};
 pub use findings::{Odds, ProblemError, Shift};
 pub use fluid::{FluidOutcome, prior_of_drained};
 pub use fluid_levels::FluidLevels;

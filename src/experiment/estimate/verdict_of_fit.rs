@@ -1,9 +1,9 @@
 //! What a fit comes down to: its figures against the measurement, the prior and stillness.
 
-use super::evidence::{STRONG, Unexplained};
+use super::evidence::Unexplained;
 use super::findings::Fitted;
 use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
-use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, Verdict};
+use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, STRONG, Verdict};
 
 /// How far from the average of the studies, in its standard deviations, a figure may lie that was not drawn towards it
 /// (docs/evidence/estimate.md, "A person instead of the average").

@@ -69,6 +69,8 @@ pub struct Forecast {
     pub check: Option<Check>,
     /// Equilibria that were solved, checks apart.
     pub states: usize,
+    /// Draws that were to be solved and have no equilibrium, so heavy and soft are they; they are read from the surface.
+    pub unbalanced: usize,
 }
 
 /// Why there is none.
@@ -91,10 +93,10 @@ const SENSITIVE: Within = Within::Energy(0.01);
 const SOLVED: usize = 16;
 
 /// Solves the states of a surface, reads `draws` from it and solves the first `checks` of them whole. `step` is called after
-/// each of them.
+/// each of them. Where a state of the surface has no equilibrium the draws are solved.
 ///
 /// # Errors
-/// [`ForecastError`] where a state has no equilibrium.
+/// [`ForecastError`] where a state in the middle of the prior, or a lighter one, has no equilibrium.
 pub fn forecast(
     posed: &Posed,
     nodes: usize,
@@ -108,36 +110,52 @@ pub fn forecast(
         Body::new(&posed.mesh, &posed.scenario, uncertainty.unknowns(), posed.poisson_ratio, nothing).map_err(refused)
     };
     let mut rough = body()?.within(BALANCED, SENSITIVE);
-    let solved = |at: Vec<f64>, found: Solved| {
-        step();
-        SolvedState { at, displacement_mm: found.outcome.displacement_mm, slopes_mm: found.sensitivities }
+    let solved = |at: Vec<f64>, found: Solved| SolvedState {
+        at,
+        displacement_mm: found.outcome.displacement_mm,
+        slopes_mm: found.sensitivities,
     };
     // From stiff and light to soft and heavy, each from the one before it.
-    let path = posed.path();
+    let mut path = posed.path();
+    let (along, middle) = (path.points(uncertainty), path.middle());
     let mut states = Vec::new();
-    for at in path.points(uncertainty) {
-        let found = rough.solve(&at).map_err(refused)?;
-        states.push(solved(at, found));
+    for (n, at) in along.iter().enumerate() {
+        let found = rough.solve(at);
+        step();
+        match found {
+            Ok(found) => states.push(solved(at.clone(), found)),
+            // So soft and heavy a body has no equilibrium, or is about to lose it: the path ends before.
+            Err(_) if n > middle => {
+                path.end_before(n);
+                break;
+            }
+            Err(source) => return Err(refused(source)),
+        }
     }
-    let middle = path.middle();
     let coordinates = Coordinates::new(uncertainty, path, &states[middle]);
     let first = Response::fitted(coordinates.clone(), &states);
-    for beside in coordinates.beside() {
+    let aside = coordinates.beside();
+    let wanted = along.len() + aside.len();
+    for beside in aside {
         rough.start_from(&first.at(&beside.at));
-        let found = rough.solve_partly(&beside.at, &beside.slopes).map_err(refused)?;
-        states.push(solved(beside.at, found));
+        if let Ok(found) = rough.solve_partly(&beside.at, &beside.slopes) {
+            states.push(solved(beside.at, found));
+        }
+        step();
     }
     let response = Response::fitted(coordinates, &states);
     let points: Vec<Vec<f64>> = (0..draws).map(|n| uncertainty.draw(n)).collect();
     let mut draws_mm: Vec<Vec<[f64; 3]>> = points.par_iter().map(|point| response.at(point)).collect();
     let mut heaviest: Vec<usize> = (0..draws).collect();
     heaviest.sort_by(|&a, &b| response.load_at(&points[b]).total_cmp(&response.load_at(&points[a])));
-    let mut equilibria = states.len();
-    for &n in heaviest.iter().take(posed.solved_of(draws)) {
+    // A surface that lacks a state is no surface to read from.
+    let solved_draws = if states.len() == wanted { posed.solved_of(draws) } else { draws };
+    let mut unbalanced = 0;
+    for &n in heaviest.iter().take(solved_draws) {
         rough.start_from(&draws_mm[n]);
-        // So heavy a draw may have none; then it is read like the others.
-        if let Ok(found) = rough.equilibrium(&points[n]) {
-            (draws_mm[n], equilibria) = (found.displacement_mm, equilibria + 1);
+        match rough.equilibrium(&points[n]) {
+            Ok(found) => draws_mm[n] = found.displacement_mm,
+            Err(_) => unbalanced += 1,
         }
         step();
     }
@@ -150,15 +168,16 @@ pub fn forecast(
         let mut exact = body()?;
         for (point, told) in points.iter().zip(&draws_mm).take(checks) {
             exact.start_from(&response.at(point));
-            let mut solved = exact.equilibrium(point).map_err(refused)?.displacement_mm;
-            solved.truncate(nodes);
+            if let Ok(solved) = exact.equilibrium(point) {
+                pairs.push((told.clone(), solved.displacement_mm[..nodes].to_vec()));
+            }
             step();
-            pairs.push((told.clone(), solved));
         }
     }
     let check = (!pairs.is_empty()).then(|| checked(&posed.supports, &pairs));
     let response = response.thinned(&(0..nodes).collect::<Vec<_>>());
-    Ok(Forecast { response, draws_mm, check, states: equilibria })
+    let equilibria = states.len() + solved_draws - unbalanced;
+    Ok(Forecast { response, draws_mm, check, states: equilibria, unbalanced })
 }
 
 #[cfg(test)]
@@ -313,6 +332,18 @@ mod tests {
         let pairs: Vec<_> = read.into_iter().zip(found.draws_mm).collect();
         let alone = checked("fixed", &pairs).mean_off_95.unwrap();
         assert!((0.01..0.06).contains(&alone), "{alone}");
+    }
+
+    #[test]
+    fn a_body_too_heavy_for_the_end_of_its_path_has_every_draw_solved() {
+        let mut posed = posed(1.0);
+        posed.scenario.loads.gravity_m_per_s2 = [0.0, 0.0, -28.0 * 9.81];
+        let nodes = posed.mesh.nodes_mm().len();
+        let found = forecast(&posed, nodes, (16, 16), &|| ()).unwrap();
+        // Two of three states of the path, one with the tissues apart, and the draws that have an equilibrium.
+        assert_eq!(found.states + found.unbalanced, 2 + 1 + 16);
+        let check = found.check.unwrap();
+        assert!(check.solves >= 12 && check.mean_off_95.unwrap() < 0.01, "{check:?}");
     }
 
     #[test]

@@ -102,6 +102,11 @@ impl Path {
         self.knots.iter().map(at).collect()
     }
 
+    /// Ends it before one of its states.
+    pub fn end_before(&mut self, state: usize) {
+        self.knots.truncate(state);
+    }
+
     /// How many states lie beside it ([`super::Coordinates::beside`]).
     pub fn beside(&self, uncertainty: &Uncertainty) -> usize {
         let kinds: Vec<Kind> = uncertainty.list.iter().map(|u| Kind::of(&u.unknown, 1.0)).collect();

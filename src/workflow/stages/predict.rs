@@ -290,6 +290,13 @@ impl Lying {
         }
         let left_out = |reason| Warning::ModelLeftOut { model: head.to_string(), reason };
         produced.warn(refused.into_iter().map(left_out));
+        let unbalanced = |(posed, forecast): &(&Posed, Forecast)| Warning::UnbalancedDraws {
+            head: head.to_string(),
+            supports: posed.supports.clone(),
+            unbalanced: forecast.unbalanced,
+            draws: forecast.draws_mm.len(),
+        };
+        produced.warn(found.iter().filter(|(_, forecast)| forecast.unbalanced > 0).map(unbalanced));
         let all: f64 = found.iter().map(|(posed, _)| posed.weight).sum();
         let every = (nodes / SHARED_NODES).max(1);
         let some: Vec<usize> = (0..nodes).step_by(every).collect();
