@@ -10,6 +10,7 @@ mod moments;
 pub mod nodal_field;
 pub mod observed;
 pub mod outcome;
+pub mod parameter_name;
 mod person_prior;
 pub mod phantom;
 pub mod population;

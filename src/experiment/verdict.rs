@@ -4,6 +4,7 @@
 //! Two lines are drawn, both before any patient was seen: three standard deviations for a contradiction, and odds of
 //! e^3 = 20 to 1 for taking one explanation instead of another.
 
+use super::parameter_name::in_words;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -235,7 +236,8 @@ impl Reason {
                 format!("any smooth movement explains what is seen as well as this load does (log odds {log_odds:.1})")
             }
             Self::FarFromPrior { name, sd } => {
-                format!("{name} comes out {sd:.1} standard deviations from what is known of it")
+                let (name, _) = in_words(name);
+                format!("the {name} comes out {sd:.1} standard deviations from what is known of it")
             }
             Self::AnotherModel { models: [a, b], log_odds } => {
                 format!("{a} and {b} explain the shift about as well (log odds {log_odds:.1})")
@@ -417,6 +419,11 @@ mod tests {
         for finding in [Finding::NoShift, Finding::Unexplained, Finding::Conflict] {
             let verdict = Verdict::new(finding, Some(0.9), vec![interval("grey_matter", 41526.0)], reasons.clone());
             assert!(!finding.has_stiffness() && !verdict.sentence.contains("41,500"), "{}", verdict.sentence);
+            assert!(
+                verdict.sentence.contains("the shear modulus of grey matter comes out 4.6"),
+                "{}",
+                verdict.sentence
+            );
         }
         for finding in [Finding::Identified, Finding::Widened, Finding::PriorDominated, Finding::CannotTell] {
             let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());

@@ -53,7 +53,7 @@ fn in_conflict() -> ExperimentOutcome {
     let verdict = json!({
         "finding": "conflict", "explained_share": 0.9, "moduli": [["brain", {"kind": "withheld"}]],
         "reasons": [{"kind": "far-from-prior", "name": name, "sd": 4.6}],
-        "sentence": "Conflict: the shift contradicts what is known: shear_modulus_pa of brain comes out 4.6 standard deviations \
+        "sentence": "Conflict: the shift contradicts what is known: the shear modulus of brain comes out 4.6 standard deviations \
                      from what is known of it. The load or the supports are not as assumed; no stiffness is claimed.",
     });
     let estimate = json!({

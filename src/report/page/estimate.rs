@@ -1,10 +1,11 @@
 //! The estimate: most probable moduli with their intervals, and what the data can tell apart.
 
 use super::super::html::{fixed, number};
-use super::posterior::{figures, parameter};
+use super::posterior::figures;
 use super::results::{Row, table, words};
 use crate::experiment::compare::{Candidate, Comparison};
 use crate::experiment::estimate::{EstimateOutcome, Knowledge, Scale};
+use crate::experiment::parameter_name::{in_words, with_unit};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -35,7 +36,7 @@ pub fn section(
             Knowledge::Withheld => "withheld: the model does not stand",
         };
         let cells = [
-            in_words(&posterior.names[n]),
+            with_unit(&posterior.names[n]),
             if claimed { number(posterior.mode[n], 5) } else { "–".to_owned() },
             if claimed { format!("{} to {}", number(low, 5), number(high, 5)) } else { "–".to_owned() },
             before,
@@ -45,7 +46,7 @@ pub fn section(
     };
     let rows: Vec<Row> = (0..posterior.names.len()).map(row).collect();
     let panel = &posterior.identifiability;
-    let pair = |(name, along): (&String, &f64)| format!("{} {}", parameter(name).0, number(*along, 2));
+    let pair = |(name, along): (&String, &f64)| format!("{} {}", in_words(name).0, number(*along, 2));
     let direction: Vec<String> = posterior.names.iter().zip(&panel.valley).map(pair).collect();
     html! {
         (table("Estimate", &head, &rows))
@@ -101,7 +102,7 @@ fn counted_by(estimate: &EstimateOutcome) -> String {
     let along = |n: &usize| posterior.identifiability.valley[*n].abs() >= SHOWN;
     let of = |scale: Scale| -> Vec<String> {
         let these = (0..posterior.names.len()).filter(along).filter(|n| estimate.prior[*n].scale == scale);
-        these.map(|n| parameter(&posterior.names[n]).0).collect()
+        these.map(|n| in_words(&posterior.names[n]).0).collect()
     };
     let words =
         [(Scale::Plain, "as it is"), (Scale::Angle, "in radians"), (Scale::Share, "by the logarithm of its odds")];
@@ -116,12 +117,6 @@ fn counted_by(estimate: &EstimateOutcome) -> String {
 
 /// The least share of a valley's direction that two decimals show.
 const SHOWN: f64 = 0.005;
-
-/// A parameter with its unit, for a table.
-fn in_words(name: &str) -> String {
-    let (name, unit) = parameter(name);
-    if unit.is_empty() { name } else { format!("{name}, {unit}") }
-}
 
 /// What was tried, the most probable first.
 fn table_of_models(models: &Comparison) -> Markup {

@@ -4,6 +4,7 @@ use super::super::chart::{DensityChart, DensityCurve, JointChart, JointGaussian,
 use super::super::html::number;
 use super::results::tissue_name;
 use crate::experiment::estimate::{EstimateOutcome, Knowledge, LogPrior, Scale, Z_95, prior_correlation};
+use crate::experiment::parameter_name::{in_words, with_unit};
 use crate::experiment::verdict::{Claim, pa, range, with_interval};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
@@ -15,25 +16,8 @@ const NARROW: f64 = 0.08;
 /// Share of the valley's direction that must lie in a plane for a line in it to mean anything.
 const IN_PLANE: f64 = 0.9;
 
-/// A parameter's name for readers, and its unit.
-pub fn parameter(name: &str) -> (String, &'static str) {
-    if let Some(angle) = name.strip_suffix(", degrees") {
-        return (angle.to_owned(), "°");
-    }
-    let units = [("_kg_per_m3", "kg/m³"), ("_pa", "Pa"), ("_mm", "mm")];
-    // A share of two moduli has no unit.
-    let unit = units.into_iter().find(|(suffix, _)| !name.starts_with("share") && name.contains(suffix));
-    let bare = unit.map_or_else(|| name.to_owned(), |(suffix, _)| name.replacen(suffix, "", 1));
-    (bare.replace('_', " "), unit.map_or("", |(_, unit)| unit))
-}
-
-fn label(name: &str) -> String {
-    let (name, unit) = parameter(name);
-    if unit.is_empty() { name } else { format!("{name} ({unit})") }
-}
-
 fn interval(name: &str, [low, high]: [f64; 2]) -> String {
-    match parameter(name).1 {
+    match in_words(name).1 {
         "Pa" => range([low, high]),
         unit => format!("{} to {} {unit}", number(low, 3), number(high, 3)).trim_end().to_owned(),
     }
@@ -153,8 +137,8 @@ fn of_one(estimate: &EstimateOutcome, n: usize, claimed: bool, truth: &BTreeMap<
     }
     let said: Vec<String> = curves.iter().map(|c| c.name.clone()).chain(rules.iter().map(|r| r.name.clone())).collect();
     (!curves.is_empty()).then(|| DensityChart {
-        description: format!("Densities of {}: {}", label(name), said.join("; ")),
-        x_label: label(name),
+        description: format!("Densities of {}: {}", with_unit(name), said.join("; ")),
+        x_label: with_unit(name),
         x_log: scale == Scale::Logarithm,
         curves,
         rules,
@@ -302,16 +286,6 @@ mod tests {
             outline_mm: None,
             falx_mm: None,
         }
-    }
-
-    #[test]
-    fn a_parameter_is_called_as_a_reader_would_with_its_unit() {
-        let said = |name| label(name);
-        assert_eq!(said("shear_modulus_pa of grey_matter"), "shear modulus of grey matter (Pa)");
-        assert_eq!(said("effective density_kg_per_m3"), "effective density (kg/m³)");
-        assert_eq!(said("gap_mm between cortex and skull"), "gap between cortex and skull (mm)");
-        assert_eq!(said("turn of gravity across that, degrees"), "turn of gravity across that (°)");
-        assert_eq!(said("share of c1_pa in c1_pa + c2_pa of brain"), "share of c1 pa in c1 pa + c2 pa of brain");
     }
 
     #[test]

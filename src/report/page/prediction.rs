@@ -2,6 +2,7 @@
 
 use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
+use crate::experiment::parameter_name::with_unit;
 use crate::experiment::predict::{Check, HeadPrediction, Prediction, Shares, SupportWeight, TargetPlace};
 use maud::{Markup, html};
 
@@ -155,7 +156,7 @@ fn unknowns(prediction: &Prediction) -> Markup {
         .iter()
         .map(|u| {
             let [low, high] = u.interval_95.map(|x| number(x, 3));
-            (false, words([u.name.replace('_', " "), number(u.median, 3), format!("{low} to {high}")]))
+            (false, words([with_unit(&u.name), number(u.median, 3), format!("{low} to {high}")]))
         })
         .collect();
     rows.extend(supports(prediction));
