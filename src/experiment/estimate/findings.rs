@@ -71,7 +71,8 @@ pub struct Odds {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shift {
-    /// Movement is more probable than stillness by more than [`STRONG`](crate::experiment::verdict::STRONG), and larger than the measurement's noise.
+    /// Movement is more probable than stillness by more than [`STRONG`](crate::experiment::verdict::STRONG), and larger than
+    /// the measurement's noise.
     pub seen: bool,
     /// Root mean square of the displacement seen, rigid remainder taken away, mm.
     pub seen_rms_mm: f64,

@@ -187,8 +187,8 @@ fn checks(checks: &[Check]) -> Markup {
     let rows: Vec<Row> = checks.iter().map(row).collect();
     html! {
         p {
-            "Draws are read from a surface through a few solved states; where the brain slides, the heaviest are solved instead, and in a fluid all of them. "
-            "Some were solved whole as well: this far the prediction is off."
+            "Draws are read from a surface through a few solved states; where the brain slides, the heaviest are solved instead, "
+            "and in a fluid all of them. Some were solved whole as well: this far the prediction is off."
         }
         (table("The fast way against full solutions", &head, &rows))
     }
