@@ -27,6 +27,7 @@ mod rigid_remainder;
 mod shape;
 mod solve;
 mod spread;
+mod support_edge;
 mod unknown;
 mod verdict_of_fit;
 

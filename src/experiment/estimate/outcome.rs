@@ -4,7 +4,7 @@ use super::evidence::Unexplained;
 use super::findings::{Odds, Shift};
 use super::fluid::FluidOutcome;
 use super::re_registration::MovedNode;
-use super::shape::{FalxAmounts, OutlineAmounts};
+use super::shape::{EdgeAmounts, FalxAmounts, OutlineAmounts};
 use super::{Convergence, LogPrior, Posterior, Process, Z_95};
 use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::Verdict;
@@ -94,6 +94,13 @@ pub struct EstimateOutcome {
     /// upper end (as much less at the other ends).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub falx_mm: Option<FalxAmounts>,
+    /// How much deeper than meshed the free edge of the falx most probably lies, mm: everywhere, and on top of that at the front
+    /// (as much less at the back).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub falx_edge_mm: Option<EdgeAmounts>,
+    /// How much farther up than tagged the base most probably holds, mm, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_edge_mm: Option<EdgeAmounts>,
 }
 
 /// The estimate with the state behind it and how sure that state is.

@@ -2,62 +2,79 @@
 //!
 //! A brain that slides on the skull has nothing but its outline to lean on: labels wider by about a millimetre made grey matter a
 //! fifth stiffer and white matter an eighth softer. A falx that stands two millimetres beside where it is taken to be holds one
-//! hemisphere back and lets the other go. A segmentation is good to about half a millimetre, and the falx between two
-//! hemispheres that touch is hardly seen, so both are estimated along with the moduli: by one amount everywhere, and by amounts
-//! that change from end to end. What they do is found on a coarse mesh of the body, moved so far and solved again
-//! (docs/evidence/estimate.md).
+//! hemisphere back and lets the other go. One that ends three millimetres higher makes grey matter a tenth stiffer and white
+//! matter a tenth softer, a base that ends three millimetres lower makes grey matter a fifth stiffer. A segmentation is good to
+//! about half a millimetre, the falx between two hemispheres that touch is hardly seen, and where either support ends is an
+//! atlas's word, so all are estimated along with the moduli: by one amount everywhere, and by amounts that change from end to
+//! end. What they do is found on a coarse mesh of the body, moved so far and solved again (docs/evidence/estimate.md).
 
 use super::body::{Body, Observation};
 use super::falx_place::Sheet;
 use super::mesh_error::at_places;
 use super::outline::Surface;
+use super::support_edge::SupportEdge;
 use super::unknown::Unknown;
 use super::{LogPrior, Scale};
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
+use crate::tag::BASE;
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
-/// How the outline moves out: everywhere by the same, or by what changes along an axis of the frame.
-const OUTLINE: [&str; 4] = ["everywhere", "from left to right", "from back to front", "from below to above"];
-
-/// How the falx moves to the right: it has no width from left to right.
-const FALX: [&str; 3] = [OUTLINE[0], OUTLINE[2], OUTLINE[3]];
+/// Where an amount is counted: everywhere the same, or what changes along an axis of the frame.
+const WAYS: [&str; 4] = ["everywhere", "from left to right", "from back to front", "from below to above"];
 
 /// How far the outline is moved out, mm: everywhere, and on top of that at the right, front and upper end.
-pub type OutlineAmounts = [f64; OUTLINE.len()];
+pub type OutlineAmounts = [f64; 4];
 
 /// How far the falx is moved to the right, mm: everywhere, and on top of that at the front and upper end.
-pub type FalxAmounts = [f64; FALX.len()];
+pub type FalxAmounts = [f64; 3];
+
+/// How much farther a support reaches, mm: everywhere, and on top of that at the front end.
+pub type EdgeAmounts = [f64; 2];
 
 /// How many steps are tried at most: to either side, halved after both.
 const TRIES: i32 = 12;
 
-/// A part of the body that may lie elsewhere, and how.
+/// A part of the body that may lie elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Amount {
-    /// The outline, outwards: everywhere, or along an axis.
-    Outline(Option<usize>),
-    /// The falx, to the right.
-    Falx(Option<usize>),
+enum Part {
+    /// The outline, outwards.
+    Outline,
+    /// The falx, to the right: it has no width from left to right.
+    Falx,
+    /// The free edge of the falx, along the falx.
+    FalxEdge,
+    /// Where the skull's base ends to hold, along the surface.
+    BaseEdge,
 }
 
-impl Amount {
-    /// All of the outline or of the falx.
-    fn of_outline() -> impl Iterator<Item = Self> {
-        [None, Some(0), Some(1), Some(2)].into_iter().map(Self::Outline)
-    }
+impl Part {
+    const ALL: [Self; 4] = [Self::Outline, Self::Falx, Self::FalxEdge, Self::BaseEdge];
 
-    fn of_falx() -> impl Iterator<Item = Self> {
-        [None, Some(1), Some(2)].into_iter().map(Self::Falx)
-    }
-
-    fn name(self) -> String {
-        let way = |axis: Option<usize>| OUTLINE[axis.map_or(0, |axis| axis + 1)];
+    /// Everywhere, and along which axes.
+    fn axes(self) -> &'static [Option<usize>] {
         match self {
-            Self::Outline(axis) => format!("outline of the brain, mm farther out {}", way(axis)),
-            Self::Falx(axis) => format!("falx, mm farther to the right {}", way(axis)),
+            Self::Outline => &[None, Some(0), Some(1), Some(2)],
+            Self::Falx => &[None, Some(1), Some(2)],
+            Self::FalxEdge | Self::BaseEdge => &[None, Some(1)],
         }
+    }
+}
+
+/// A part of the body that may lie elsewhere, and how: everywhere, or along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Amount(Part, Option<usize>);
+
+impl Amount {
+    fn name(self) -> String {
+        let part = match self.0 {
+            Part::Outline => "outline of the brain, mm farther out",
+            Part::Falx => "falx, mm farther to the right",
+            Part::FalxEdge => "free edge of the falx, mm deeper",
+            Part::BaseEdge => "edge of the base, mm farther up",
+        };
+        format!("{part} {}", WAYS[self.1.map_or(0, |axis| axis + 1)])
     }
 }
 
@@ -82,15 +99,21 @@ pub struct ShapeError {
     pub outline_mm: f64,
     /// Of the falx, sideways.
     pub falx_mm: f64,
+    /// Of the edges of falx and base, where the base holds it.
+    pub edges_mm: f64,
 }
 
-/// What was found of it.
+/// What was found of it, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShapeFound {
     /// Of the outline, where it was looked for.
-    pub outline_mm: Option<OutlineAmounts>,
+    pub outline: Option<OutlineAmounts>,
     /// Of the falx, where it was looked for.
-    pub falx_mm: Option<FalxAmounts>,
+    pub falx: Option<FalxAmounts>,
+    /// Of the falx's free edge, where it was looked for.
+    pub falx_edge: Option<EdgeAmounts>,
+    /// Of the base's edge, where it was looked for.
+    pub base_edge: Option<EdgeAmounts>,
 }
 
 /// Displacement of places for each of the amounts that are looked for.
@@ -116,11 +139,14 @@ impl ShapeColumns {
 
     /// The amounts that came out, by what they are of.
     pub fn found(&self, amounts_mm: &[f64]) -> ShapeFound {
-        let of = |wanted: Amount| self.amounts.iter().position(|a| *a == wanted).map(|n| amounts_mm[n]);
-        let all = |list: Vec<Option<f64>>| list.into_iter().collect::<Option<Vec<f64>>>();
+        let of = |part: Part| -> Vec<f64> {
+            self.amounts.iter().zip(amounts_mm).filter(|(amount, _)| amount.0 == part).map(|(_, mm)| *mm).collect()
+        };
         ShapeFound {
-            outline_mm: all(Amount::of_outline().map(of).collect()).and_then(|list| list.try_into().ok()),
-            falx_mm: all(Amount::of_falx().map(of).collect()).and_then(|list| list.try_into().ok()),
+            outline: of(Part::Outline).try_into().ok(),
+            falx: of(Part::Falx).try_into().ok(),
+            falx_edge: of(Part::FalxEdge).try_into().ok(),
+            base_edge: of(Part::BaseEdge).try_into().ok(),
         }
     }
 }
@@ -135,11 +161,22 @@ impl Shape<'_> {
             let found = body.equilibrium(parameters).ok()?;
             Some(at_places(mesh, &found.displacement_mm, places_mm))
         };
-        let ShapeError { outline_mm, falx_mm } = self.error;
+        let ShapeError { outline_mm, falx_mm, edges_mm } = self.error;
+        // On a brain that slides they told nothing (docs/evidence/estimate.md).
+        let edges = edges_mm > 0.0 && self.template.fixed.iter().any(|set| set == BASE);
         let surface = (outline_mm > 0.0).then(|| Surface::new(self.mesh)).flatten();
         let sheet = (falx_mm > 0.0).then(|| Sheet::new(self.mesh)).flatten();
-        let mut amounts: Vec<Amount> = surface.iter().flat_map(|_| Amount::of_outline()).collect();
-        amounts.extend(sheet.iter().flat_map(|_| Amount::of_falx()));
+        let falx_edge = edges.then(|| SupportEdge::of_falx(self.mesh)).flatten();
+        let base_edge = edges.then(|| SupportEdge::of_base(self.mesh)).flatten();
+        let there = |part: &Part| match part {
+            Part::Outline => surface.is_some(),
+            Part::Falx => sheet.is_some(),
+            Part::FalxEdge => falx_edge.is_some(),
+            Part::BaseEdge => base_edge.is_some(),
+        };
+        let parts = Part::ALL.into_iter().filter(there);
+        let amounts: Vec<Amount> =
+            parts.flat_map(|part| part.axes().iter().map(move |axis| Amount(part, *axis))).collect();
         if amounts.is_empty() {
             return None;
         }
@@ -148,11 +185,20 @@ impl Shape<'_> {
             // All of it everywhere, or from -1 to 1 along an axis.
             axis.map_or(1.0, |axis| 2.0 * (x[axis] - ends[axis][0]) / (ends[axis][1] - ends[axis][0]) - 1.0)
         };
-        let moved = |amount: Amount, step_mm: f64| match amount {
-            Amount::Outline(axis) => surface.as_ref()?.moved(self.mesh, |x| step_mm * share(axis, x)),
-            Amount::Falx(axis) => sheet.as_ref()?.moved(self.mesh, |x| step_mm * share(axis, x)),
+        let moved = |Amount(part, axis): Amount, step_mm: f64| {
+            let by_mm = |x| step_mm * share(axis, x);
+            match part {
+                Part::Outline => surface.as_ref()?.moved(self.mesh, by_mm),
+                Part::Falx => sheet.as_ref()?.moved(self.mesh, by_mm),
+                Part::FalxEdge => falx_edge.as_ref()?.moved(self.mesh, by_mm),
+                Part::BaseEdge => base_edge.as_ref()?.moved(self.mesh, by_mm),
+            }
         };
-        let sd_of = |amount: &Amount| if matches!(amount, Amount::Outline(_)) { outline_mm } else { falx_mm };
+        let sd_of = |amount: &Amount| match amount.0 {
+            Part::Outline => outline_mm,
+            Part::Falx => falx_mm,
+            Part::FalxEdge | Part::BaseEdge => edges_mm,
+        };
         // By one standard deviation, to the other side or by less where the mesh or the equilibrium does not bear it.
         let found_of = |amount: Option<&Amount>| match amount {
             None => Some((at(self.mesh)?, 0.0)),
@@ -188,14 +234,22 @@ mod tests {
 
     /// A block that hangs on a sheet in its middle and on nothing else: a place in either half, and what its shape does to them.
     fn hung(error: ShapeError) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
+        held(&[tag::FALX], 0.0, error)
+    }
+
+    /// The same held by these sets; the sheet ends so far above its base, which holds in front alone.
+    fn held(by: &[&str], sheet_ends_mm: f64, error: ShapeError) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
         let mut mesh = block(6);
-        let middle = |n: &u32| (mesh.nodes_mm()[*n as usize][0] - 30.0).abs() < 1e-9;
-        let held: Vec<u32> = (0..mesh.nodes_mm().len() as u32).filter(middle).collect();
-        mesh.node_sets.insert(tag::FALX.to_owned(), held);
+        let at = |n: &u32| mesh.nodes_mm()[*n as usize];
+        let in_sheet = |n: &u32| (at(n)[0] - 30.0).abs() < 1e-9 && at(n)[2] > sheet_ends_mm - 1e-9;
+        let sheet: Vec<u32> = (0..mesh.nodes_mm().len() as u32).filter(in_sheet).collect();
+        let front: Vec<u32> = mesh.node_sets[BASE].iter().copied().filter(|n| at(n)[1] < 10.0 + 1e-9).collect();
+        mesh.node_sets.insert(tag::FALX.to_owned(), sheet);
+        mesh.node_sets.insert(BASE.to_owned(), front);
         let settings = PhantomSettings {
             tissues: 2,
             two_tissue_force_n: [0.0, 0.0, -0.02],
-            fixed: vec![tag::FALX.to_owned()],
+            fixed: by.iter().map(|set| (*set).to_owned()).collect(),
             ..PhantomSettings::default()
         };
         let unknowns: Vec<Unknown> = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect();
@@ -208,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_falx_farther_to_the_right_lets_the_left_go_and_holds_the_right() {
-        let (places, found) = hung(ShapeError { outline_mm: 0.0, falx_mm: 1.0 });
+        let (places, found) = hung(ShapeError { falx_mm: 1.0, ..ShapeError::default() });
         let found = found.unwrap();
         assert_eq!(found.columns_mm.shape(), (3 * places.len(), 3));
         // Pushed down: farther down is more.
@@ -218,16 +272,32 @@ mod tests {
         assert!((down(0, 0) + down(1, 0)).abs() < 0.3 * down(0, 0), "{}", found.columns_mm);
         assert!(down(0, 1).abs() < 0.3 * down(0, 0), "{}", found.columns_mm);
         let amounts = found.found(&[0.4, -0.1, 0.2]);
-        assert_eq!(amounts, ShapeFound { outline_mm: None, falx_mm: Some([0.4, -0.1, 0.2]) });
+        assert_eq!(amounts, ShapeFound { falx: Some([0.4, -0.1, 0.2]), ..ShapeFound::default() });
     }
 
     #[test]
     fn what_is_known_exactly_has_no_amounts_and_what_is_not_has_each_with_its_own_spread() {
         assert!(hung(ShapeError::default()).1.is_none());
-        let both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0 }).1.unwrap();
+        let both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0, edges_mm: 0.0 }).1.unwrap();
         let sd: Vec<f64> = both.priors().map(|prior| prior.sd.unwrap()).collect();
         assert_eq!(sd, [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]);
         let found = both.found(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-        assert_eq!((found.outline_mm, found.falx_mm), (Some([1.0, 2.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
+        assert_eq!((found.outline, found.falx), (Some([1.0, 2.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
+    }
+
+    #[test]
+    fn supports_that_reach_farther_hold_more_and_are_looked_for_where_the_base_holds() {
+        let error = ShapeError { edges_mm: 2.0, ..ShapeError::default() };
+        let (places, found) = held(&[BASE, tag::FALX], 30.0, error);
+        let found = found.unwrap();
+        // Pushed down, both places go less far beside a sheet that ends lower, and with a base that reaches farther back.
+        for place in 0..places.len() {
+            let up = |amount: usize| found.columns_mm[(3 * place + 2, amount)];
+            assert!(up(0) > 5e-5 && up(2) > 5e-5, "{}", found.columns_mm);
+        }
+        let amounts = found.found(&[1.0, 2.0, 3.0, 4.0]);
+        let wanted = ShapeFound { falx_edge: Some([1.0, 2.0]), base_edge: Some([3.0, 4.0]), ..ShapeFound::default() };
+        assert_eq!(amounts, wanted);
+        assert!(held(&[tag::FALX], 30.0, error).1.is_none());
     }
 }

@@ -285,6 +285,8 @@ mod tests {
             rigid_remainder_mm: None,
             outline_mm: None,
             falx_mm: None,
+            falx_edge_mm: None,
+            base_edge_mm: None,
         }
     }
 
