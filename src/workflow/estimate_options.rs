@@ -81,7 +81,7 @@ pub struct EstimateOptions {
     /// How much farther base and falx may hold a patient's brain than they are taken to, mm: the free edge of the falx down, the
     /// edge of the base up, both placed by an atlas; standard deviation everywhere, and of what changes from back to front.
     /// Estimated as `outline_mm` is where the base holds; 0 to take them as they are (docs/evidence/estimate.md).
-    pub edges_mm: f64,
+    pub support_edges_mm: f64,
     /// Also estimate the effective density, with the prior below.
     pub density: bool,
     /// Standard deviation of ln(effective density): the default spans 33 (all submerged) to 300 kg/m3 around 100.
@@ -119,7 +119,7 @@ impl Default for EstimateOptions {
             wall_log_sd: 0.15,
             outline_mm: 0.5,
             falx_mm: 1.0,
-            edges_mm: 3.0,
+            support_edges_mm: 3.0,
             density: false,
             density_log_sd: 0.56,
             fluid: Fluid::default(),
@@ -136,7 +136,7 @@ impl Default for EstimateOptions {
 impl EstimateOptions {
     /// How far a patient's body may be off.
     pub fn shape_error(&self) -> ShapeError {
-        ShapeError { outline_mm: self.outline_mm, falx_mm: self.falx_mm, edges_mm: self.edges_mm }
+        ShapeError { outline_mm: self.outline_mm, falx_mm: self.falx_mm, support_edges_mm: self.support_edges_mm }
     }
 
     /// Refuses what no estimate can be posed with.
@@ -163,7 +163,7 @@ impl EstimateOptions {
             ("wall_log_sd", self.wall_log_sd),
             ("outline_mm", self.outline_mm),
             ("falx_mm", self.falx_mm),
-            ("edges_mm", self.edges_mm),
+            ("support_edges_mm", self.support_edges_mm),
         ];
         if let Some((name, value)) = not_below.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
             return Err(format!("`{name}` is {value}: it must be 0 or more"));

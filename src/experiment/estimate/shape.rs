@@ -100,7 +100,7 @@ pub struct ShapeError {
     /// Of the falx, sideways.
     pub falx_mm: f64,
     /// Of the edges of falx and base, where the base holds it.
-    pub edges_mm: f64,
+    pub support_edges_mm: f64,
 }
 
 /// What was found of it, mm.
@@ -161,9 +161,9 @@ impl Shape<'_> {
             let found = body.equilibrium(parameters).ok()?;
             Some(at_places(mesh, &found.displacement_mm, places_mm))
         };
-        let ShapeError { outline_mm, falx_mm, edges_mm } = self.error;
+        let ShapeError { outline_mm, falx_mm, support_edges_mm } = self.error;
         // On a brain that slides they told nothing (docs/evidence/estimate.md).
-        let edges = edges_mm > 0.0 && self.template.fixed.iter().any(|set| set == BASE);
+        let edges = support_edges_mm > 0.0 && self.template.fixed.iter().any(|set| set == BASE);
         let surface = (outline_mm > 0.0).then(|| Surface::new(self.mesh)).flatten();
         let sheet = (falx_mm > 0.0).then(|| Sheet::new(self.mesh)).flatten();
         let falx_edge = edges.then(|| SupportEdge::of_falx(self.mesh)).flatten();
@@ -197,7 +197,7 @@ impl Shape<'_> {
         let sd_of = |amount: &Amount| match amount.0 {
             Part::Outline => outline_mm,
             Part::Falx => falx_mm,
-            Part::FalxEdge | Part::BaseEdge => edges_mm,
+            Part::FalxEdge | Part::BaseEdge => support_edges_mm,
         };
         // By one standard deviation, to the other side or by less where the mesh or the equilibrium does not bear it.
         let found_of = |amount: Option<&Amount>| match amount {
@@ -244,8 +244,12 @@ mod tests {
         let in_sheet = |n: &u32| (at(n)[0] - 30.0).abs() < 1e-9 && at(n)[2] > sheet_ends_mm - 1e-9;
         let sheet: Vec<u32> = (0..mesh.nodes_mm().len() as u32).filter(in_sheet).collect();
         let front: Vec<u32> = mesh.node_sets[BASE].iter().copied().filter(|n| at(n)[1] < 10.0 + 1e-9).collect();
-        mesh.node_sets.insert(tag::FALX.to_owned(), sheet);
-        mesh.node_sets.insert(BASE.to_owned(), front);
+        for (set, nodes) in [(tag::FALX, sheet), (BASE, front)] {
+            let in_set = |facet: &[u32; 3]| facet.iter().all(|n| nodes.contains(n));
+            let facets = mesh.facets().into_iter().map(|(facet, ..)| facet).filter(in_set).collect();
+            mesh.facet_sets.insert(set.to_owned(), facets);
+            mesh.node_sets.insert(set.to_owned(), nodes);
+        }
         let settings = PhantomSettings {
             tissues: 2,
             two_tissue_force_n: [0.0, 0.0, -0.02],
@@ -278,7 +282,7 @@ mod tests {
     #[test]
     fn what_is_known_exactly_has_no_amounts_and_what_is_not_has_each_with_its_own_spread() {
         assert!(hung(ShapeError::default()).1.is_none());
-        let both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0, edges_mm: 0.0 }).1.unwrap();
+        let both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0, support_edges_mm: 0.0 }).1.unwrap();
         let sd: Vec<f64> = both.priors().map(|prior| prior.sd.unwrap()).collect();
         assert_eq!(sd, [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]);
         let found = both.found(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
@@ -287,7 +291,7 @@ mod tests {
 
     #[test]
     fn supports_that_reach_farther_hold_more_and_are_looked_for_where_the_base_holds() {
-        let error = ShapeError { edges_mm: 2.0, ..ShapeError::default() };
+        let error = ShapeError { support_edges_mm: 2.0, ..ShapeError::default() };
         let (places, found) = held(&[BASE, tag::FALX], 30.0, error);
         let found = found.unwrap();
         // Pushed down, both places go less far beside a sheet that ends lower, and with a base that reaches farther back.

@@ -123,6 +123,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let fluid = FluidOutcome::of(&unknown, &prior, &fitted.descent.log_parameters, &posterior)
         .filter(|_| verdict.finding.has_stiffness());
     let correlated = fitted.correlated;
+    let shape = correlated.as_ref().map(|c| c.shape).unwrap_or_default();
     let outcome = EstimateOutcome {
         taught_by: None,
         fluid,
@@ -145,10 +146,10 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         measured_noise: correlated.as_ref().map(|c| c.measured_noise),
         odds: correlated.as_ref().map(|c| c.odds),
         rigid_remainder_mm: correlated.as_ref().map(|c| c.rigid_remainder_mm),
-        outline_mm: correlated.as_ref().and_then(|c| c.shape.outline),
-        falx_mm: correlated.as_ref().and_then(|c| c.shape.falx),
-        falx_edge_mm: correlated.as_ref().and_then(|c| c.shape.falx_edge),
-        base_edge_mm: correlated.as_ref().and_then(|c| c.shape.base_edge),
+        outline_mm: shape.outline,
+        falx_mm: shape.falx,
+        falx_edge_mm: shape.falx_edge,
+        base_edge_mm: shape.base_edge,
         shift: correlated.map(|c| c.shift),
         posterior,
         prior,

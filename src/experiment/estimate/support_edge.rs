@@ -35,30 +35,27 @@ pub(super) struct SupportEdge {
 impl SupportEdge {
     /// The edge of the base: where held facets of the outside border on free ones. `None` for a body without one.
     pub fn of_base(mesh: &TetMesh) -> Option<Self> {
-        Self::new(mesh, &facets_of(mesh, BASE, || mesh.boundary_facets(|_| true))?, |_| true)
+        Self::new(mesh, mesh.facet_sets.get(BASE)?, |_| true)
     }
 
     /// The free edge of the falx: where its sheet ends inside the brain. `None` for a body without a sheet.
     pub fn of_falx(mesh: &TetMesh) -> Option<Self> {
-        let sheet = facets_of(mesh, FALX, || mesh.facets().into_iter().map(|(facet, ..)| facet).collect())?;
         let mut outer: Vec<u32> = mesh.boundary_facets(|_| true).into_iter().flatten().collect();
         outer.sort_unstable();
         outer.dedup();
         let inside = |n: u32| outer.binary_search(&n).is_err();
-        Self::new(mesh, &sheet, |[a, b]| inside(a) || inside(b))
+        Self::new(mesh, mesh.facet_sets.get(FALX)?, |[a, b]| inside(a) || inside(b))
     }
 
-    /// Ends of these facets that are asked for; `None` for a slab, in which many facets share a side, and where none ends.
+    /// Ends of these facets that are asked for; `None` where there are none.
     fn new(mesh: &TetMesh, facets: &[[u32; 3]], wanted: impl Fn([u32; 2]) -> bool) -> Option<Self> {
+        // How many facets share a side, and the corner opposite to it.
         let mut sides: BTreeMap<[u32; 2], (usize, u32)> = BTreeMap::new();
         for facet in facets {
             for k in 0..3 {
                 let [a, b, opposite] = [0, 1, 2].map(|n| facet[(k + n) % 3]);
                 sides.entry([a.min(b), a.max(b)]).or_insert((0, opposite)).0 += 1;
             }
-        }
-        if sides.values().any(|(count, _)| *count > 2) {
-            return None;
         }
         let at = |n: u32| Vector3::from(mesh.nodes_mm()[n as usize]);
         let sides: Vec<Side> = sides
@@ -92,28 +89,17 @@ impl SupportEdge {
     }
 }
 
-/// The facets of a set: its own, or those of `all` whose corners are all in it; `None` where there are none.
-fn facets_of(mesh: &TetMesh, set: &str, all: impl FnOnce() -> Vec<[u32; 3]>) -> Option<Vec<[u32; 3]>> {
-    if let Some(own) = mesh.facet_sets.get(set) {
-        return Some(own.clone());
-    }
-    let nodes = mesh.node_sets.get(set)?;
-    let mut found = all();
-    found.retain(|facet| facet.iter().all(|n| nodes.binary_search(n).is_ok()));
-    (!found.is_empty()).then_some(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::experiment::phantom::block;
 
-    /// A cube of 80 mm in cells of 10 with these nodes in a set.
+    /// A cube of 80 mm in cells of 10, with the facets whose corners all lie there in a set.
     fn with_set(name: &str, inside: impl Fn([f64; 3]) -> bool) -> TetMesh {
         let mut mesh = block(8);
-        let all = 0..mesh.nodes_mm().len() as u32;
-        let nodes = all.filter(|&n| inside(mesh.nodes_mm()[n as usize])).collect();
-        mesh.node_sets.insert(name.to_owned(), nodes);
+        let corners = |facet: &[u32; 3]| facet.iter().all(|&n| inside(mesh.nodes_mm()[n as usize]));
+        let facets = mesh.facets().into_iter().map(|(facet, ..)| facet).filter(corners).collect();
+        mesh.facet_sets.insert(name.to_owned(), facets);
         mesh
     }
 
@@ -156,11 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn a_slab_and_a_body_without_supports_have_no_edge() {
-        let slab = with_set(FALX, |x| (x[0] - 40.0).abs() < 11.0 && x[2] > 40.0 - 1e-9);
-        assert!(SupportEdge::of_falx(&slab).is_none());
-        let mut bare = block(4);
-        bare.node_sets.clear();
-        assert!(SupportEdge::of_base(&bare).is_none() && SupportEdge::of_falx(&bare).is_none());
+    fn a_falx_of_nodes_alone_and_a_body_without_supports_have_no_edge() {
+        let mut mesh = block(4);
+        let middle =
+            (0..mesh.nodes_mm().len() as u32).filter(|&n| (mesh.nodes_mm()[n as usize][0] - 20.0).abs() < 1e-9);
+        let slab = middle.collect();
+        mesh.node_sets.insert(FALX.to_owned(), slab);
+        assert!(SupportEdge::of_base(&mesh).is_none() && SupportEdge::of_falx(&mesh).is_none());
     }
 }
