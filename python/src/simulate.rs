@@ -4,7 +4,7 @@ use crate::arrays::{array1, array2, rows};
 use crate::errors::{raised, refused};
 use crate::job;
 use crate::mesh::mesh_arrays;
-use hgm::cli::{Failure, Reject};
+use hgm::cli::Failure;
 use hgm::fem::{Outcome, Scenario};
 use hgm::mesh::TetMesh;
 use hgm::workflow::{SimulationError, WorkflowError, in_words, simulate_mesh};
@@ -56,7 +56,7 @@ fn scenario(text: &str, json: bool) -> Result<Scenario, Failure> {
             let of_line = said.split_once(": ").filter(|(line, _)| json && line.starts_with("line "));
             refused(in_words(of_line.map_or(&said, |(_, reason)| reason)))
         })
-        .reject()
+        .map_err(Failure::rejected)
 }
 
 /// The deformed state; `json` says which of the two the scenario's text is.

@@ -13,7 +13,7 @@ use anyhow::anyhow;
 pub enum Failure {
     /// Exit code 1: the computation failed.
     Failed(anyhow::Error),
-    /// Exit code 3: the input was rejected; nothing was written.
+    /// Exit code 3: the input was rejected; no result was written.
     Rejected(anyhow::Error),
     /// Exit code 4: computed, outputs kept, but a quality gate refused the result.
     QualityGate(anyhow::Error),
@@ -27,6 +27,11 @@ impl Failure {
             ErrorKind::Failed => Self::Failed(error),
             ErrorKind::QualityGate => Self::QualityGate(error),
         }
+    }
+
+    /// The input's fault (exit code 3), with what to do about it.
+    pub fn rejected(error: impl Into<anyhow::Error>) -> Self {
+        Self::Rejected(with_remedy(error.into()))
     }
 
     /// The number a script sees.
@@ -124,19 +129,4 @@ fn kind(error: &anyhow::Error) -> ErrorKind {
     let of_job = error.downcast_ref().map(WorkflowError::kind);
     let of_body = || error.downcast_ref().map(ReplayError::kind).or_else(|| error.downcast_ref().map(ServeError::kind));
     of_job.or_else(of_body).unwrap_or(if given { ErrorKind::Rejected } else { ErrorKind::Failed })
-}
-
-/// Marks an error as the input's fault (exit code 3).
-pub trait Reject<T> {
-    /// `Err(e)` becomes [`Failure::Rejected`].
-    ///
-    /// # Errors
-    /// The error it was called on.
-    fn reject(self) -> Result<T, Failure>;
-}
-
-impl<T, E: Into<anyhow::Error>> Reject<T> for Result<T, E> {
-    fn reject(self) -> Result<T, Failure> {
-        self.map_err(|error| Failure::Rejected(with_remedy(error.into())))
-    }
 }

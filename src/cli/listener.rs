@@ -68,9 +68,6 @@ impl Progress for Listener {
 }
 
 /// A bar with the time left.
-///
-/// # Panics
-/// Never: the template is a constant.
 fn bar(steps: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{prefix:>14} [{bar:30}] {pos}/{len} {msg} (left {eta})")
         .expect("the template is constant")

@@ -2,7 +2,7 @@
 
 use super::{Failure, Session};
 use crate::artefact::write_whole;
-use crate::manual::{boutiques, man_pages, markdown};
+use crate::manual::Form;
 use std::path::PathBuf;
 
 /// Write man pages, one per command; or the reference pages of the documentation, or the descriptor of the BIDS App
@@ -18,27 +18,9 @@ pub struct Args {
     form: Form,
 }
 
-/// What `hgm man` writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Form {
-    /// Man pages, one per command
-    Man,
-    /// Commands, settings and files of a case as Markdown
-    Markdown,
-    /// `hgm bids` as a Boutiques descriptor
-    Boutiques,
-}
-
 pub fn run(args: &Args, hgm: clap::Command, session: &Session) -> Result<(), Failure> {
-    let written = match args.form {
-        Form::Man => {
-            man_pages::pages(hgm, "hgm")?.into_iter().map(|(name, page)| (format!("{name}.1"), page)).collect()
-        }
-        Form::Markdown => markdown::pages(hgm),
-        Form::Boutiques => boutiques::descriptor(&hgm).into_iter().collect::<Vec<_>>(),
-    };
     let mut files = Vec::new();
-    for (name, text) in written {
+    for (name, text) in args.form.pages(hgm)? {
         let file = args.output.join(name);
         write_whole(&file, &text)?;
         files.push(file.display().to_string());

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 ///
 /// Example: hgm mesh pre_dseg.nii.gz -o brain.vtu --cells 60000 --preview brain.png
 /// Example: hgm mesh aseg.mgz --labels freesurfer -o brain.vtu
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// Label map (NIfTI, .mgz or .mgh)
     #[arg(value_name = "DSEG")]
@@ -47,14 +47,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.mesh.over(&mut flags);
     flags.list("mesh.without", &args.without);
     flags.switch("tag.tentorium", args.tentorium);
-    let files = MeshFiles {
-        labels: args.dseg.clone(),
-        numbers: args.labels.clone(),
-        output: args.output.clone(),
-        in_mni: (args.sets != "auto").then_some(args.sets == "mni"),
-        preview: args.preview.clone(),
-        surfaces: args.surfaces.clone(),
-    };
+    let in_mni = (args.sets != "auto").then_some(args.sets == "mni");
+    let Args { dseg: labels, labels: numbers, output, preview, surfaces, .. } = args.clone();
+    let files = MeshFiles { labels, numbers, output, in_mni, preview, surfaces };
     let (force, settings) = (session.options.force, session.settings(flags)?);
     let meshed = mesh_file(&files, &settings, &session.programs, force, &mut *session.listener())?;
     session.emit(&meshed, &results_in_words::meshed(&meshed, &args.output))?;

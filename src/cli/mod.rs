@@ -42,7 +42,7 @@ mod warp;
 mod why;
 
 pub use call::Called;
-pub use failure::{Failure, Reject};
+pub use failure::Failure;
 
 use crate::manual::help;
 use crate::workflow::Progress;

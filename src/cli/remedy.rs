@@ -173,9 +173,7 @@ fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
         EvaluateError::NoPose { .. } => {
             "--against CASE says it, or --post-to-pre FILE, as `hgm register POST PRE -o FILE` writes it"
         }
-        EvaluateError::OtherScan { .. } | EvaluateError::OtherGrid { .. } | EvaluateError::NoLandmark { .. } => {
-            return None;
-        }
+        EvaluateError::OtherScan { .. } | EvaluateError::OtherGrid { .. } | EvaluateError::NoLandmark { .. } => None?,
     })
 }
 
@@ -221,15 +219,9 @@ fn of_case(error: &CaseError) -> Option<String> {
         CaseError::OtherScan { .. } => {
             "name another folder (-o), or say --force to make this one again from these scans".to_owned()
         }
-        CaseError::Stale { folder, .. } if is_plan(folder) => {
-            format!(
-                "run `hgm predict` on {} again with the settings that are meant (`hgm why` tells what differs)",
-                folder.display()
-            )
-        }
         CaseError::Stale { folder, .. } => format!(
-            "run `hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate` on {} again with the settings that are meant (`hgm why` \
-             tells what differs)",
+            "run {} on {} again with the settings that are meant (`hgm why` tells what differs)",
+            if is_plan(folder) { "`hgm predict`" } else { "`hgm prep`, `hgm run`, `hgm sweep` or `hgm estimate`" },
             folder.display()
         ),
         CaseError::Held { .. } => "wait until it has ended".to_owned(),

@@ -144,12 +144,8 @@ impl Session {
     pub fn listener(&self) -> Box<dyn Progress> {
         match &self.caller {
             Some(caller) => Box::new(Shared(Arc::clone(&caller.progress))),
-            None => Box::new(Listener::new(self.shows_bars())),
+            None => Box::new(Listener::new(!self.options.quiet && std::io::stderr().is_terminal())),
         }
-    }
-
-    fn shows_bars(&self) -> bool {
-        self.caller.is_none() && !self.options.quiet && std::io::stderr().is_terminal()
     }
 
     /// Prints the result: `value` with `--json`, else the text.
@@ -186,10 +182,8 @@ fn config(options: &GlobalOptions) -> Result<toml::Table, Failure> {
 fn end_between_files() -> std::io::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::spawn(move || {
-        let mut told = false;
-        for signal in signals.forever() {
-            if let Some(end) = AT_SIGNAL.get().filter(|_| !told) {
-                told = true;
+        for (earlier, signal) in signals.forever().enumerate() {
+            if let (0, Some(end)) = (earlier, AT_SIGNAL.get()) {
                 end();
                 continue;
             }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 ///
 /// Example: hgm synth --side left --seed 7 -o patient-07
 /// Example: hgm synth --head T1.nii.gz --dseg aseg.mgz --lobe frontal --resection-cc 20 -o patient-08
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// Output folder: pre.nii.gz, post.nii.gz, truth/
     #[arg(short, long, value_name = "DIR")]
@@ -97,13 +97,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let slices = args.spacing_mm.map(|spacing| below.slices_of_voxels_mm(spacing));
     flags.set("synth.post_slice_mm", args.slice_mm.or(slices));
     let settings = session.settings(flags)?;
-    let files = SyntheticFiles {
-        output: args.output.clone(),
-        head: args.head.clone(),
-        dseg: args.dseg.clone(),
-        labels: args.labels.clone(),
-        resected_mask: args.resected_mask.clone(),
-    };
+    let Args { output, head, dseg, labels, resected_mask, .. } = args.clone();
+    let files = SyntheticFiles { output, head, dseg, labels, resected_mask };
     let truth = synthetic_patient(&files, &settings, session.options.force, &mut *session.listener())?;
     let text = results_in_words::synthesised(&truth, &files, &settings);
     session.emit(&serde_json::json!({ "folder": args.output.display().to_string(), "truth": truth }), &text)

@@ -71,14 +71,18 @@ impl PhantomSettings {
         let (brain, grey, white) =
             (self.brain_shear_modulus_pa, self.grey_matter_shear_modulus_pa, self.white_matter_shear_modulus_pa);
         let (one, two) = (self.one_tissue_force_n, self.two_tissue_force_n);
+        let pushes =
+            |tissues: usize, force: &[f64; 3]| finite(force) && (self.tissues != tissues || *force != [0.0; 3]);
+        const FORCE_RULE: &str =
+            "three numbers, and not all 0 where it is what pushes: a body at rest tells nothing of its stiffness";
         first_broken(&[
             ("tissues", &self.tissues, (1..=2).contains(&self.tissues), TISSUES_RULE),
             ("brain_shear_modulus_pa", &brain, positive(brain), "above 0"),
             ("grey_matter_shear_modulus_pa", &grey, positive(grey), "above 0"),
             ("white_matter_shear_modulus_pa", &white, positive(white), "above 0"),
             ("poisson_ratio", &self.poisson_ratio, (0.0..0.5).contains(&self.poisson_ratio), POISSON_RULE),
-            ("one_tissue_force_n", &one, finite(&one), "three numbers"),
-            ("two_tissue_force_n", &two, finite(&two), "three numbers"),
+            ("one_tissue_force_n", &one, pushes(1, &one), FORCE_RULE),
+            ("two_tissue_force_n", &two, pushes(2, &two), FORCE_RULE),
             ("sd_levels", &self.sd_levels, levels_hold(&self.sd_levels), LEVELS_RULE),
             ("fixed", &self.fixed, sets_hold(&self.fixed), SETS_RULE),
             ("loaded_set", &self.loaded_set, SETS.contains(&self.loaded_set.as_str()), SETS_RULE),
@@ -203,6 +207,13 @@ mod tests {
         let outcomes = errors_of(&settings, &samples);
         assert!(outcomes[4].rmse_mm["all"] < 1e-6, "the truth leaves no error");
         assert_eq!(best_sample(&outcomes[..4], "all").unwrap().id, "sample-02");
+    }
+
+    #[test]
+    fn a_phantom_that_nothing_pushes_is_refused() {
+        let still = PhantomSettings { one_tissue_force_n: [0.0; 3], ..PhantomSettings::default() };
+        assert_eq!(still.check().unwrap_err().name, "one_tissue_force_n");
+        assert_eq!(PhantomSettings { tissues: 2, ..still }.check(), Ok(()), "with two tissues the other force pushes");
     }
 
     #[test]

@@ -38,9 +38,22 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     } else {
         let named = |axis: &str| {
             let fits = |cell: &String| [axis, &format!("{axis}_mm")].contains(&cell.to_lowercase().as_str());
-            first.iter().position(fits).ok_or_else(|| {
-                damaged(name, "the first row", format!("no column is called `{axis}`: say x, y and z (mm, RAS)"))
-            })
+            let mut columns = (0..first.len()).filter(|&c| fits(&first[c]));
+            match (columns.next(), columns.next()) {
+                (Some(only), None) => Ok(only),
+                (None, _) => Err(damaged(
+                    name,
+                    "the first row",
+                    format!("no column is called `{axis}`: say x, y and z (mm, RAS)"),
+                )),
+                (Some(one), Some(other)) => {
+                    let both = format!("`{}` and `{}`", first[one], first[other]);
+                    let problem = format!(
+                        "two columns may be {axis} ({both}): leave the one in mm of the scanner (RAS), rename the other"
+                    );
+                    Err(damaged(name, "the first row", problem))
+                }
+            }
         };
         let columns = [named("x")?, named("y")?, named("z")?];
         (Some(rows.remove(0)), columns)

@@ -66,6 +66,12 @@ fn a_damaged_file_is_refused_with_its_place() {
     let refuse = |bytes: &[u8], name: &str| Drawing::decode(bytes, name).unwrap_err().to_string();
     assert!(refuse(b"x,y\n1,2\n", "a.csv").contains("a.csv: the first row: no column is called `z`"));
     assert!(refuse(b"x,y,z\n1,2,up\n", "a.csv").contains("row 2: `up`"));
+    // Voxels beside millimetres: which are meant is not guessed.
+    for header in ["x,y,z,x_mm,y_mm,z_mm", "X,y,z,x"] {
+        let row = vec!["1"; header.split(',').count()].join(",");
+        let said = refuse(format!("{header}\n{row}\n").as_bytes(), "a.csv");
+        assert!(said.contains("two columns may be x") && said.contains("rename the other"), "{said}");
+    }
     assert!(refuse(b"x,y,z\n1,2,inf\n", "a.csv").contains("point 0"));
     for text in ["1,-12,-20,-5\n", "1,2,3,4,a\n"] {
         let said = refuse(text.as_bytes(), "a.csv");

@@ -14,8 +14,8 @@ use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
 use crate::segment::native::labels_on;
 use crate::segment::{
-    HeadError, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, carried_priors,
-    fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors, without_gaps,
+    GivenBrain, HeadError, LeftOut, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation,
+    carried_priors, fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors, without_gaps,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -194,7 +194,8 @@ pub fn take_pair_apart(
     let by_hand = given.cavity.is_some() || given.resected.is_some();
     if let Some(found) = likeness.filter(|found| !by_hand && !found.is_one_head()) {
         let folds = found.folds;
-        return Err(if found.is_reversed() {
+        let labels = given.labels.as_ref();
+        return Err(if found.is_reversed() || labels.is_some_and(|labels| tissues_exchanged(pre, post, labels)) {
             PairError::OtherWeighting { folds }
         } else {
             PairError::NotOnePerson { folds }
@@ -292,6 +293,8 @@ pub fn take_pair_apart(
     };
     after.warnings.extend(gaps.unwrap_or_default());
     after.warnings.extend(unchanged.map(|percent| SegmentWarning::UnchangedCavity { percent }));
+    let unlike = likeness.filter(|found| !found.is_one_head());
+    after.warnings.extend(unlike.map(|found| SegmentWarning::UnlikeScans { folds: found.folds }));
     after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
     if computed {
         let percent = outside_percent(&filled_before, &before.brain_mni);
@@ -345,13 +348,37 @@ pub fn take_head_apart(
     let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
     let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
     if let Some(labels) = &given.labels {
-        let (before, scale) = segment_by_labels(pre, labels);
+        let (mut before, scale) = segment_by_labels(pre, labels);
         let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
+        let on_template = |p| fit.atlas_from_subject.apply(p);
+        let left_out = LeftOut::of(&before.brain_mni, &before.known_mni, on_template).noted(GivenBrain::Labels);
+        before.warnings.extend(left_out);
         return Ok((before, fit, scale));
     }
     let head = segment_head(pre, &masks, &settings.deformable, &settings.segment);
     let (before, fit) = head.map_err(in_pre)?;
     Ok((before, fit, Scale { turned_at: None }))
+}
+
+/// Whether white matter is the brighter tissue in one of the scans alone, where a label map of the first lies: two weightings (a T1 and
+/// a FLAIR), whose folds are not each other's opposite as a T1's and a T2's are.
+fn tissues_exchanged(pre: &PosedScan<'_, Pre>, post: &PosedScan<'_, Post>, labels: &LabelMap<Pre>) -> bool {
+    /// Of grey matter's intensity: closer together neither tissue is the brighter one.
+    const APART: f64 = 0.05;
+    let contrast = |scan: &Volume<f32, Mni>, known: &Mask<Mni>| {
+        let labels = labels_on(labels, &scan.grid, &pre.mni_from_t1.inverse());
+        let [grey, white] = [label::GREY_MATTER, label::WHITE_MATTER].map(|tissue| {
+            let (mut sum, mut count) = (0.0, 0.0f64);
+            for n in (0..scan.data.len()).filter(|&n| known.data[n] && labels.data[n] == tissue) {
+                sum += f64::from(scan.data[n]);
+                count += 1.0;
+            }
+            sum / count.max(1.0)
+        });
+        (white - grey) / grey.max(1e-6)
+    };
+    let (before, after) = (contrast(pre.on_template(), pre.known()), contrast(post.on_template(), post.known()));
+    before.abs().min(after.abs()) > APART && before * after < 0.0
 }
 
 /// How much of a cavity drawn by hand shows after the operation what it showed before, percent; `None` where that is little

@@ -1,6 +1,7 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::confidence::evidence;
+use super::coverage::{GivenBrain, LeftOut};
 use super::overhang::{beyond, onto_the_brain, short};
 use super::posed_scan::PosedScan;
 use super::segmentation::{FoundBrain, find_brain, labelled};
@@ -294,6 +295,8 @@ pub fn segment_head<F: Frame>(
     segmentation.regions = evidence(&segmentation.labels_mni, &segmentation.t1_mni, on_template);
     segmentation.warnings.extend(gaps.unwrap_or_default());
     if overrides.brain.is_some() {
+        let left_out = LeftOut::of(&segmentation.brain_mni, &segmentation.known_mni, on_template);
+        segmentation.warnings.extend(left_out.noted(GivenBrain::Mask));
         return Ok((segmentation, carried.fit));
     }
     if outside.share > DOUBTFUL_SHARE || outside.worst.is_some() {

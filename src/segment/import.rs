@@ -47,8 +47,9 @@ pub enum ImportError {
     /// A tumour's map, not a brain's.
     #[error(
         "it labels {cc:.0} cc with {} alone: that is a map of a tumour (BraTS: 1 core, 2 oedema, 3 or 4 enhancing tumour), where a \
-         map of the whole brain is asked for; give the brain's labels (of FreeSurfer, SynthSeg or `hgm segment`) with the tumour \
-         drawn into them under numbers of its own (in hgm's table 6 is tumour, 7 oedema)",
+         map of the whole brain is asked for; give the brain's labels with the tumour drawn into them under numbers of its own: 6 \
+         (tumour) and 7 (oedema) in a map that `hgm segment` has made; with another tool's map a table of all its numbers says which is \
+         the tumour's",
         listed(codes)
     )]
     Tumour {
@@ -239,8 +240,16 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
     if ventricle > 1.0 && ventricle_open > 0.35 {
         return Some("its ventricles lie at the surface of the brain".to_owned());
     }
-    if ventricle > 1.0 && cc(label::CSF) > OUTER_CSF_CC && deeper(labels, label::CSF, label::VENTRICLE) {
-        return Some("its fluid outside the ventricles lies deeper than its ventricles do".to_owned());
+    if ventricle > 1.0 {
+        let [fluid_mm, ventricle_mm] = depths_mm(labels, [label::CSF, label::VENTRICLE]);
+        if ventricle_mm < SHALLOW_MM {
+            return Some(format!(
+                "half of what it calls ventricles lies less than {ventricle_mm:.0} mm below the brain's surface: that is fluid of the sulci"
+            ));
+        }
+        if cc(label::CSF) > OUTER_CSF_CC && fluid_mm > ventricle_mm {
+            return Some("its fluid outside the ventricles lies deeper than its ventricles do".to_owned());
+        }
     }
     if white_open > grey_open {
         return Some("its white matter lies at the surface more than its grey matter does".to_owned());
@@ -251,10 +260,13 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
 /// Fluid of this much is not the fourth ventricle alone, cc: sulci and cisterns are drawn.
 const OUTER_CSF_CC: f64 = 30.0;
 
-/// Whether one label lies deeper in the head than another, by the medians of their distances to the outside.
-fn deeper<F: Frame>(labels: &LabelMap<F>, one: u8, other: u8) -> bool {
+/// Ventricles lie deeper than this, by their median, mm: the mantle around wide ones may be thinner, their middle is not so near.
+const SHALLOW_MM: f32 = 10.0;
+
+/// How deep labels lie in the head, by the medians of their distances to the outside, mm; 0 for one that is not there.
+fn depths_mm<F: Frame, const N: usize>(labels: &LabelMap<F>, of: [u8; N]) -> [f32; N] {
     let outside = labels.map(|l| l == label::BACKGROUND);
-    let Some(around) = outside.map(|x| !x).bounding_box() else { return false };
+    let Some(around) = outside.map(|x| !x).bounding_box() else { return [0.0; N] };
     let around = around.grown(&labels.grid, 2.0);
     let (labels, depth) = (labels.cropped(&around), distance_mm(&outside.cropped(&around)));
     let median = |l: u8| {
@@ -262,7 +274,7 @@ fn deeper<F: Frame>(labels: &LabelMap<F>, one: u8, other: u8) -> bool {
         let middle = own.len() / 2;
         if own.is_empty() { 0.0 } else { *own.select_nth_unstable_by(middle, f32::total_cmp).1 }
     };
-    median(one) > median(other)
+    of.map(median)
 }
 
 /// The share of a label's faces to other labels that look at the background or at `also`.

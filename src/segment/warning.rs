@@ -1,5 +1,6 @@
 //! What is told of a segmentation that does not stop the work.
 
+use super::coverage::GivenBrain;
 use super::overhang::VaultPart;
 use super::region::Region;
 use crate::geometry::Frame;
@@ -78,6 +79,28 @@ pub enum SegmentWarning {
         /// Share of that layer there, in percent.
         percent: f64,
     },
+    /// A brain that was given leaves out parts of the one that the fitted template expects.
+    #[error(
+        "the {given} leaves out {percent:.0} % of the brain that the fitted template expects{}: is it of this scan, and whole?",
+        if parts.is_empty() { String::new() } else { format!(" ({})", in_words(parts, "of it")) }
+    )]
+    LeavesOut {
+        /// What was given.
+        given: GivenBrain,
+        /// Share of the whole brain, in percent.
+        percent: f64,
+        /// The parts that miss most, percent of each.
+        parts: Vec<(Region, f64)>,
+    },
+    /// Scans that do not look like one head, taken for one since a cavity was drawn by hand.
+    #[error(
+        "the two scans do not look like one head (once one lies on the other their folds correlate by {folds:.2}; one head: .9 and \
+         more): two people, two weightings, or the registration failed; nothing but the masks that were given says that they are one"
+    )]
+    UnlikeScans {
+        /// The correlation of their folds.
+        folds: f64,
+    },
     /// A cavity drawn by hand holds tissue.
     #[error(
         "{percent:.0} % of the tissue under the cavity mask looks as it did before the operation: is the mask of this scan, and on \
@@ -125,6 +148,10 @@ pub enum SegmentWarning {
     },
 }
 
+/// A cavity drawn by hand that holds so much of the tissue that was there before is of another place or scan, percent; one full of blood
+/// has half of its tissue's brightness at most.
+const STILL_THERE_PERCENT: f64 = 85.0;
+
 /// So much of a cavity's outside at the scan's edge hides a tenth of the cavity and more, percent: of a ball, the disc where a
 /// plane cuts that part off.
 const HIDDEN_PERCENT: f64 = 16.0;
@@ -136,9 +163,14 @@ impl SegmentWarning {
         Self::BlankSlices { first: gap.slices.start, last: gap.slices.end - 1, axis: gap.axis, thickness_mm }
     }
 
-    /// Whether the cavity, and what was resected, cannot be believed for it.
-    pub fn belies_the_cavity(&self) -> bool {
-        matches!(self, Self::CavityAtEdge { percent } if *percent >= HIDDEN_PERCENT)
+    /// Whether brain or cavity, and what follows from them, cannot be believed for it.
+    pub fn belies_the_masks(&self) -> bool {
+        match self {
+            Self::CavityAtEdge { percent } => *percent >= HIDDEN_PERCENT,
+            Self::UnchangedCavity { percent } => *percent >= STILL_THERE_PERCENT,
+            Self::LeavesOut { given, percent, parts } => given.is_of_another_brain(parts, *percent),
+            _ => false,
+        }
     }
 }
 

@@ -112,7 +112,7 @@ impl Case {
     }
 
     fn field_of(&self, file: &str, name: &str) -> Result<Field, WorkflowError> {
-        let state = vtu::decode(&self.read(file)?, file)?;
+        let state = vtu::decode(&self.read_made(file)?, file)?;
         let found = state.point_field(name).or_else(|| state.cell_fields.iter().find(|field| field.name == name));
         let none = || CaseError::NoField { folder: self.folder.clone(), name: name.to_owned() };
         Ok(found.cloned().ok_or_else(none)?)
@@ -129,12 +129,14 @@ impl Case {
     /// Whether its masks are to be believed.
     ///
     /// # Errors
-    /// [`WorkflowError::QualityGate`] with a sentence per mask; only a patient's are asked.
+    /// [`WorkflowError::QualityGate`] with a sentence per mask; a phantom's are not asked.
     pub fn image_gate(&self) -> Result<(), WorkflowError> {
-        if self.subject() != Some(Subject::Patient) {
-            return Ok(());
-        }
-        let (_, Implausible { implausible }) = self.stage(&StageName::Anat)?;
+        let stage = match self.subject() {
+            Some(Subject::Patient) => StageName::Anat,
+            Some(Subject::Plan) => StageName::Plan,
+            _ => return Ok(()),
+        };
+        let (_, Implausible { implausible }) = self.stage(&stage)?;
         if implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(implausible)) }
     }
 

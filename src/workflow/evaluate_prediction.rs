@@ -87,7 +87,7 @@ pub fn evaluate_prediction(folder: &Path, seen: &SeenAfterwards) -> Result<Predi
     case.check_outcome()?;
     let (_, prediction): (_, Prediction) = case.stage(&StageName::Predict)?;
     let mut evaluation = PredictionEvaluation {
-        prediction_sha256: sha256_hex(&case.read(PREDICTION_JSON)?),
+        prediction_sha256: sha256_hex(&case.read_made(PREDICTION_JSON)?),
         ..PredictionEvaluation::default()
     };
     let mut field = None;

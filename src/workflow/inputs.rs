@@ -132,6 +132,7 @@ impl OwnMasks {
         let read = |role: MaskRole, path: &Option<PathBuf>| {
             path.as_deref().map(|path| given_mask(role, path, scans, work)).transpose()
         };
+        labels_alone(inputs.dseg.as_deref(), [&inputs.brain_mask, &inputs.ventricle_mask])?;
         let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), &scans.pre, work));
         let pose = inputs.pose.as_deref().map(given_pose);
         Ok(Self {
@@ -161,6 +162,15 @@ impl OwnMasks {
         let masks =
             masks.into_iter().filter_map(|(role, mask)| mask.as_ref().map(|(_, bytes)| (role, bytes.as_slice())));
         masks.chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
+    }
+}
+
+/// Refuses masks of brain and ventricles beside a label map that says both.
+pub(super) fn labels_alone(dseg: Option<&Path>, [brain, ventricle]: [&Option<PathBuf>; 2]) -> Result<(), InputError> {
+    let mut beside = [(MaskRole::Brain, brain), (MaskRole::Ventricle, ventricle)].into_iter();
+    match beside.find(|(_, mask)| mask.is_some()).filter(|_| dseg.is_some()) {
+        Some((role, _)) => Err(InputError::BesideLabels { role }),
+        None => Ok(()),
     }
 }
 

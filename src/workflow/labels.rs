@@ -18,7 +18,7 @@ enum Choice {
 }
 
 fn choice(word: &str) -> Result<Choice, WorkflowError> {
-    let tables = named(word);
+    let tables = named(&word.to_lowercase());
     if !tables.is_empty() {
         return Ok(Choice::BuiltIn(tables));
     }
@@ -138,5 +138,19 @@ pub fn any_labels(
     if let Some(&LabelCount { code, .. }) = counts.iter().find(|c| c.code > 255) {
         return Err(LabelMapError::TooLarge { name: name.to_owned(), code }.into());
     }
+    let table: Vec<&LabelTable> = named("hgm");
+    let structure = |code: u32| table.iter().find_map(|table| table.structure(code));
+    let names: Option<Vec<String>> = counts
+        .iter()
+        .filter(|c| c.code != 0)
+        .map(|c| Some(format!("{} as {}", c.code, structure(c.code)?.name)))
+        .collect();
+    progress.taken_for(&match names {
+        Some(names) => format!(
+            "{name}: taken for hgm's own numbers ({}): say whose they are where they are another tool's, or a mask's",
+            names.join(", ")
+        ),
+        None => format!("{name}: numbers of no tool that is known, meshed as they are"),
+    });
     Ok(codes.map(|code| code as u8))
 }

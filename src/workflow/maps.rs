@@ -3,6 +3,7 @@
 use super::case::Case;
 use super::error::{CaseError, WorkflowError};
 use super::facts::MeshFacts;
+use super::made_files::MadeFiles;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::stages::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, lesions, transforms};
@@ -11,8 +12,8 @@ use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
 use crate::image::nifti::{self, ReadOptions, decode_displacement};
 use crate::image::{Grid, Mask, Volume};
 use crate::layout::{
-    ESTIMATE_STATE, NATIVE_RESECTED, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN, PRE_FROM_POST_FIELD, PRE_NATIVE_BRAIN,
-    SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
+    ESTIMATE_STATE, MNI_FROM_PRE_TEXT, NATIVE_RESECTED, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN, PRE_FROM_POST_FIELD,
+    PRE_FROM_POST_TEXT, PRE_NATIVE_BRAIN, SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
 };
 use crate::overlay::{Carried, PointState};
 use crate::segment::atlas;
@@ -73,6 +74,10 @@ impl Map {
 
     /// The map of a case in a state.
     pub fn of_case(case: &Case, state: Option<&str>, to: WarpTo, part: Part) -> Result<(Self, String), WorkflowError> {
+        let made = MadeFiles::of(case);
+        for file in [PRE_FROM_POST_TEXT, MNI_FROM_PRE_TEXT] {
+            made.read(file)?;
+        }
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         if to == WarpTo::Mni {
             let rigid = AffineTransform::from_matrix(&mni_from_pre.to_matrix());
@@ -89,16 +94,16 @@ impl Map {
         let file = family.of(&state);
         let options = ReadOptions::default();
         let mask_of = |file: &str| -> Result<Mask<Native>, WorkflowError> {
-            let (mask, _) = nifti::decode_labels(&case.read(file)?, file, &options)?;
+            let (mask, _) = nifti::decode_labels(&made.read(file)?, file, &options)?;
             Ok(mask.map(|l| l > 0))
         };
         let taken = || mask_of(NATIVE_RESECTED);
         let ((field, sd, believed), taken) = if case.path(&file).exists() {
-            let vectors = || -> Result<_, WorkflowError> { Ok(decode_displacement(&case.read(&file)?, &file)?) };
+            let vectors = || -> Result<_, WorkflowError> { Ok(decode_displacement(&made.read(&file)?, &file)?) };
             let others = || -> Result<_, WorkflowError> {
                 let of = SHIFT_SD.of(&state);
                 let sd = (part == Part::Points).then(|| -> Result<_, WorkflowError> {
-                    Ok(nifti::decode_intensities(&case.read(&of)?, &of, &options)?)
+                    Ok(nifti::decode_intensities(&made.read(&of)?, &of, &options)?)
                 });
                 Ok((sd.transpose()?, mask_of(&SHIFT_MASK.of(&state))?, taken()?))
             };
@@ -106,6 +111,7 @@ impl Map {
             let (sd, mask, taken) = others?;
             ((field?, sd, mask), taken)
         } else {
+            made.check()?;
             (computed(case, &state, family, to)?, taken()?)
         };
         let rigid = match to {

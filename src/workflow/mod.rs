@@ -35,6 +35,7 @@ mod labels;
 mod law_fitting;
 mod layer;
 mod lock;
+mod made_files;
 mod maps;
 mod meshing;
 mod outcome;
@@ -118,6 +119,7 @@ use crate::artefact::check_writable;
 use crate::experiment::compare::Comparison;
 use crate::layout;
 use lock::Lock;
+use made_files::MadeFiles;
 use patient::{Images, Patient, Prepared};
 use phantom::Phantom;
 use stages::SampleMode;
@@ -319,6 +321,7 @@ pub fn report(place: &Place) -> Result<Case, WorkflowError> {
     }
     let _alone = Lock::take(&place.folder, true)?;
     case.check_outcome()?;
+    MadeFiles::of(&case).check()?;
     outcome::write_page(&case)?;
     Ok(case)
 }

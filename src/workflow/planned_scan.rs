@@ -1,7 +1,7 @@
 //! The files a user gives before an operation: one scan, the plan, points, masks of their own.
 
 use super::error::{MaskRole, WorkflowError};
-use super::inputs::{given_labels, given_pose, read_mask_of};
+use super::inputs::{given_labels, given_pose, labels_alone, read_mask_of};
 use super::planned_resection::PlannedResection;
 use super::user_file::{read_input, shown};
 use super::warning::{Warning, all_of};
@@ -86,6 +86,7 @@ impl PlannedScan {
     /// Reads everything that was given. Comes before any stage: what cannot be used leaves nothing behind.
     pub fn read(inputs: &PlanInputs, work: &Work<'_>) -> Result<Self, WorkflowError> {
         let options = &work.settings.image;
+        labels_alone(inputs.dseg.as_deref(), [&inputs.brain_mask, &inputs.ventricle_mask])?;
         let bytes = read_input(&inputs.pre)?;
         let scan = nifti::decode_scan(&bytes, &format!("pre-operative scan {}", shown(&inputs.pre)), options)?;
         let mut warnings: Vec<Warning> = all_of("pre", &scan.warnings).collect();

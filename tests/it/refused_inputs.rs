@@ -121,6 +121,15 @@ fn masks_that_fit_neither_scan_are_refused_before_anything_is_written() {
             refuses(&arguments, name, words, &path("case"));
         }
     }
+    // Which of the two would count is not guessed.
+    std::fs::write(path("ones.nii.gz"), packed(&filled(&plain, 1), 1)).unwrap();
+    for (option, role) in [("--brain-mask", "brain mask"), ("--ventricle-mask", "ventricle mask")] {
+        let (pre, post, ones) = (pre.to_str().unwrap(), post.to_str().unwrap(), path("ones.nii.gz"));
+        let pair = ["prep", pre, post, "--dseg", &ones, option, &ones, "-o", &path("case")];
+        refuses(&pair, role, &["label map", "leave one of the two out"], &path("case"));
+        let plan = ["predict", pre, "--resection", &ones, "--dseg", &ones, option, &ones, "-o", &path("case")];
+        refuses(&plan, role, &["label map"], &path("case"));
+    }
 }
 
 #[test]

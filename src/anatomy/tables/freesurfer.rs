@@ -2,7 +2,8 @@
 //!
 //! Numbers and names: `distribution/FreeSurferColorLUT.txt` of the FreeSurfer sources. The fourth ventricle is CSF here,
 //! because hgm's ventricle is the lateral and third ones. Cavum septi (5th) lies between the lateral ones and belongs to
-//! them. The ventral diencephalon is mixed; FreeSurfer itself counts it as subcortical grey.
+//! them. The ventral diencephalon is mixed; FreeSurfer itself counts it as subcortical grey. Not here: 6 and 45, an outline of the
+//! cerebellum that no map of a volume holds; a 6 in a map of FreeSurfer's is somebody's tumour in hgm's number.
 
 use crate::anatomy::table::{LabelTable, Tissue};
 use Tissue::{Csf, Grey, Outside, Ventricle, White};
@@ -14,7 +15,6 @@ pub(super) const SUBCORTICAL: &[(u32, &str, Tissue)] = &[
     (3, "Left-Cerebral-Cortex", Grey),
     (4, "Left-Lateral-Ventricle", Ventricle),
     (5, "Left-Inf-Lat-Vent", Ventricle),
-    (6, "Left-Cerebellum-Exterior", Grey),
     (7, "Left-Cerebellum-White-Matter", White),
     (8, "Left-Cerebellum-Cortex", Grey),
     (9, "Left-Thalamus", Grey),
@@ -40,7 +40,6 @@ pub(super) const SUBCORTICAL: &[(u32, &str, Tissue)] = &[
     (42, "Right-Cerebral-Cortex", Grey),
     (43, "Right-Lateral-Ventricle", Ventricle),
     (44, "Right-Inf-Lat-Vent", Ventricle),
-    (45, "Right-Cerebellum-Exterior", Grey),
     (46, "Right-Cerebellum-White-Matter", White),
     (47, "Right-Cerebellum-Cortex", Grey),
     (48, "Right-Thalamus", Grey),

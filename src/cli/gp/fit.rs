@@ -31,7 +31,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.model.get() == GenerativeModel::StudyLevel {
+    if args.model.model == GenerativeModel::StudyLevel {
         return study_level(args, session);
     }
     let mut flags = Layer::default();

@@ -23,26 +23,15 @@ pub struct StudyOptions {
 /// The generative model that is asked.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ModelOption {
-    /// The paper's Gaussian process, or the model of how studies and people differ [default: published]
-    #[arg(long, value_name = "published|study-level")]
-    model: Option<GenerativeModel>,
-}
-
-impl ModelOption {
-    /// Which one.
-    pub fn get(&self) -> GenerativeModel {
-        self.model.unwrap_or_default()
-    }
+    /// The paper's Gaussian process, or the model of how studies and people differ
+    #[arg(long, value_name = "published|study-level", default_value = "published")]
+    pub model: GenerativeModel,
 }
 
 /// Refuses an option that the chosen model has no use for.
 pub fn only_with(given: bool, option: &str, model: &str) -> Result<(), Failure> {
-    if given {
-        return Err(Failure::Rejected(anyhow!(
-            "{option} belongs to --model {model}: leave it out, or choose that model"
-        )));
-    }
-    Ok(())
+    let refused = || anyhow!("{option} belongs to --model {model}: leave it out, or choose that model");
+    if given { Err(Failure::Rejected(refused())) } else { Ok(()) }
 }
 
 /// Which hyperparameters.

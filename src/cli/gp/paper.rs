@@ -1,9 +1,9 @@
 //! `hgm gp paper`: every figure and table of the paper.
 
+use super::emit;
 use crate::cli::{Failure, Session};
 use crate::mesh::engine::Engine;
 use crate::workflow::{Layer, paper};
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Every figure and table of the paper in one command, beside the printed numbers, with what differs and why
@@ -28,7 +28,5 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("mesh.size.cells", Some(args.cells));
     flags.set("phantom.tissues", Some(1));
     let settings = session.settings(flags)?;
-    let made = paper(&session.place(&args.output), &settings, &mut *session.listener())?;
-    let files = made.names();
-    session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &files.join("\n"))
+    emit(paper(&session.place(&args.output), &settings, &mut *session.listener())?, session)
 }

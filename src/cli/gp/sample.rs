@@ -58,11 +58,11 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
+    let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };
     let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
-    if args.model.get() == GenerativeModel::StudyLevel {
+    if args.model.model == GenerativeModel::StudyLevel {
         only_with(args.spread.is_some(), "--spread", "published")?;
         let own = args.hyperparameters.study_level()?;
-        let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };
         let wanted = match args.draws {
             None => Expected::Levels(args.levels.clone()),
             Some(count) => Expected::Draws { count, curves: args.curves },
@@ -72,8 +72,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return emit(sample_study_level(&studies, what, &wanted, how, seed, place)?, seed, session);
     }
     only_with(args.of.is_some(), "--of", "study-level")?;
-    let hyperparameters = args.hyperparameters.read()?;
-    let settings = SampleSettings { hyperparameters, model: args.law, stretches: usize::from(args.stretches), ..base };
+    let settings = SampleSettings { hyperparameters: args.hyperparameters.read()?, ..settings };
     let wanted = match args.draws {
         None => Wanted::Levels(args.levels.clone()),
         Some(count) => Wanted::Draws { count, spread: args.spread.unwrap_or_default(), curves: args.curves },

@@ -1,10 +1,10 @@
 //! `hgm gp show`: the paper's figures, table and tests.
 
+use super::emit;
 use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
 use crate::cli::{Failure, Session};
 use crate::material::generative::{GenerativeModel, SampleSettings};
-use crate::workflow::{GenerativeFiles, show_gp, show_study_level};
-use serde_json::json;
+use crate::workflow::{show_gp, show_study_level};
 use std::path::PathBuf;
 
 /// Figures of the posterior and of the meta-models, shear moduli per task, tests between the laws
@@ -33,20 +33,12 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
-    if args.model.get() == GenerativeModel::StudyLevel {
+    if args.model.model == GenerativeModel::StudyLevel {
         only_with(!args.models.is_empty(), "--models", "published")?;
         let own = args.hyperparameters.study_level()?;
-        let made = show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?;
-        return emit(made, session);
+        return emit(show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?, session);
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters: args.hyperparameters.read()?, ..base };
-    let made = show_gp(&studies, &args.models, &settings, (&args.output, session.options.force))?;
-    emit(made, session)
-}
-
-fn emit(mut made: GenerativeFiles, session: &Session) -> Result<(), Failure> {
-    let (text, files) = (made.take_text(), made.names());
-    let shown = format!("{text}\n{}", files.join("\n"));
-    session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &shown)
+    emit(show_gp(&studies, &args.models, &settings, (&args.output, session.options.force))?, session)
 }

@@ -1,8 +1,7 @@
 //! `hgm gp studies`: the literature table.
 
 use crate::cli::{Failure, Session};
-use crate::material::literature::{LiteratureModel, STUDIES_CSV, citation, table};
-use serde_json::{Value, json};
+use crate::material::literature::{STUDIES_CSV, listed, table};
 
 /// Print the literature table (CSV), whose columns a table of your own takes
 ///
@@ -14,12 +13,5 @@ use serde_json::{Value, json};
 pub struct Args {}
 
 pub fn run(_args: &Args, session: &Session) -> Result<(), Failure> {
-    let studies = table();
-    let study = |model: &LiteratureModel| -> Value {
-        json!({
-            "id": model.id, "study": model.study, "task": model.task.to_string(), "citation": citation(model),
-            "stretch_window": model.stretch_window, "confidence": model.confidence, "note": model.note,
-        })
-    };
-    session.emit(&studies.iter().map(study).collect::<Vec<_>>(), STUDIES_CSV)
+    session.emit(&table().iter().map(listed).collect::<Vec<_>>(), STUDIES_CSV)
 }

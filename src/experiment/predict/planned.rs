@@ -132,8 +132,17 @@ pub fn assumptions(
     found: &Prediction,
 ) -> Vec<String> {
     let stiffness = prior.source_of(&settings.tissue_list());
+    let pressures: Vec<String> =
+        own.pressure.iter().map(|load| format!("{} Pa on the {}", load.pressure_pa, load.set)).collect();
+    let besides = if pressures.is_empty() {
+        String::new()
+    } else {
+        format!(" Besides its weight it is under a pressure that is taken as known: {}.", pressures.join(", "))
+    };
     let mut said = vec![
-        "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.".to_owned(),
+        format!(
+            "The planned tissue is taken out and nothing else is done to the brain: no swelling, no retraction, no bleeding.{besides}"
+        ),
         match settings.drained.or(own.csf.as_ref().map(|csf| csf.drained)) {
             _ if settings.fluid_level.is_some() => level_in_words(settings, found),
             Some(part) => format!(
@@ -165,7 +174,7 @@ pub fn assumptions(
             at(Z_95)
         ));
     }
-    said.extend(found.supports_in_words());
+    said.extend(found.supports_in_words(&own.fixed));
     if found.slides() && own.skull.gap_mm > 0.0 {
         said.push(format!(
             "Where it slides, the skull stands about {} mm off it, give or take a factor of {:.1}; it pushes back and never pulls.",
@@ -198,6 +207,7 @@ mod tests {
     use super::super::known_level::KnownLevel;
     use super::super::support::SupportWeight;
     use super::*;
+    use crate::fem::PressureLoad;
     use crate::geometry::Mni;
     use crate::image::Grid;
     use crate::segment::label;
@@ -280,6 +290,13 @@ mod tests {
             assert!(sliding.contains(words), "{words}: {sliding}");
         }
         assert!(!told(Supports::Fixed, &settings).contains("skull stands"));
+        assert!(told(Supports::Fixed, &settings).contains("held at its base and at the falx"));
+        let pressure = vec![PressureLoad { set: "ventricle".to_owned(), pressure_pa: 1500.0 }];
+        let own = ResectionSettings { pressure, fixed: vec!["base".to_owned()], ..ResectionSettings::default() };
+        let way = SupportWeight { supports: Supports::Fixed.name().to_owned(), weight: 1.0 };
+        let found = Prediction { supports: vec![way], ..Prediction::default() };
+        let loaded = assumptions(&settings, (&own, &PriorSettings::default()), &found).join(" ");
+        assert!(loaded.contains("1500 Pa on the ventricle") && loaded.contains("held at its base (weight"), "{loaded}");
         let drained = PredictSettings { drained: Some(0.3), ..settings };
         assert!(
             told(Supports::Fixed, &drained)

@@ -2,7 +2,7 @@
 
 use super::head::Head;
 use super::known_level::KnownLevel;
-use crate::experiment::resection::{CsfSettings, TISSUE_KG_PER_M3};
+use crate::experiment::resection::{CsfSettings, ResectionSettings, Supports, TISSUE_KG_PER_M3};
 use crate::experiment::setting::{SettingError, first_broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -135,6 +135,41 @@ impl PredictSettings {
             ("fixed_weight and sliding_weight", &weights, weigh, "0 or more, and not both 0"),
         ])
     }
+
+    /// Refuses what a patient's loads make of these settings: `own` is the table `[resection]`, whose settings are named as they stand
+    /// there.
+    ///
+    /// # Errors
+    /// The first setting of either table that no prediction can be made with.
+    pub fn check_with(&self, own: &ResectionSettings) -> Result<(), SettingError> {
+        let own_weight = self.drained.is_some() || self.fluid_level.is_some();
+        let fluid = own.csf.clone().unwrap_or_default().density_kg_per_m3;
+        let (tissue, drained) = (self.tissue_density_kg_per_m3, own.csf.as_ref().map_or(1.0, |csf| csf.drained));
+        let effective = own.density_kg_per_m3;
+        let held = own.supports == Supports::Sliding || !own.fixed.is_empty();
+        first_broken(&[
+            (
+                "resection.density_kg_per_m3",
+                &effective,
+                own_weight || effective > 0.0,
+                "above 0: a prediction is of a brain that sinks under a weight",
+            ),
+            (
+                "resection.csf.drained",
+                &drained,
+                own_weight || drained > 0.0,
+                "above 0: with all of the fluid left nothing sinks, and a factor either way of nothing is nothing",
+            ),
+            (
+                "predict.tissue_density_kg_per_m3",
+                &tissue,
+                !own_weight || tissue >= fluid,
+                "at least the fluid's density (`density_kg_per_m3` of the table [resection.csf], 1007 where that is left out): lighter tissue \
+                 floats",
+            ),
+            ("resection.fixed", &own.fixed, held, "one set or more: a brain that nothing holds falls"),
+        ])
+    }
 }
 
 #[cfg(test)]
@@ -166,5 +201,31 @@ mod tests {
         for (name, change) in cases {
             assert!(of(change).unwrap_err().contains(name), "{name}");
         }
+    }
+
+    #[test]
+    fn what_the_patients_own_loads_make_impossible_is_refused_by_name() {
+        let fluid = |density_kg_per_m3, drained| Some(CsfSettings { density_kg_per_m3, drained });
+        let own = ResectionSettings::default();
+        let tissue = ResectionSettings { density_kg_per_m3: 1040.0, ..own.clone() };
+        let drained = PredictSettings { drained: Some(0.3), ..PredictSettings::default() };
+        let light = PredictSettings { tissue_density_kg_per_m3: 1010.0, ..drained.clone() };
+        let plain = PredictSettings::default();
+        let cases = [
+            (&plain, ResectionSettings { density_kg_per_m3: 0.0, ..own.clone() }, "resection.density_kg_per_m3"),
+            (&plain, ResectionSettings { csf: fluid(1007.0, 0.0), ..tissue.clone() }, "resection.csf.drained"),
+            (
+                &light,
+                ResectionSettings { csf: fluid(1035.0, 0.3), ..tissue.clone() },
+                "predict.tissue_density_kg_per_m3",
+            ),
+            (&plain, ResectionSettings { fixed: Vec::new(), ..own.clone() }, "resection.fixed"),
+        ];
+        for (settings, own, name) in cases {
+            assert_eq!(settings.check_with(&own).unwrap_err().name, name);
+        }
+        assert_eq!(plain.check_with(&own), Ok(()));
+        assert_eq!(drained.check_with(&ResectionSettings { csf: fluid(1007.0, 0.0), ..tissue }), Ok(()));
+        assert_eq!(light.check_with(&own), Ok(()));
     }
 }

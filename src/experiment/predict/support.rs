@@ -1,5 +1,6 @@
 //! A way of supporting the brain with its weight among draws.
 
+use crate::tag::BASE;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,9 +20,16 @@ impl SupportWeight {
         self.supports == "sliding"
     }
 
-    /// What the skull does, and how much that counts.
-    pub(super) fn in_words(&self) -> String {
-        let what = if self.slides() { "slides on the skull" } else { "is held at its base and at the falx" };
+    /// What the skull does, and how much that counts; `held` are the sets that do not move where it holds the brain.
+    pub(super) fn in_words(&self, held: &[String]) -> String {
+        let what =
+            if self.slides() { "slides on the skull".to_owned() } else { format!("is held at {}", places(held)) };
         format!("it {what} (weight {:.0} %)", 100.0 * self.weight)
     }
+}
+
+/// "its base and at the falx".
+fn places(sets: &[String]) -> String {
+    let place = |set: &String| if set == BASE { "its base".to_owned() } else { format!("the {set}") };
+    sets.iter().map(place).collect::<Vec<_>>().join(" and at ")
 }

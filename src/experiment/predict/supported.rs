@@ -17,9 +17,10 @@ impl Prediction {
     }
 
     /// How the skull holds the brain: a sentence, or one for each head where a way was left out of some.
-    pub(super) fn supports_in_words(&self) -> Vec<String> {
+    /// `held`: see [`SupportWeight::in_words`].
+    pub(super) fn supports_in_words(&self, held: &[String]) -> Vec<String> {
         let of = |with: String, used: &[SupportWeight]| {
-            let ways = used.iter().map(SupportWeight::in_words).collect::<Vec<_>>().join(", or ");
+            let ways = used.iter().map(|way| way.in_words(held)).collect::<Vec<_>>().join(", or ");
             let left_out = used.len() < self.supports.len();
             let rest = if left_out {
                 " Held otherwise it finds no equilibrium under these loads; that is left out."
@@ -69,14 +70,16 @@ mod tests {
     #[test]
     fn the_weights_told_are_those_of_the_draws_head_by_head() {
         let (both, held): (&[_], &[_]) = (&[("fixed", 0.5), ("sliding", 0.5)], &[("fixed", 1.0)]);
-        let said = |heads: &[(&str, &[(&str, f64)])]| predicted(heads).supports_in_words();
+        let said = |heads: &[(&str, &[(&str, f64)])]| predicted(heads).supports_in_words(&["base".to_owned()]);
         let all = said(&[("supine", both), ("left", both)]);
         assert!(all.len() == 1 && all[0].contains("50 %") && !all[0].contains("left out"), "{all:?}");
         let lost = said(&[("supine", held)]);
         assert!(lost.len() == 1 && lost[0].contains("100 %") && lost[0].contains("left out"), "{lost:?}");
         let unlike = said(&[("supine", both), ("left", held)]);
         assert!(
-            unlike.len() == 2 && unlike[0].contains("50 %") && unlike[1].contains("head left: it is held"),
+            unlike.len() == 2
+                && unlike[0].contains("50 %")
+                && unlike[1].contains("head left: it is held at its base (weight"),
             "{unlike:?}"
         );
         assert!(predicted(&[("supine", both), ("left", held)]).slides() && !predicted(&[("left", held)]).slides());

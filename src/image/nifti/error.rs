@@ -22,6 +22,15 @@ pub enum NiftiProblem {
         /// How to convert what the name suggests.
         hint: &'static str,
     },
+    /// Numbers are missing within the image.
+    #[error(
+        "voxels: {cc:.1} cc within the image are NaN or infinite, so that nothing is known of what lies there; export the scan again \
+         without masking or resampling it"
+    )]
+    Hole {
+        /// Their volume.
+        cc: f64,
+    },
     /// Too short to hold any header.
     #[error("sizeof_hdr: the file holds {bytes} bytes, a NIfTI header needs 348; copy or export the file again")]
     TooShort {

@@ -21,6 +21,7 @@ pub use error::{NiftiError, NiftiProblem};
 pub use warning::NiftiWarning;
 pub use which::Orientation;
 
+use super::components::fill_holes;
 use super::grid::Grid;
 use super::volume::{LabelMap, Mask, Volume};
 use crate::geometry::Native;
@@ -51,6 +52,8 @@ pub struct NiftiImage {
     pub warnings: Vec<NiftiWarning>,
     /// Voxels that were NaN or infinite and are 0 now.
     pub nonfinite_voxels: usize,
+    /// How much of them lies within the image, not joined to its border, cc.
+    pub hole_cc: f64,
     /// Which affine the grid comes from.
     pub orientation: Orientation,
 }
@@ -73,7 +76,12 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
 /// # Errors
 /// As [`decode`].
 pub fn decode_scan(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiImage, NiftiError> {
+    /// A few voxels are a resampler's slip; more is a place of which nothing is known, which 0 would make fluid.
+    const LARGEST_HOLE_CC: f64 = 1.0;
     let mut image = decode(bytes, name, options)?;
+    if image.hole_cc > LARGEST_HOLE_CC {
+        return Err(refused(name, NiftiProblem::Hole { cc: image.hole_cc }));
+    }
     let floor = floor::counted_from_their_floor(&mut image.volume.data);
     image.warnings.extend(floor.map(|floor| NiftiWarning::BelowZero { floor: f64::from(floor) }));
     Ok(image)
@@ -247,15 +255,15 @@ fn read_checked(bytes: &[u8], mgh: bool, options: &ReadOptions) -> Result<NiftiI
         bytes[layout.first as usize..(layout.first + layout.bytes) as usize].to_vec()
     };
     let mut data = voxels(raw, &layout, &header, slope, intercept)?;
-    let mut nonfinite_voxels = 0;
-    for x in data.iter_mut().filter(|x| !x.is_finite()) {
-        *x = 0.0;
-        nonfinite_voxels += 1;
-    }
+    let nonfinite_voxels = data.par_iter().filter(|x| !x.is_finite()).count();
+    let mut hole_cc = 0.0;
     if nonfinite_voxels > 0 {
+        let finite = Volume::from_fn(grid, |n| data[n].is_finite());
+        hole_cc = fill_holes(&finite).volume_cc() - finite.volume_cc();
+        data.par_iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
         warnings.push(NiftiWarning::NotFinite { voxels: nonfinite_voxels });
     }
-    Ok(NiftiImage { volume: Volume::from_data(grid, data), warnings, nonfinite_voxels, orientation })
+    Ok(NiftiImage { volume: Volume::from_data(grid, data), warnings, nonfinite_voxels, hole_cc, orientation })
 }
 
 /// Voxels through the crate. The scaling is ours: the crate scales integers in the precision of the result.

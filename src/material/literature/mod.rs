@@ -11,7 +11,7 @@ mod table;
 
 pub use model::{Branches, Curve, Curves, LiteratureModel, Points};
 pub use studies::{Refusal, StudyError, merge, read_studies};
-pub use table::{STUDIES_CSV, citation, table};
+pub use table::{STUDIES_CSV, citation, listed, table};
 
 #[cfg(test)]
 mod tests;

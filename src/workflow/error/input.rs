@@ -55,6 +55,11 @@ pub enum InputError {
     )]
     SameVoxels { pre: PathBuf, post: PathBuf },
     #[error(
+        "a {role} was given beside a label map, which says where brain and ventricles are and would win: leave one of the two out, or \
+         draw the mask into the map"
+    )]
+    BesideLabels { role: MaskRole },
+    #[error(
         "{role} {name}: its grid ({} voxels) is that of neither scan (pre-operative {}, post-operative {}){}; resample \
          the mask onto one of them",
         size(*found), size(*pre), size(*post),

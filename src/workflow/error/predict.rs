@@ -1,6 +1,7 @@
 //! Why no prediction can be made.
 
 use crate::experiment::predict::{Head, LevelError, PlannedError, TaughtError};
+use crate::experiment::setting::SettingError;
 use crate::mesh::OpenSurface;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -11,6 +12,8 @@ use thiserror::Error;
 pub enum PredictError {
     #[error(transparent)]
     Plan(#[from] PlannedError),
+    #[error(transparent)]
+    Loads(#[from] SettingError),
     #[error(transparent)]
     Taught(#[from] TaughtError),
     #[error(

@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 24;
+const VERSION: u32 = 25;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -216,7 +216,13 @@ pub(crate) fn anat(
             side: found.side,
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),
             scans: quality,
-            implausible: after.warnings.iter().filter(|w| w.belies_the_cavity()).map(ToString::to_string).collect(),
+            implausible: before
+                .warnings
+                .iter()
+                .chain(&after.warnings)
+                .filter(|w| w.belies_the_masks())
+                .map(ToString::to_string)
+                .collect(),
         });
         Ok(produced)
     })

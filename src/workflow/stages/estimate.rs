@@ -52,9 +52,10 @@ impl EstimateOptions {
                 "`fluid` needs gravity, and this body is loaded without it (a phantom is pushed by a force); take it away",
             );
         }
-        if self.pressure && loads.pressure.is_empty() {
+        if self.pressure && (loads.pressure.is_empty() || loads.pressure.iter().any(|load| load.pressure_pa == 0.0)) {
             return Err(
-                "`pressure` needs a pressure to begin with: give one in [[resection.pressure]], or take it away",
+                "`pressure` needs pressures other than 0 to begin with, since how large each is, is estimated as a factor of it: \
+                        give them in [[resection.pressure]], or take it away",
             );
         }
         Ok(())

@@ -32,7 +32,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Plan;
 /// Less of a plan outside the brain is drawn generously.
 const NOTED_OUTSIDE: f64 = 0.1;
@@ -49,6 +49,9 @@ pub struct PlanFacts {
     /// How good the scan is.
     #[serde(default)]
     pub scans: ScanQualities,
+    /// What of its images is not to be believed.
+    #[serde(default)]
+    pub implausible: Vec<String>,
 }
 
 /// What later stages start from, as the case's files hold it.
@@ -155,6 +158,7 @@ pub(crate) fn plan(
             },
             plan: found,
             scans: ScanQualities { pre: Some(quality), post: None },
+            implausible: before.warnings.iter().filter(|w| w.belies_the_masks()).map(ToString::to_string).collect(),
         });
         Ok(produced)
     })?;

@@ -37,7 +37,7 @@ pub(crate) struct Predicted {
 pub(crate) fn read_draws(case: &Case, state: &str) -> Result<Predicted, WorkflowError> {
     let draws = read_table(case, state)?;
     let mesh = PREDICTED_STATE.of(state);
-    let read = vtu::decode(&case.read(&mesh)?, &mesh)?;
+    let read = vtu::decode(&case.read_made(&mesh)?, &mesh)?;
     let vectors = |name: &str| read.point_field(name).and_then(Field::vectors).ok_or_else(|| damaged(case, &mesh));
     let mean_mm = vectors("displacement")?;
     let count = draws.first().map_or(0, |draw| draw.coordinates.len());
@@ -54,7 +54,8 @@ pub(crate) fn read_table(case: &Case, state: &str) -> Result<Vec<DrawnState>, Wo
     if !case.path(&table).exists() {
         return Err(PredictError::NoDraws { folder: case.folder().to_path_buf(), file: table }.into());
     }
-    Ok(draws_from_csv(&case.read_text(&table)?).map_err(|_| damaged(case, &table))?)
+    let text = String::from_utf8(case.read_made(&table)?).map_err(|_| damaged(case, &table))?;
+    Ok(draws_from_csv(&text).map_err(|_| damaged(case, &table))?)
 }
 
 fn damaged(case: &Case, file: &str) -> CaseError {

@@ -1,8 +1,11 @@
 //! What is read all the same, and as what.
 
 use super::{File, NAME, gzip, read};
-use hgm::geometry::Position;
-use hgm::image::nifti::{NiftiProblem, NiftiWarning, ReadOptions, decode, decode_labels, decode_mask};
+use hgm::geometry::{Native, Position};
+use hgm::image::nifti::{
+    NiftiProblem, NiftiWarning, ReadOptions, decode, decode_labels, decode_mask, decode_scan, encode_f32,
+};
+use hgm::image::{Grid, Volume};
 use nalgebra::Point3;
 
 #[test]
@@ -70,6 +73,19 @@ fn nan_voxels_become_zero_and_are_counted() {
     }));
     assert_eq!((image.nonfinite_voxels, image.volume.data[3], image.volume.data[4]), (2, 0.0, 0.0));
     assert_eq!(image.warnings, [NiftiWarning::NotFinite { voxels: 2 }]);
+}
+
+#[test]
+fn a_scan_with_a_hole_is_refused_and_one_without_numbers_around_is_read() {
+    let scan = |from: usize| {
+        let grid = Grid::axis_aligned([30; 3], [1.0; 3], [0.0; 3]);
+        let within = |n: usize| grid.voxel(n).iter().all(|v| (from..from + 12).contains(v));
+        encode_f32(&Volume::<f32, Native>::from_fn(grid, |n| if within(n) { f32::NAN } else { 100.0 + n as f32 }))
+    };
+    let read = |from: usize| decode_scan(&scan(from), NAME, &ReadOptions::default());
+    let refused = read(9).unwrap_err().to_string();
+    assert!(refused.contains("1.7 cc within the image are NaN"), "{refused}");
+    assert_eq!(read(0).unwrap().nonfinite_voxels, 1728);
 }
 
 #[test]

@@ -1,0 +1,133 @@
+//! How much of the brain that the template expects is in a brain that somebody gave, part by part.
+
+use super::{Region, SegmentWarning, atlas};
+use crate::geometry::{Mni, Position};
+use crate::image::Mask;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// One voxel in so many along each axis is looked at.
+const STRIDE: usize = 2;
+
+/// What a given brain leaves out of what the fitted template expects where the scan shows something.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOut {
+    /// Each part of the brain and the share of it that is left out, 0 to 1.
+    pub parts: Vec<(Region, f64)>,
+    /// The share of the whole brain.
+    pub whole: f64,
+}
+
+impl LeftOut {
+    /// Compares a given brain with the template's, as far as the scan is known.
+    pub fn of(
+        brain: &Mask<Mni>,
+        known: &Mask<Mni>,
+        template_from_patient: impl Fn(Position<Mni>) -> Position<Mni> + Sync,
+    ) -> Self {
+        let (grid, template) = (brain.grid, &atlas::template().t1);
+        let seen_at = |n: usize| {
+            let p = template_from_patient(grid.centre(grid.voxel(n)));
+            let expected = known.data[n] && template.nearest(p).is_some_and(|t1| t1 > 0);
+            expected.then(|| (Region::at(p), brain.data[n]))
+        };
+        let of_slice = |k: usize| -> Vec<(Region, bool)> {
+            let rows = (0..grid.dims[1]).step_by(STRIDE);
+            let places = rows.flat_map(|j| (0..grid.dims[0]).step_by(STRIDE).map(move |i| grid.index(i, j, k)));
+            places.filter_map(seen_at).collect()
+        };
+        let seen: Vec<Vec<(Region, bool)>> = (0..grid.dims[2]).into_par_iter().step_by(STRIDE).map(of_slice).collect();
+        let share = |of: &dyn Fn(Region) -> bool| {
+            let own = seen.iter().flatten().filter(|(region, _)| of(*region));
+            let (all, out) = own.fold((0usize, 0usize), |(all, out), (_, held)| (all + 1, out + usize::from(!held)));
+            out as f64 / all.max(1) as f64
+        };
+        let parts = Region::ALL.into_iter().map(|part| (part, share(&|region| region == part))).collect();
+        Self { parts, whole: share(&|_| true) }
+    }
+}
+
+/// What somebody gave for a brain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GivenBrain {
+    /// A mask; the template is fitted to the scan.
+    Mask,
+    /// A label map; the template is fitted to the map itself, and follows a part of what it leaves out.
+    Labels,
+}
+
+impl GivenBrain {
+    /// Percent of one part of the brain that is noted, and of the whole that is too much. Of maps of seven heads 1 % at most of any part was
+    /// left out (FreeSurfer's, hgm's own), of hgm's masks of five without their fluid, or drawn in by 2 mm, 24 % of any and 14 % of the whole
+    /// (docs/evidence/choices.md).
+    fn limits(self) -> [f64; 2] {
+        match self {
+            Self::Mask => [28.0, 25.0],
+            Self::Labels => [10.0, 12.0],
+        }
+    }
+
+    /// Whether this is more than a lesion, an earlier resection or another rule for the outline: one part mostly gone, or much of all.
+    pub fn is_of_another_brain(self, parts: &[(Region, f64)], percent: f64) -> bool {
+        /// After an earlier operation on a lobe about half of it is gone.
+        const MOST_OF_PART: f64 = 55.0;
+        percent >= self.limits()[1] || parts.iter().any(|(_, part)| *part >= MOST_OF_PART)
+    }
+}
+
+impl std::fmt::Display for GivenBrain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Mask => "brain mask",
+            Self::Labels => "label map",
+        })
+    }
+}
+
+impl LeftOut {
+    /// What is to be said of it, the parts that miss most first.
+    pub fn noted(&self, given: GivenBrain) -> Option<SegmentWarning> {
+        let [of_part, of_whole] = given.limits();
+        let percent = 100.0 * self.whole;
+        let mut parts: Vec<(Region, f64)> = self.parts.iter().map(|(region, share)| (*region, 100.0 * share)).collect();
+        parts.retain(|(_, part)| *part >= of_part);
+        parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        (percent >= of_whole || !parts.is_empty()).then_some(SegmentWarning::LeavesOut { given, percent, parts })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noted(given: GivenBrain, keeps: &(dyn Fn(Position<Mni>) -> bool + Sync)) -> Option<SegmentWarning> {
+        let t1 = &atlas::template().t1;
+        let brain = Mask::from_fn(t1.grid, |n| t1.data[n] > 0 && keeps(t1.grid.centre(t1.grid.voxel(n))));
+        LeftOut::of(&brain, &Mask::filled(t1.grid, true), |p| p).noted(given)
+    }
+
+    #[test]
+    fn what_a_brain_leaves_out_is_named_and_much_of_it_belies_it() {
+        let belied = |given, keeps: &(dyn Fn(Position<Mni>) -> bool + Sync)| {
+            noted(given, keeps).map(|warning| (warning.to_string(), warning.belies_the_masks()))
+        };
+        assert_eq!(belied(GivenBrain::Labels, &|_| true), None);
+        assert_eq!(belied(GivenBrain::Mask, &|p| p.mm.y < 45.0), None, "the tip of the frontal pole");
+        let (said, belied_half) = belied(GivenBrain::Mask, &|p| p.mm.x > 0.0).unwrap();
+        assert!(belied_half && said.contains("brain mask") && said.contains("left frontal lobe: 9"), "{said}");
+        let (said, belied_lobe) = belied(GivenBrain::Labels, &|p| Region::at(p) != Region::Cerebellum).unwrap();
+        assert!(belied_lobe && said.contains("label map") && said.contains("cerebellum: 100 %"), "{said}");
+        let temporal = |p: Position<Mni>| Region::at(p) != Region::LeftTemporal || p.mm.y < -20.0;
+        let (said, belied_lobectomy) = belied(GivenBrain::Labels, &temporal).unwrap();
+        assert!(!belied_lobectomy && said.contains("left temporal lobe"), "an earlier operation: {said}");
+    }
+
+    #[test]
+    fn what_the_scan_does_not_show_is_not_asked_for() {
+        let t1 = &atlas::template().t1;
+        let shown = Mask::from_fn(t1.grid, |n| t1.grid.centre(t1.grid.voxel(n)).mm.z > 0.0);
+        let brain = Mask::from_fn(t1.grid, |n| t1.data[n] > 0 && shown.data[n]);
+        assert_eq!(LeftOut::of(&brain, &shown, |p| p).noted(GivenBrain::Labels), None);
+    }
+}
