@@ -1,7 +1,8 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
 use super::confidence::evidence;
-use super::coverage::{GivenBrain, LeftOut};
+use super::coverage::LeftOut;
+use super::given_brain::GivenBrain;
 use super::overhang::{beyond, onto_the_brain, short};
 use super::posed_scan::PosedScan;
 use super::segmentation::{FoundBrain, find_brain, labelled};

@@ -1,10 +1,9 @@
 //! How much of the brain that the template expects is in a brain that somebody gave, part by part.
 
-use super::{Region, SegmentWarning, atlas};
+use super::{GivenBrain, Region, SegmentWarning, atlas};
 use crate::geometry::{Mni, Position};
 use crate::image::Mask;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// One voxel in so many along each axis is looked at.
 const STRIDE: usize = 2;
@@ -47,44 +46,6 @@ impl LeftOut {
     }
 }
 
-/// What somebody gave for a brain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GivenBrain {
-    /// A mask; the template is fitted to the scan.
-    Mask,
-    /// A label map; the template is fitted to the map itself, and follows a part of what it leaves out.
-    Labels,
-}
-
-impl GivenBrain {
-    /// Percent of one part of the brain that is noted, and of the whole that is too much. Of maps of seven heads 1 % at most of any part was
-    /// left out (FreeSurfer's, hgm's own), of hgm's masks of five without their fluid, or drawn in by 2 mm, 24 % of any and 14 % of the whole
-    /// (docs/evidence/choices.md).
-    fn limits(self) -> [f64; 2] {
-        match self {
-            Self::Mask => [28.0, 25.0],
-            Self::Labels => [10.0, 12.0],
-        }
-    }
-
-    /// Whether this is more than a lesion, an earlier resection or another rule for the outline: one part mostly gone, or much of all.
-    pub fn is_of_another_brain(self, parts: &[(Region, f64)], percent: f64) -> bool {
-        /// After an earlier operation on a lobe about half of it is gone.
-        const MOST_OF_PART: f64 = 55.0;
-        percent >= self.limits()[1] || parts.iter().any(|(_, part)| *part >= MOST_OF_PART)
-    }
-}
-
-impl std::fmt::Display for GivenBrain {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Mask => "brain mask",
-            Self::Labels => "label map",
-        })
-    }
-}
-
 impl LeftOut {
     /// What is to be said of it, the parts that miss most first.
     pub fn noted(&self, given: GivenBrain) -> Option<SegmentWarning> {
@@ -115,7 +76,7 @@ mod tests {
         assert_eq!(belied(GivenBrain::Labels, &|_| true), None);
         assert_eq!(belied(GivenBrain::Mask, &|p| p.mm.y < 45.0), None, "the tip of the frontal pole");
         let (said, belied_half) = belied(GivenBrain::Mask, &|p| p.mm.x > 0.0).unwrap();
-        assert!(belied_half && said.contains("brain mask") && said.contains("left frontal lobe: 9"), "{said}");
+        assert!(belied_half && said.contains("brain mask") && said.contains("left frontal lobe: 100 %"), "{said}");
         let (said, belied_lobe) = belied(GivenBrain::Labels, &|p| Region::at(p) != Region::Cerebellum).unwrap();
         assert!(belied_lobe && said.contains("label map") && said.contains("cerebellum: 100 %"), "{said}");
         let temporal = |p: Position<Mni>| Region::at(p) != Region::LeftTemporal || p.mm.y < -20.0;

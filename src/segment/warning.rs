@@ -1,6 +1,6 @@
 //! What is told of a segmentation that does not stop the work.
 
-use super::coverage::GivenBrain;
+use super::given_brain::GivenBrain;
 use super::overhang::VaultPart;
 use super::region::Region;
 use crate::geometry::Frame;
@@ -82,7 +82,7 @@ pub enum SegmentWarning {
     /// A brain that was given leaves out parts of the one that the fitted template expects.
     #[error(
         "the {given} leaves out {percent:.0} % of the brain that the fitted template expects{}: is it of this scan, and whole?",
-        if parts.is_empty() { String::new() } else { format!(" ({})", in_words(parts, "of it")) }
+        if parts.is_empty() { String::new() } else { format!("; {}", in_words(parts, "is missing")) }
     )]
     LeavesOut {
         /// What was given.

@@ -10,9 +10,7 @@ mod studies;
 pub use options::StudyOptions;
 
 use super::{Failure, Session};
-use crate::workflow::GenerativeFiles;
 use clap::Subcommand;
-use serde_json::json;
 
 /// The Gaussian process over the literature: fit it, sample it, show it
 ///
@@ -40,11 +38,4 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Paper(args) => paper::run(args, session),
         Command::Studies(args) => studies::run(args, session),
     }
-}
-
-/// Tells what several files hold: the table for a terminal, where there is one, then their names.
-fn emit(mut made: GenerativeFiles, session: &Session) -> Result<(), Failure> {
-    let (text, files) = (made.take_text(), made.names());
-    let lines: Vec<String> = Some(text).filter(|text| !text.is_empty()).into_iter().chain(files.clone()).collect();
-    session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &lines.join("\n"))
 }

@@ -1,12 +1,13 @@
 //! Options of every command on the generative model.
 
-use crate::cli::Failure;
+use crate::cli::{Failure, Session};
 use crate::material::generative::GenerativeModel;
 use crate::material::gp::Hyperparameters;
 use crate::material::literature::Curves;
 use crate::material::study_level::StudyLevelFile;
-use crate::workflow::{Studies, hyperparameters, study_level_file};
+use crate::workflow::{GenerativeFiles, Studies, hyperparameters, study_level_file};
 use anyhow::anyhow;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Which studies.
@@ -60,4 +61,11 @@ impl HyperparameterOptions {
     pub fn read(&self) -> Result<Hyperparameters, Failure> {
         Ok(hyperparameters(self.hyperparameters.as_deref())?)
     }
+}
+
+/// Tells what several files hold: the table for a terminal, where there is one, then their names.
+pub fn emit(mut made: GenerativeFiles, session: &Session) -> Result<(), Failure> {
+    let (text, files) = (made.take_text(), made.names());
+    let lines: Vec<String> = Some(text).filter(|text| !text.is_empty()).into_iter().chain(files.clone()).collect();
+    session.emit(&json!({ "files": files, "settings": made.settings, "result": made.facts }), &lines.join("\n"))
 }

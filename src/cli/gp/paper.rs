@@ -1,6 +1,6 @@
 //! `hgm gp paper`: every figure and table of the paper.
 
-use super::emit;
+use super::options::emit;
 use crate::cli::{Failure, Session};
 use crate::mesh::engine::Engine;
 use crate::workflow::{Layer, paper};

@@ -1,7 +1,6 @@
 //! `hgm gp show`: the paper's figures, table and tests.
 
-use super::emit;
-use super::options::{HyperparameterOptions, ModelOption, StudyOptions, only_with};
+use super::options::{HyperparameterOptions, ModelOption, StudyOptions, emit, only_with};
 use crate::cli::{Failure, Session};
 use crate::material::generative::{GenerativeModel, SampleSettings};
 use crate::workflow::{show_gp, show_study_level};
