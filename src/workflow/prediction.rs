@@ -8,6 +8,7 @@ use super::plan::{Goal, plan};
 use super::planned_scan::{PlanInputs, PlannedScan};
 use super::progress::Progress;
 use super::put_back::Before;
+use super::refusal;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::stages::{self, PlannedHead, PredictInput};
@@ -18,6 +19,7 @@ use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
 use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
+use crate::report::refusal::{as_scanned, posed};
 
 /// How the brain of a pre-operative scan will move when the planned tissue is taken, with its spread. Registration of the
 /// scan, labels and mesh are made as for a pair.
@@ -68,12 +70,28 @@ pub(super) fn predict_scan(
     work.hold(true)?;
     check_scan(work, &scan.sum)?;
     let before = Before::of(&work.case);
-    let (made, prediction, outcome) = every_stage(work, scan, targets).inspect_err(|error| before.put_back(error))?;
+    let (made, prediction, outcome) = every_stage(work, scan, targets).inspect_err(|error| {
+        show_refused(work, scan, error);
+        before.put_back(error);
+    })?;
     let steps = plan(work.settings, Subject::Plan, Goal::Predict)?;
     let manifests: Vec<&Manifest> = steps.iter().filter_map(|step| made.get(&step.stage)).collect();
     let warnings = manifests.iter().flat_map(|m| m.warnings.iter().cloned()).collect();
     finish(work, &ExperimentOutcome { warnings, ..outcome }, &manifests)?;
     Ok((work.case.clone(), prediction))
+}
+
+/// A picture of a scan that no head was found in, beside the folder, which is left as it was.
+fn show_refused(work: &Work<'_>, scan: &PlannedScan, error: &WorkflowError) {
+    let (row, how) = match error {
+        WorkflowError::Registration { .. } => (as_scanned(&scan.pre), "as it was given"),
+        WorkflowError::Pair(_) => match stages::mni_from_pre(&work.case) {
+            Ok(mni_from_pre) => (posed(&scan.pre, &mni_from_pre), "in the pose that was found"),
+            Err(_) => return,
+        },
+        _ => return,
+    };
+    work.tell(|p| refusal::show(&[row], &work.place.folder, &format!("the scan {how}"), p));
 }
 
 /// Every stage of one plan, with its outcome but for the warnings.
