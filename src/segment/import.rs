@@ -4,7 +4,9 @@ use crate::anatomy::{
     LabelCount, LabelError, LabelTable, Recognised, Side, Structure, Tissue, built_in, label, recognise,
 };
 use crate::geometry::Frame;
+use crate::image::components::fill_holes;
 use crate::image::distance::distance_mm;
+use crate::image::morphology::close;
 use crate::image::{LabelMap, Volume};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -260,15 +262,19 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
 /// Fluid of this much is not the fourth ventricle alone, cc: sulci and cisterns are drawn.
 const OUTER_CSF_CC: f64 = 30.0;
 
-/// Ventricles lie deeper than this, by their median, mm: the mantle around wide ones may be thinner, their middle is not so near.
-const SHALLOW_MM: f32 = 10.0;
+/// Ventricles lie deeper than this, by their median, mm: 31 to 55 in maps of eight heads (FreeSurfer's, SynthSeg's, GIF's, hgm's own);
+/// fluid of the sulci 6, with the ventricles 9.
+const SHALLOW_MM: f32 = 15.0;
+/// Gaps narrower than twice this are part of the head: sulci, and what FreeSurfer leaves to the background around its ventricles, mm.
+const GAP_MM: f64 = 5.0;
 
 /// How deep labels lie in the head, by the medians of their distances to the outside, mm; 0 for one that is not there.
 fn depths_mm<F: Frame, const N: usize>(labels: &LabelMap<F>, of: [u8; N]) -> [f32; N] {
-    let outside = labels.map(|l| l == label::BACKGROUND);
-    let Some(around) = outside.map(|x| !x).bounding_box() else { return [0.0; N] };
-    let around = around.grown(&labels.grid, 2.0);
-    let (labels, depth) = (labels.cropped(&around), distance_mm(&outside.cropped(&around)));
+    let labelled = labels.map(|l| l != label::BACKGROUND);
+    let Some(around) = labelled.bounding_box() else { return [0.0; N] };
+    let around = around.grown(&labels.grid, GAP_MM + 2.0);
+    let head = fill_holes(&close(&labelled.cropped(&around), GAP_MM));
+    let (labels, depth) = (labels.cropped(&around), distance_mm(&head.map(|x| !x)));
     let median = |l: u8| {
         let mut own: Vec<f32> = (0..depth.data.len()).filter(|&n| labels.data[n] == l).map(|n| depth.data[n]).collect();
         let middle = own.len() / 2;
@@ -354,6 +360,23 @@ mod tests {
             c => c,
         });
         assert!(refused(&inside_out, "freesurfer").contains("ventricles lie at the surface"));
+        let radius_mm =
+            |n: usize| map.grid.voxel(n).iter().map(|&v| (2.0 * v as f64 - 79.0).powi(2)).sum::<f64>().sqrt();
+        let sulci = Volume::from_fn(map.grid, |n| match (radius_mm(n), map.data[n]) {
+            (r, 3) if (52.0..55.0).contains(&r) => 4,
+            (r, 42) if (52.0..55.0).contains(&r) => 43,
+            (_, 4) => 2,
+            (_, 43) => 41,
+            (_, own) => own,
+        });
+        assert!(
+            refused(&sulci, "freesurfer").contains("that is fluid of the sulci"),
+            "{}",
+            refused(&sulci, "freesurfer")
+        );
+        // FreeSurfer leaves a gap to the background here and there around the ventricles.
+        let gap = Volume::from_fn(map.grid, |n| if (15.0..18.0).contains(&radius_mm(n)) { 0 } else { map.data[n] });
+        assert_eq!(import_labels(&gap, None).map(|found| found.table), Ok("freesurfer".to_owned()));
         let half = aseg(1.0).map(|c| if c == 2 || c == 41 { 0 } else { c });
         assert!(refused(&half, "freesurfer").contains("missing"));
     }
