@@ -21,7 +21,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         .from_reader(bytes);
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (n, record) in reader.records().enumerate() {
-        let record = record.map_err(|e| damaged(name, format!("row {}", n + 1), e.to_string()))?;
+        let record = record.map_err(|e| damaged(name, format!("row {}", n + 1), in_words(&e)))?;
         rows.push(record.iter().map(|cell| cell.trim_start_matches('\u{feff}').to_owned()).collect());
     }
     let Some(first) = rows.first().cloned() else { return Err(damaged(name, "the table", "it holds no row")) };
@@ -75,6 +75,17 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let names =
         rows.iter().enumerate().map(|(n, row)| label.map_or_else(|| (n + 1).to_string(), |c| row[c].clone())).collect();
     Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Table { header, rows, columns }) })
+}
+
+/// What is wrong with a row, and what to do about it.
+fn in_words(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("it has {len} cells and the rows above it {expected_len}: give every row as many")
+        }
+        csv::ErrorKind::Utf8 { .. } => "it is no UTF-8 text: save the file as UTF-8".to_owned(),
+        _ => error.to_string(),
+    }
 }
 
 /// Spreadsheets of half the world write semicolons, because their commas are decimal marks.

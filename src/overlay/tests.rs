@@ -66,6 +66,8 @@ fn a_damaged_file_is_refused_with_its_place() {
     let refuse = |bytes: &[u8], name: &str| Drawing::decode(bytes, name).unwrap_err().to_string();
     assert!(refuse(b"x,y\n1,2\n", "a.csv").contains("a.csv: the first row: no column is called `z`"));
     assert!(refuse(b"x,y,z\n1,2,up\n", "a.csv").contains("row 2: `up`"));
+    assert!(refuse(b"x,y,z\n1,2\n", "a.csv").contains("row 2: it has 2 cells and the rows above it 3"));
+    assert!(refuse(b"x,y,z\n1,2,\xff\n", "a.csv").contains("save the file as UTF-8"));
     // Voxels beside millimetres: which are meant is not guessed.
     for header in ["x,y,z,x_mm,y_mm,z_mm", "X,y,z,x"] {
         let row = vec!["1"; header.split(',').count()].join(",");

@@ -297,6 +297,21 @@ fn slow_a_prediction_is_held_against_what_was_seen_and_nothing_else() {
         assert!(words.iter().all(|w| said.contains(w)), "{arguments:?}: {said}");
     }
     assert_eq!(std::fs::read_to_string(case.join("sim/evaluation.json")).unwrap(), kept);
+
+    // Nor is a file of the case that was changed since, whatever would be made of it.
+    let draws = case.join("sim/predicted_draws.csv");
+    let written = std::fs::read_to_string(&draws).unwrap();
+    let last = written.trim_end().rfind(',').unwrap();
+    std::fs::write(&draws, format!("{},9.5\n", &written[..last])).unwrap();
+    for command in ["evaluate", "report"] {
+        let against: &[&str] = if command == "evaluate" { &["--against", &pair_word] } else { &[] };
+        let ended = output(&[&[command, &case_word], against].concat());
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(3), "{command}: {said}");
+        assert!(said.contains("sim/predicted_draws.csv") && said.contains("was changed"), "{command}: {said}");
+    }
+    std::fs::write(&draws, written).unwrap();
+    assert_eq!(evaluated(&[&case_word, "--against", &pair_word])["against"], found["against"]);
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn a_fault_out_of_range_ends_with_3_says_where_it_stands_and_leaves_nothing() {
 }
 
 #[test]
-fn what_was_asked_for_stands_in_the_truth_and_the_old_lesion_in_the_grid_of_both_scans() {
+fn slow_what_was_asked_for_stands_in_the_truth_and_the_old_lesion_in_the_grid_of_both_scans() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     std::fs::write(path("faults.toml"), "[synth.post]\nghost_fraction = 0.05\ncut_mm = 20.0\n").unwrap();
