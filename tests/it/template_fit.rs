@@ -57,7 +57,7 @@ fn a_small_heads_scalp_is_not_taken_for_pia() {
 }
 
 #[test]
-fn the_carried_surface_is_drawn_neither_in_nor_out_by_what_surrounds_the_brain() {
+fn slow_the_carried_surface_is_drawn_neither_in_nor_out_by_what_surrounds_the_brain() {
     let template_from_head = atlas::head_from_template().inverse().unwrap();
     let own_cc = surface_cc(&carried_priors(|p| template_from_head.apply(p)));
     let narrow = head_around(&template_from_head, 1.0, 4.0);
