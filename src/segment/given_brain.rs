@@ -14,7 +14,7 @@ pub enum GivenBrain {
 }
 
 impl GivenBrain {
-    /// Percent of one part of the brain that is noted, and of the whole that is too much. Of maps of seven heads 1 % at most of any part was
+    /// Percent of one part of the brain that is noted, and of the whole that is too much. Of maps of six heads 1 % at most of any part was
     /// left out (FreeSurfer's, hgm's own), of hgm's masks of five without their fluid, or drawn in by 2 mm, 24 % of any and 14 % of the whole
     /// (docs/evidence/choices.md).
     pub(super) fn limits(self) -> [f64; 2] {

@@ -262,7 +262,7 @@ fn no_brain<F: Frame>(labels: &LabelMap<F>) -> Option<String> {
 /// Fluid of this much is not the fourth ventricle alone, cc: sulci and cisterns are drawn.
 const OUTER_CSF_CC: f64 = 30.0;
 
-/// Ventricles lie deeper than this, by their median, mm: 31 to 55 in maps of eight heads (FreeSurfer's, SynthSeg's, GIF's, hgm's own);
+/// Ventricles lie deeper than this, by their median, mm: 31 to 55 in eight maps (FreeSurfer's, SynthSeg's, GIF's, hgm's own);
 /// fluid of the sulci 6, with the ventricles 9.
 const SHALLOW_MM: f32 = 15.0;
 /// Gaps narrower than twice this are part of the head: sulci, and what FreeSurfer leaves to the background around its ventricles, mm.

@@ -148,8 +148,8 @@ pub enum SegmentWarning {
     },
 }
 
-/// A cavity drawn by hand that holds so much of the tissue that was there before is of another place or scan, percent; one full of blood
-/// has half of its tissue's brightness at most.
+/// A cavity drawn by hand that holds so much of the tissue that was there before is of another place or scan, percent; on the wrong side
+/// of one patient it held all of it. Well above what is noted, since a cavity full of blood looks like tissue.
 const STILL_THERE_PERCENT: f64 = 85.0;
 
 /// So much of a cavity's outside at the scan's edge hides a tenth of the cavity and more, percent: of a ball, the disc where a
