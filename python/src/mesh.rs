@@ -45,7 +45,7 @@ pub fn field_array(py: Python<'_>, field: Field) -> PyResult<Bound<'_, PyAny>> {
 pub fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let read = move || {
         let name = path.display().to_string();
-        vtu::decode(&read_input(&path)?, &name).map_err(Failure::rejected)
+        vtu::decode(&read_input(&path)?, &name).map_err(Failure::of_input)
     };
     let state = py.detach(read).map_err(|failure: Failure| raised(py, &failure))?;
     let found = mesh_arrays(py, &state.mesh)?;
@@ -89,7 +89,7 @@ pub fn encode_label_map(
 pub fn read_label_map(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray3<u8>>, [[f64; 4]; 4])> {
     let read = move || {
         let name = path.display().to_string();
-        decode_labels(&read_input(&path)?, &name, &ReadOptions::default()).map_err(Failure::rejected)
+        decode_labels(&read_input(&path)?, &name, &ReadOptions::default()).map_err(Failure::of_input)
     };
     let (labels, _) = py.detach(read).map_err(|failure: Failure| raised(py, &failure))?;
     let [i, j, k] = labels.grid.dims;

@@ -56,7 +56,7 @@ fn scenario(text: &str, json: bool) -> Result<Scenario, Failure> {
             let of_line = said.split_once(": ").filter(|(line, _)| json && line.starts_with("line "));
             refused(in_words(of_line.map_or(&said, |(_, reason)| reason)))
         })
-        .map_err(Failure::rejected)
+        .map_err(Failure::of_input)
 }
 
 /// The deformed state; `json` says which of the two the scenario's text is.

@@ -30,7 +30,7 @@ impl Failure {
     }
 
     /// The input's fault (exit code 3), with what to do about it.
-    pub fn rejected(error: impl Into<anyhow::Error>) -> Self {
+    pub fn of_input(error: impl Into<anyhow::Error>) -> Self {
         Self::Rejected(with_remedy(error.into()))
     }
 

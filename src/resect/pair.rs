@@ -365,8 +365,8 @@ pub fn take_head_apart(
 fn tissues_exchanged(pre: &PosedScan<'_, Pre>, post: &PosedScan<'_, Post>, labels: &LabelMap<Pre>) -> bool {
     /// Of grey matter's intensity: closer together neither tissue is the brighter one.
     const APART: f64 = 0.05;
+    let labels = labels_on(labels, &pre.on_template().grid, &pre.mni_from_t1.inverse());
     let contrast = |scan: &Volume<f32, Mni>, known: &Mask<Mni>| {
-        let labels = labels_on(labels, &scan.grid, &pre.mni_from_t1.inverse());
         let [grey, white] = [label::GREY_MATTER, label::WHITE_MATTER].map(|tissue| {
             let (mut sum, mut count) = (0.0, 0.0f64);
             for n in (0..scan.data.len()).filter(|&n| known.data[n] && labels.data[n] == tissue) {
@@ -445,8 +445,31 @@ fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::RigidTransform;
     use crate::image::Grid;
     use crate::segment::TissueVolumes;
+
+    #[test]
+    fn a_t1_and_a_flair_have_their_tissues_exchanged_and_two_t1_have_not() {
+        let labels: LabelMap<Pre> = crate::segment::atlas::template().labels.clone().relabelled();
+        let drawn = |grey: f32, white: f32| {
+            labels.map(|l| match l {
+                label::BACKGROUND => 0.0,
+                label::GREY_MATTER => grey,
+                label::WHITE_MATTER => white,
+                _ => 30.0,
+            })
+        };
+        let (same, moved) = (RigidTransform::identity(), RigidTransform::identity());
+        let t1 = drawn(70.0, 100.0);
+        let exchanged = |post: Volume<f32, Pre>| {
+            let post = post.relabelled();
+            tissues_exchanged(&PosedScan::new(&t1, &same), &PosedScan::new(&post, &moved), &labels)
+        };
+        assert!(exchanged(drawn(100.0, 80.0)));
+        assert!(!exchanged(drawn(80.0, 110.0)));
+        assert!(!exchanged(drawn(90.0, 88.0)), "neither tissue is the brighter one");
+    }
 
     #[test]
     fn a_cavity_drawn_over_tissue_that_is_still_there_is_told() {

@@ -44,17 +44,18 @@ impl LeftOut {
         let parts = Region::ALL.into_iter().map(|part| (part, share(&|region| region == part))).collect();
         Self { parts, whole: share(&|_| true) }
     }
-}
 
-impl LeftOut {
     /// What is to be said of it, the parts that miss most first.
     pub fn noted(&self, given: GivenBrain) -> Option<SegmentWarning> {
-        let [of_part, of_whole] = given.limits();
         let percent = 100.0 * self.whole;
         let mut parts: Vec<(Region, f64)> = self.parts.iter().map(|(region, share)| (*region, 100.0 * share)).collect();
-        parts.retain(|(_, part)| *part >= of_part);
+        parts.retain(|(_, part)| *part >= given.noted_percent());
         parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        (percent >= of_whole || !parts.is_empty()).then_some(SegmentWarning::LeavesOut { given, percent, parts })
+        (percent >= given.most_percent() || !parts.is_empty()).then_some(SegmentWarning::LeavesOut {
+            given,
+            percent,
+            parts,
+        })
     }
 }
 

@@ -14,21 +14,28 @@ pub enum GivenBrain {
 }
 
 impl GivenBrain {
-    /// Percent of one part of the brain that is noted, and of the whole that is too much. Of maps of six heads 1 % at most of any part was
-    /// left out (FreeSurfer's, hgm's own), of hgm's masks of five without their fluid, or drawn in by 2 mm, 24 % of any and 14 % of the whole
-    /// (docs/evidence/choices.md).
-    pub(super) fn limits(self) -> [f64; 2] {
+    /// From how many percent of one part of the brain on it is told. Of maps of six heads 1 % at most of any part was left out
+    /// (FreeSurfer's, hgm's own), of hgm's masks of four heads without their fluid, or drawn in by 2 mm, 24 % (docs/evidence/choices.md).
+    pub(super) fn noted_percent(self) -> f64 {
         match self {
-            Self::Mask => [28.0, 25.0],
-            Self::Labels => [10.0, 12.0],
+            Self::Mask => 28.0,
+            Self::Labels => 10.0,
         }
     }
 
-    /// Whether this is more than a lesion, an earlier resection or another rule for the outline: one part mostly gone, or much of all.
-    pub fn is_of_another_brain(self, parts: &[(Region, f64)], percent: f64) -> bool {
-        /// After an earlier operation on a lobe about half of it is gone.
+    /// How many percent of the whole are too much: of those masks 14 were left out, of the maps 1.
+    pub(super) fn most_percent(self) -> f64 {
+        match self {
+            Self::Mask => 25.0,
+            Self::Labels => 12.0,
+        }
+    }
+
+    /// Whether more is left out than by a lesion, an earlier resection or another rule for the outline: one part mostly, or much of all.
+    pub(super) fn leaves_too_much(self, parts: &[(Region, f64)], percent: f64) -> bool {
+        /// An earlier operation on a lobe takes a part of it.
         const MOST_OF_PART: f64 = 55.0;
-        percent >= self.limits()[1] || parts.iter().any(|(_, part)| *part >= MOST_OF_PART)
+        percent >= self.most_percent() || parts.iter().any(|(_, part)| *part >= MOST_OF_PART)
     }
 }
 

@@ -168,7 +168,7 @@ impl SegmentWarning {
         match self {
             Self::CavityAtEdge { percent } => *percent >= HIDDEN_PERCENT,
             Self::UnchangedCavity { percent } => *percent >= STILL_THERE_PERCENT,
-            Self::LeavesOut { given, percent, parts } => given.is_of_another_brain(parts, *percent),
+            Self::LeavesOut { given, percent, parts } => given.leaves_too_much(parts, *percent),
             _ => false,
         }
     }
@@ -180,4 +180,19 @@ fn in_words(parts: &[(Region, f64)], what: &str) -> String {
     let others: Vec<String> = parts.iter().skip(1).map(of).collect();
     let first = parts.first().map(|first| format!("{} {what}", of(first))).unwrap_or_default();
     if others.is_empty() { first } else { format!("{first} ({})", others.join(", ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cavity_drawn_over_living_tissue_is_not_believed_and_one_with_blood_in_it_is() {
+        assert!(SegmentWarning::UnchangedCavity { percent: 100.0 }.belies_the_masks());
+        assert!(!SegmentWarning::UnchangedCavity { percent: 60.0 }.belies_the_masks());
+        assert!(
+            !SegmentWarning::UnlikeScans { folds: 0.3 }.belies_the_masks(),
+            "the masks were given to go on all the same"
+        );
+    }
 }

@@ -138,8 +138,8 @@ pub fn any_labels(
     if let Some(&LabelCount { code, .. }) = counts.iter().find(|c| c.code > 255) {
         return Err(LabelMapError::TooLarge { name: name.to_owned(), code }.into());
     }
-    let table: Vec<&LabelTable> = named("hgm");
-    let structure = |code: u32| table.iter().find_map(|table| table.structure(code));
+    let own = named("hgm");
+    let structure = |code: u32| own.iter().find_map(|table| table.structure(code));
     let names: Option<Vec<String>> = counts
         .iter()
         .filter(|c| c.code != 0)

@@ -2,21 +2,19 @@
 
 use super::case::Case;
 use super::error::{CaseError, WorkflowError};
-use crate::artefact::{Reason, sha256_hex};
-use std::collections::BTreeMap;
+use crate::artefact::{Manifest, Reason, sha256_hex};
 
-/// A case's files with the checksums that its stages keep of them.
+/// A case's files with the manifests of the stages that made them.
 #[derive(Debug)]
 pub(crate) struct MadeFiles<'a> {
     case: &'a Case,
-    sums: BTreeMap<String, String>,
+    made: Vec<Manifest>,
 }
 
 impl<'a> MadeFiles<'a> {
     /// Those of every stage that has finished.
     pub fn of(case: &'a Case) -> Self {
-        let outputs = case.recorded().into_iter().flat_map(|manifest| manifest.outputs);
-        Self { case, sums: outputs.map(|(file, record)| (file, record.sha256)).collect() }
+        Self { case, made: case.recorded() }
     }
 
     /// The bytes of a file, as its stage wrote them; of a file that no stage keeps a checksum of, as they are.
@@ -25,8 +23,8 @@ impl<'a> MadeFiles<'a> {
     /// A file that is missing or was changed.
     pub fn read(&self, file: &str) -> Result<Vec<u8>, WorkflowError> {
         let bytes = self.case.read(file)?;
-        match self.sums.get(file) {
-            Some(sum) if sha256_hex(&bytes) != *sum => Err(self.changed(file)),
+        match self.made.iter().find_map(|manifest| manifest.outputs.get(file)) {
+            Some(written) if sha256_hex(&bytes) != written.sha256 => Err(self.changed(file.to_owned())),
             _ => Ok(bytes),
         }
     }
@@ -36,14 +34,17 @@ impl<'a> MadeFiles<'a> {
     /// # Errors
     /// The first of them.
     pub fn check(&self) -> Result<(), WorkflowError> {
-        let there = |file: &&String| self.case.path(file).exists();
-        self.sums.keys().filter(there).try_for_each(|file| self.read(file).map(drop))
+        let mut reasons = self.made.iter().flat_map(|manifest| manifest.changed_outputs(self.case.folder()));
+        let changed = reasons.find_map(|reason| match reason {
+            Reason::OutputChanged { file } => Some(self.changed(file)),
+            _ => None,
+        });
+        changed.map_or(Ok(()), Err)
     }
 
-    fn changed(&self, file: &str) -> WorkflowError {
-        let (folder, reasons) =
-            (self.case.folder().to_path_buf(), vec![Reason::OutputChanged { file: file.to_owned() }]);
-        CaseError::Stale { folder, what: file.to_owned(), reasons }.into()
+    fn changed(&self, file: String) -> WorkflowError {
+        let (folder, reasons) = (self.case.folder().to_path_buf(), vec![Reason::OutputChanged { file: file.clone() }]);
+        CaseError::Stale { folder, what: file, reasons }.into()
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Numbers and names: `distribution/FreeSurferColorLUT.txt` of the FreeSurfer sources. The fourth ventricle is CSF here,
 //! because hgm's ventricle is the lateral and third ones. Cavum septi (5th) lies between the lateral ones and belongs to
-//! them. The ventral diencephalon is mixed; FreeSurfer itself counts it as subcortical grey. Not here: 6 and 45, an outline of the
-//! cerebellum that no map of a volume holds; a 6 in a map of FreeSurfer's is somebody's tumour in hgm's number.
+//! them. The ventral diencephalon is mixed; FreeSurfer itself counts it as subcortical grey. Not here: 6 and 45, the
+//! cerebellum's exterior on either side; a 6 in a map of FreeSurfer's is likely somebody's tumour in hgm's number.
 
 use crate::anatomy::table::{LabelTable, Tissue};
 use Tissue::{Csf, Grey, Outside, Ventricle, White};

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    model: ModelOption,
+    generative: ModelOption,
     #[command(flatten)]
     studies: StudyOptions,
     /// Rank of the coregionalisation of the twelve tasks [default: 1]
@@ -31,7 +31,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.model.model == GenerativeModel::StudyLevel {
+    if args.generative.model == GenerativeModel::StudyLevel {
         return study_level(args, session);
     }
     let mut flags = Layer::default();

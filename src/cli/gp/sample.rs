@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, value_name = "tissue|study")]
     spread: Option<Spread>,
     #[command(flatten)]
-    model: ModelOption,
+    generative: ModelOption,
     /// What materials of the study-level model are of [default: person]
     #[arg(long, value_name = "mean|laboratory|person|study")]
     of: Option<Of>,
@@ -60,7 +60,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { model: args.law, stretches: usize::from(args.stretches), ..base };
     let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
-    if args.model.model == GenerativeModel::StudyLevel {
+    if args.generative.model == GenerativeModel::StudyLevel {
         only_with(args.spread.is_some(), "--spread", "published")?;
         let own = args.hyperparameters.study_level()?;
         let wanted = match args.draws {

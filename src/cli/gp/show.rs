@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', value_name = "ID,ID,...")]
     models: Vec<u32>,
     #[command(flatten)]
-    model: ModelOption,
+    generative: ModelOption,
     #[command(flatten)]
     studies: StudyOptions,
     #[command(flatten)]
@@ -32,7 +32,7 @@ pub struct Args {
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
-    if args.model.model == GenerativeModel::StudyLevel {
+    if args.generative.model == GenerativeModel::StudyLevel {
         only_with(!args.models.is_empty(), "--models", "published")?;
         let own = args.hyperparameters.study_level()?;
         return emit(show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?, session);

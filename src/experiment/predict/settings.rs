@@ -141,7 +141,7 @@ impl PredictSettings {
     ///
     /// # Errors
     /// The first setting of either table that no prediction can be made with.
-    pub fn check_with(&self, own: &ResectionSettings) -> Result<(), SettingError> {
+    pub fn check_loads(&self, own: &ResectionSettings) -> Result<(), SettingError> {
         let own_weight = self.drained.is_some() || self.fluid_level.is_some();
         let fluid = own.csf.clone().unwrap_or_default().density_kg_per_m3;
         let (tissue, drained) = (self.tissue_density_kg_per_m3, own.csf.as_ref().map_or(1.0, |csf| csf.drained));
@@ -222,10 +222,10 @@ mod tests {
             (&plain, ResectionSettings { fixed: Vec::new(), ..own.clone() }, "resection.fixed"),
         ];
         for (settings, own, name) in cases {
-            assert_eq!(settings.check_with(&own).unwrap_err().name, name);
+            assert_eq!(settings.check_loads(&own).unwrap_err().name, name);
         }
-        assert_eq!(plain.check_with(&own), Ok(()));
-        assert_eq!(drained.check_with(&ResectionSettings { csf: fluid(1007.0, 0.0), ..tissue }), Ok(()));
-        assert_eq!(light.check_with(&own), Ok(()));
+        assert_eq!(plain.check_loads(&own), Ok(()));
+        assert_eq!(drained.check_loads(&ResectionSettings { csf: fluid(1007.0, 0.0), ..tissue }), Ok(()));
+        assert_eq!(light.check_loads(&own), Ok(()));
     }
 }
