@@ -45,6 +45,7 @@ def run(
     dseg: Any = None,
     labels: Optional[str] = None,
     pose: Any = None,
+    pose_start: Any = None,
     brain_mask: Any = None,
     ventricle_mask: Any = None,
     cavity_mask: Any = None,
@@ -73,6 +74,8 @@ def run(
         Another tool's labels of the pre-operative scan (FreeSurfer, SynthSeg ...); `labels` says whose numbers they are.
     pose : path, optional
         A rigid transform to the MNI frame.
+    pose_start : path, optional
+        The same, roughly: the pose is looked for from there.
     brain_mask, ventricle_mask, cavity_mask, resected_mask : path or nibabel image, optional
         Masks of your own: they win over the computed ones.
     prediction : path, optional
@@ -100,6 +103,7 @@ def run(
             temporary,
             dseg=dseg,
             pose=pose,
+            pose_start=pose_start,
             brain_mask=brain_mask,
             ventricle_mask=ventricle_mask,
             cavity_mask=cavity_mask,
@@ -131,6 +135,7 @@ def predict(
     dseg: Any = None,
     labels: Optional[str] = None,
     pose: Any = None,
+    pose_start: Any = None,
     brain_mask: Any = None,
     ventricle_mask: Any = None,
     force: bool = False,
@@ -160,7 +165,7 @@ def predict(
         What counts as a shift.
     draws, checks : int, optional
         Draws from the priors, and those that are solved whole.
-    tissues, settings, dseg, labels, pose, brain_mask, ventricle_mask, force, progress
+    tissues, settings, dseg, labels, pose, pose_start, brain_mask, ventricle_mask, force, progress
         As for :func:`run`.
 
     Returns
@@ -169,7 +174,8 @@ def predict(
     """
     with files() as temporary:
         own = _given(
-            temporary, targets=targets, dseg=dseg, pose=pose, brain_mask=brain_mask, ventricle_mask=ventricle_mask
+            temporary, targets=targets, dseg=dseg, pose=pose, pose_start=pose_start, brain_mask=brain_mask,
+            ventricle_mask=ventricle_mask
         )
         words = ["predict", temporary.path("pre", pre)]
         if isinstance(resection, (list, tuple, np.ndarray)):

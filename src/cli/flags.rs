@@ -185,6 +185,9 @@ pub struct OwnLabels {
     /// The pose of the pre-operative scan by hand: a rigid transform to the MNI frame (4x4 text in RAS, or .tfm)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
     pub pose: Option<PathBuf>,
+    /// The same, roughly: the pose is looked for from there instead of from many starts
+    #[arg(long, help_heading = MASKS, value_name = "FILE", conflicts_with_all = ["pose", "dseg"])]
+    pub pose_start: Option<PathBuf>,
     /// A brain mask of your own, in the pre-operative scan's grid (wins over the computed one)
     #[arg(long, help_heading = MASKS, value_name = "FILE")]
     pub brain_mask: Option<PathBuf>,
@@ -228,10 +231,10 @@ pub struct PairOptions {
 impl PairOptions {
     /// The files.
     pub fn inputs(&self) -> Inputs {
-        let OwnLabels { dseg, labels, pose, brain_mask } = self.own.clone();
+        let OwnLabels { dseg, labels, pose, pose_start, brain_mask } = self.own.clone();
         let OwnMasks { ventricle_mask, cavity_mask, resected_mask } = self.masks.clone();
         let (pre, post) = (self.pre.clone(), self.post.clone());
-        let prediction = None;
-        Inputs { pre, post, dseg, labels, pose, brain_mask, ventricle_mask, cavity_mask, resected_mask, prediction }
+        let inputs = Inputs { pre, post, dseg, labels, pose, pose_start, brain_mask, ..Inputs::default() };
+        Inputs { ventricle_mask, cavity_mask, resected_mask, ..inputs }
     }
 }

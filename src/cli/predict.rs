@@ -86,10 +86,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     flags.set("predict.tissues", args.tissues);
     let mut plans = PlannedResection::all(&args.resection, &args.resection_label, &args.resection_ellipsoid)?;
     let (settings, place) = (session.settings(flags)?, session.place(&args.output));
-    let OwnLabels { dseg, labels, pose, brain_mask } = args.own.clone();
+    let OwnLabels { dseg, labels, pose, pose_start, brain_mask } = args.own.clone();
     let (pre, resection, targets) = (args.pre.clone(), plans.remove(0), args.targets.clone());
     let ventricle_mask = args.ventricle_mask.clone();
-    let inputs = PlanInputs { pre, resection, targets, dseg, labels, pose, brain_mask, ventricle_mask };
+    let inputs = PlanInputs { pre, resection, targets, dseg, labels, pose, pose_start, brain_mask, ventricle_mask };
     if plans.is_empty() {
         let (case, prediction) = predict(&inputs, &place, &settings, &mut *session.listener())?;
         session.emit(&prediction, &(prediction_table(&prediction) + &case.page().display().to_string()))?;

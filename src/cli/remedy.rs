@@ -77,7 +77,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             "where both are right `[register] largest_size_difference_percent` in a settings file (--config) takes more"
         }
         WorkflowError::Registration { .. } => {
-            "--pose FILE gives the pose by hand, --dseg FILE a label map that says it"
+            "--pose-start FILE says where to look for it, --pose FILE gives it by hand, --dseg FILE a label map that says it"
         }
         WorkflowError::Rigid { .. } | WorkflowError::Head { .. } => {
             "`hgm prep` takes a pose (--pose), a label map (--dseg) and masks of your own"
@@ -156,6 +156,7 @@ fn of_asking(error: &AskedError) -> &'static str {
         AskedError::MeshBeforeResection { .. } => "leave --before-resection out",
         AskedError::PackedNifti { .. } => "see -o and --write-brain-mask",
         AskedError::MasksOfTemplate => "leave --moving-mask and --fixed-mask out",
+        AskedError::PoseAndStart | AskedError::StartBesideLabels => "leave --pose-start out",
     }
 }
 
@@ -255,5 +256,6 @@ fn option(role: MaskRole) -> &'static str {
         MaskRole::Resected => "see --resected-mask",
         MaskRole::Labels => "see --dseg",
         MaskRole::Pose => "see --pose",
+        MaskRole::PoseStart => "see --pose-start",
     }
 }

@@ -1,7 +1,7 @@
 //! `hgm segment`: one T1 to a label map.
 
 use super::{Failure, Session, session::warn};
-use crate::workflow::{Layer, SegmentFiles, results_in_words, segment_file};
+use crate::workflow::{Layer, SegmentFiles, WorkflowError, results_in_words, segment_file};
 use std::path::PathBuf;
 
 /// A T1 to labels in its own grid: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle
@@ -30,5 +30,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let files = SegmentFiles { t1, output, brain_mask, write_brain_mask, in_mni };
     let found = segment_file(&files, &session.settings(Layer::default())?, &mut *session.listener())?;
     warn(&found.warnings);
-    session.emit(&found, &results_in_words::segmented(&found))
+    session.emit(&found, &results_in_words::segmented(&found))?;
+    if found.refused.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(found.refused).into()) }
 }

@@ -26,6 +26,12 @@ pub struct Evaluation {
     pub summary: Vec<StateErrors>,
     /// A row for each landmark.
     pub landmarks: Vec<LandmarkErrors>,
+    /// Names that one of two files alone holds: not compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
+    /// SHA-256 of the results that they were carried by, where they are kept in a case.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub of_sha256: String,
 }
 
 /// Errors over all landmarks that were carried.
@@ -53,7 +59,7 @@ pub struct StateErrors {
 pub struct LandmarkErrors {
     /// Its name or number.
     pub name: String,
-    /// Where it lies: `tissue`, `fluid`, `removed`, `outside`. A landmark in removed tissue is left out of the summary.
+    /// Where it lies: `tissue`, `fluid`, `removed`, `outside`. Landmarks in removed tissue or outside are left out of the summary.
     pub place: String,
     /// Error of each way, in the order of the summary, mm.
     pub error_mm: Vec<f64>,
@@ -90,7 +96,7 @@ pub fn evaluate(
         error_mm: carried.iter().map(|c| rounded(error(c, n))).collect(),
         sd_mm: carried.iter().map(|c| c.sd_mm[n].map(rounded)).collect(),
     };
-    Evaluation { summary: summary.collect(), landmarks: (0..names.len()).map(row).collect() }
+    Evaluation { summary: summary.collect(), landmarks: (0..names.len()).map(row).collect(), ..Evaluation::default() }
 }
 
 /// Between the two nearest of sorted values; 0 of none.

@@ -21,6 +21,9 @@ use super::{ConvergenceRecord, FemError, FemWarning, Frame, Motion, NewtonIterat
 /// Most Newton iterations of a step that is to be solved to the residual asked for.
 const MOST_NEWTON: usize = 30;
 
+/// Part of the load that may be out of balance in a body that is called at rest.
+const RESTED: f64 = 1e-2;
+
 /// A body under way.
 struct Moving<'a> {
     model: &'a Model,
@@ -61,7 +64,9 @@ impl Model {
             motion.steps = step;
             motion.time_s = step as f64 * h;
             motion.fastest_mm_per_s = fastest / METRES_PER_MM;
-            motion.rested = motion.fastest_mm_per_s <= settings.rest_speed_mm_per_s;
+            // Much damping or a short step make anything slow: what rests is also in balance.
+            motion.rested = motion.fastest_mm_per_s <= settings.rest_speed_mm_per_s
+                && self.out_of_balance_share(&body.u, &body.laws).1 <= RESTED;
             if settings.keep_every > 0 && step % settings.keep_every == 0 {
                 motion.frames.push(Frame { time_s: motion.time_s, displacement_mm: self.to_mesh_mm(&body.u) });
             }
@@ -75,11 +80,8 @@ impl Model {
                 break;
             }
         }
-        let mut forces = vec![[0.0; 3]; body.u.len()];
-        self.internal_forces(&body.u, &body.laws, &mut forces);
-        let size = reduce::norm(&self.out_of_balance(&forces, 1.0));
-        let scale = reduce::norm(&self.free_part(&self.load_n));
-        record.relative_residual = if scale > 0.0 { size / scale } else { size };
+        let (forces, share) = self.out_of_balance_share(&body.u, &body.laws);
+        record.relative_residual = share;
         let mut outcome = self.outcome(&body.u, &forces, &body.laws, record);
         if !motion.rested {
             let Motion { steps, time_s, fastest_mm_per_s, .. } = motion;
@@ -87,6 +89,17 @@ impl Model {
         }
         outcome.motion = Some(motion);
         Ok(outcome)
+    }
+
+    /// The internal forces at a state, N, and how much is out of balance there, over the loads (where there are none, over the
+    /// internal forces).
+    fn out_of_balance_share(&self, u: &[[f64; 3]], laws: &Laws) -> (Vec<[f64; 3]>, f64) {
+        let mut forces = vec![[0.0; 3]; u.len()];
+        self.internal_forces(u, laws, &mut forces);
+        let size = reduce::norm(&self.out_of_balance(&forces, 1.0));
+        let load = reduce::norm(&self.free_part(&self.load_n));
+        let scale = if load > 0.0 { load } else { reduce::norm(&forces) };
+        (forces, if scale > 0.0 { size / scale } else { size })
     }
 }
 

@@ -86,12 +86,18 @@ impl Model {
         // Held and moved components, in mesh numbering; a mid-edge node follows its two ends.
         let mut held = vec![[false; 3]; nodes];
         let mut moved = vec![[0.0; 3]; nodes];
-        let mut hold = |set: &str, components: [bool; 3], to_m: [f64; 3]| -> Result<(), FemError> {
+        let mut hold = |set: &str, components: [bool; 3], to_mm: [f64; 3]| -> Result<(), FemError> {
+            let to_m = metres(to_mm);
             let members = node_set(mesh, set)?;
             let inside = |n: u32| members.binary_search(&n).is_ok();
             let middle = edges.iter().enumerate().filter(|(_, e)| inside(e[0]) && inside(e[1]));
             for n in members.iter().map(|&n| n as usize).chain(middle.map(|(k, _)| corners + k)) {
                 for i in (0..3).filter(|&i| components[i]) {
+                    if held[n][i] && moved[n][i] != to_m[i] {
+                        let other_mm = moved[n][i] / METRES_PER_MM;
+                        let (set, axis) = (set.to_owned(), ["x", "y", "z"][i]);
+                        return Err(FemError::TwoWays { set, axis, mm: to_mm[i], other_mm });
+                    }
                     held[n][i] = true;
                     moved[n][i] = to_m[i];
                 }
@@ -99,7 +105,7 @@ impl Model {
             Ok(())
         };
         for p in &scenario.prescribed {
-            hold(&p.set, p.components, metres(p.displacement_mm))?;
+            hold(&p.set, p.components, p.displacement_mm)?;
         }
         for set in scenario.held() {
             hold(set, [true; 3], [0.0; 3])?;
@@ -194,6 +200,7 @@ impl Model {
         });
         let partition = body.partition(&row_of, &pattern);
         let mut warnings = unstable_laws(&scenario.materials);
+        warnings.extend(tiny(&nodes_m));
         warnings.extend(floating(scenario));
         warnings.extend(supports.idle.iter().cloned());
         warnings.extend(idle_loads(&load_parts, &row_of, scenario));
@@ -377,13 +384,24 @@ impl Model {
     }
 }
 
-/// Springs that are all there is to hold the body must hold it somewhere near.
-fn check_springs(supports: &Supports, load_n: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Result<(), FemError> {
+/// Diagonal of the box around the body, mm.
+fn size_mm(nodes_m: &[[f64; 3]]) -> f64 {
     let reach = |axis: usize| {
         let of = || nodes_m.iter().map(|x| x[axis]);
         of().fold(f64::NEG_INFINITY, f64::max) - of().fold(f64::INFINITY, f64::min)
     };
-    let size_mm = (0..3).map(|axis| reach(axis).powi(2)).sum::<f64>().sqrt() / METRES_PER_MM;
+    (0..3).map(|axis| reach(axis).powi(2)).sum::<f64>().sqrt() / METRES_PER_MM
+}
+
+/// A body smaller than any piece of brain that is measured: its mesh was in metres.
+fn tiny(nodes_m: &[[f64; 3]]) -> Option<FemWarning> {
+    const LEAST_MM: f64 = 1.0;
+    Some(size_mm(nodes_m)).filter(|size_mm| *size_mm < LEAST_MM).map(|size_mm| FemWarning::Tiny { size_mm })
+}
+
+/// Springs that are all there is to hold the body must hold it somewhere near.
+fn check_springs(supports: &Supports, load_n: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Result<(), FemError> {
+    let size_mm = size_mm(nodes_m);
     match supports.give_mm(load_n) {
         Some(give_mm) if give_mm > size_mm => Err(FemError::WeakSprings { give_mm, size_mm }),
         _ => Ok(()),

@@ -123,6 +123,14 @@ impl Model {
             let held = self.held_of_row(self.row_of[new]);
             [0, 1, 2].map(|i| if held[i] { forces[new][i] - self.load_n[new][i] } else { 0.0 })
         };
+        let mut reaction_n: Vec<[f64; 3]> = (0..self.corners).map(reaction).collect();
+        // The mesh has no mid-edge nodes: half of what holds one at either end has the same sum and the same moment.
+        for (k, ends) in self.edges.iter().enumerate() {
+            let middle = reaction(self.corners + k);
+            for &end in ends {
+                (0..3).for_each(|i| reaction_n[end as usize][i] += 0.5 * middle[i]);
+            }
+        }
         let density: Vec<f64> = state.iter().map(|s| s[2]).collect();
 
         let worst_cell = worst(&state);
@@ -137,18 +145,34 @@ impl Model {
             warnings.push(FemWarning::Squeezed { cells: crushed });
         }
         let (contact, pressure) = self.supports.outcome(u, &self.nodes_m);
-        let of_node = |n: usize| pressure[self.number[n] as usize];
         Outcome {
-            contact_pressure_pa: if contact.is_empty() { Vec::new() } else { (0..self.corners).map(of_node).collect() },
+            contact_pressure_pa: if contact.is_empty() { Vec::new() } else { self.at_corners(&pressure) },
             contact,
             displacement_mm: self.to_mesh_mm(u),
-            reaction_n: (0..self.corners).map(reaction).collect(),
+            reaction_n,
             jacobian: state.iter().map(|s| s[0]).collect(),
             strain_energy_density_pa: density,
             convergence,
             motion: None,
             warnings,
         }
+    }
+}
+
+impl Model {
+    /// What nodes of the solver hold, on those of the mesh: where a corner holds nothing of its own (the area of a quadratic face
+    /// lies on its mid-edge nodes alone), the mean over the edges that end there.
+    fn at_corners(&self, held: &[Option<f64>]) -> Vec<f64> {
+        let of = |n: usize| held[self.number[n] as usize];
+        let mut sums = vec![(0.0, 0usize); self.corners];
+        for (k, ends) in self.edges.iter().enumerate() {
+            let Some(value) = of(self.corners + k) else { continue };
+            for &end in ends {
+                let (sum, count) = &mut sums[end as usize];
+                (*sum, *count) = (*sum + value, *count + 1);
+            }
+        }
+        (0..self.corners).zip(sums).map(|(n, (sum, count))| of(n).unwrap_or(sum / count.max(1) as f64)).collect()
     }
 }
 

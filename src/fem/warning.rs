@@ -52,6 +52,10 @@ pub enum FemWarning {
     )]
     StillMoves { steps: usize, time_s: f64, fastest_mm_per_s: f64 },
     #[error(
+        "the whole mesh is {size_mm:.3} mm across: coordinates are read as mm; a mesh in metres has to be scaled by 1000 first"
+    )]
+    Tiny { size_mm: f64 },
+    #[error(
         "the tissue ({tissue} kg/m3) is lighter than the fluid of `loads.csf` ({fluid} kg/m3) and floats below its level: where a \
          fluid is given, `loads.density_kg_per_m3` is the tissue's own (about 1040), not an effective one"
     )]

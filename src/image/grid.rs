@@ -106,9 +106,15 @@ impl<F: Frame> Grid<F> {
         }
     }
 
-    /// Whether both grids have the same voxels, affines compared to `tolerance_mm`.
+    /// Whether both grids have the same voxels: none is further than `tolerance_mm` from where the other grid has it.
     pub fn coincides(&self, other: &Self, tolerance_mm: f64) -> bool {
-        self.dims == other.dims && (self.mm_from_voxel - other.mm_from_voxel).abs().max() <= tolerance_mm
+        let apart = self.mm_from_voxel - other.mm_from_voxel;
+        // What an affine map does to a box is largest at a corner.
+        let corner = |n: usize| {
+            let along = |axis: usize| if n >> axis & 1 == 0 { 0.0 } else { self.dims[axis].saturating_sub(1) as f64 };
+            through(&apart, &Point3::new(along(0), along(1), along(2))).coords.norm()
+        };
+        self.dims == other.dims && (0..8).map(corner).all(|mm| mm <= tolerance_mm)
     }
 }
 
@@ -123,6 +129,18 @@ fn through(m: &Matrix4<f64>, p: &Point3<f64>) -> Point3<f64> {
 mod tests {
     use super::*;
     use crate::geometry::Pre;
+
+    #[test]
+    fn grids_that_part_far_from_their_first_voxel_do_not_coincide() {
+        let grid = Grid::<Pre>::axis_aligned([200, 200, 200], [1.0; 3], [-100.0; 3]);
+        let turned = |angle: f64| {
+            let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), angle).to_homogeneous();
+            // About the first voxel.
+            let shift = nalgebra::Translation3::new(-100.0, -100.0, -100.0).to_homogeneous();
+            Grid::<Pre>::new(grid.dims, shift * turn * shift.try_inverse().unwrap() * grid.mm_from_voxel).unwrap()
+        };
+        assert!(grid.coincides(&turned(1e-4), 0.1) && !grid.coincides(&turned(0.002), 0.1));
+    }
 
     #[test]
     fn voxel_and_position_invert_each_other() {

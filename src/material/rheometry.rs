@@ -36,6 +36,12 @@ pub enum RheometryError {
     /// Not a table.
     #[error(transparent)]
     Csv(#[from] CsvError),
+    /// Compression measured as positive.
+    #[error(
+        "the stress is negative where the tissue is stretched and positive where it is compressed: give tension as positive, compression \
+         as negative"
+    )]
+    Sign,
     /// Nothing below the header.
     #[error("the table has no rows: give a header such as `stretch,nominal stress (kPa)` and one row a point")]
     Empty,
@@ -197,6 +203,10 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
         test.stretches.push(stretch);
         test.values_pa.push(value_pa);
     }
+    let work: f64 = test.stretches.iter().zip(&test.values_pa).map(|(l, value)| (l - 1.0) * value).sum();
+    if test.measured == Measured::NominalStress && work < 0.0 {
+        return Err(RheometryError::Sign);
+    }
     Ok(test)
 }
 
@@ -269,7 +279,8 @@ mod tests {
 
     #[test]
     fn malformed_tables_are_refused_with_line_and_remedy() {
-        let cases: [(&[u8], &str); 12] = [
+        let cases: [(&[u8], &str); 13] = [
+            (b"stretch,stress (Pa)\n1.0,0\n0.9,100\n0.8,300\n", "tension as positive"),
             (b"", "no rows"),
             (b"stretch,stress (kPa)\n", "no rows"),
             (b"stretch,stress\n1,2\n", "line 1: the column `stress` names no unit"),

@@ -50,6 +50,13 @@ pub enum PointState {
     Outside,
 }
 
+impl PointState {
+    /// Whether there is a brain shift to be held against: not for what was taken, nor for what lies beyond the brain.
+    pub fn moves_with_the_brain(self) -> bool {
+        matches!(self, Self::Tissue | Self::Fluid)
+    }
+}
+
 impl fmt::Display for PointState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -13,6 +13,12 @@ fn is_point(line: &str) -> bool {
     !line.starts_with('#') && !line.trim().is_empty()
 }
 
+/// What a line of comment says of `key`, however it is spaced and capitalised.
+fn said_above<'a>(lines: &'a [String], key: &str) -> Option<&'a str> {
+    let comments = lines.iter().filter_map(|line| line.strip_prefix('#')?.split_once('='));
+    comments.into_iter().find(|(said, _)| said.trim().eq_ignore_ascii_case(key)).map(|(_, value)| value.trim())
+}
+
 /// The cells of a line; a label with a comma stands in quotes.
 fn cells_of(line: &str) -> Vec<String> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
@@ -27,7 +33,17 @@ fn quoted(cell: &str) -> String {
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     let text = std::str::from_utf8(bytes).map_err(|_| damaged(name, "the file", "not UTF-8 text"))?;
     let lines: Vec<String> = text.lines().map(str::to_owned).collect();
-    let system = lines.iter().find_map(|line| line.strip_prefix("# CoordinateSystem =")).map_or("RAS", str::trim);
+    if let Some(columns) = said_above(&lines, "columns") {
+        let mut first = columns.split(',').map(str::trim);
+        if !first.next().is_some_and(|c| c == "id" || c == "label") || !first.by_ref().take(3).eq(["x", "y", "z"]) {
+            return Err(damaged(
+                name,
+                "columns",
+                format!("`{columns}` does not begin with id,x,y,z; save it again from 3D Slicer"),
+            ));
+        }
+    }
+    let system = said_above(&lines, "CoordinateSystem").unwrap_or("RAS");
     let lps = match system {
         "RAS" | "0" => false,
         "LPS" | "1" => true,

@@ -32,6 +32,18 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     for (m, markup) in markups.iter().enumerate() {
         let lps = is_lps(markup)
             .ok_or_else(|| damaged(name, format!("markups[{m}].coordinateSystem"), "it is neither LPS nor RAS"))?;
+        match markup["type"].as_str() {
+            None | Some("Fiducial" | "Line" | "Curve" | "ClosedCurve" | "Angle") => {}
+            Some(other) => {
+                let problem = format!(
+                    "`{other}` is placed by more than its points, which alone are carried; save the points as a list"
+                );
+                return Err(damaged(name, format!("markups[{m}].type"), problem));
+            }
+        }
+        if let Some(units) = markup["coordinateUnits"].as_str().filter(|units| *units != "mm") {
+            return Err(damaged(name, format!("markups[{m}].coordinateUnits"), format!("`{units}`; save it in mm")));
+        }
         for (n, point) in
             markup["controlPoints"].as_array().into_iter().flatten().enumerate().filter(|(_, p)| is_placed(p))
         {

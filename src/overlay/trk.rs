@@ -91,7 +91,15 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         return Err(damaged(name, "vox_to_ras", problem));
     }
     let order = &bytes[948..952];
-    let named = if order[0] == 0 { Some(axes_of(&vox_to_ras)) } else { axes_named(order) };
+    // TrackVis takes an empty one for LPS, other programs for the order of the matrix.
+    const LPS: [(usize, bool); 3] = [(0, false), (1, false), (2, true)];
+    let unnamed = order[0] == 0;
+    if unnamed && axes_of(&vox_to_ras) != LPS {
+        let problem =
+            "it is empty, which programs read in two ways; save the file with its reference image (dipy does)";
+        return Err(damaged(name, "voxel_order", problem));
+    }
+    let named = if unnamed { Some(LPS) } else { axes_named(order) };
     let named = named.ok_or_else(|| damaged(name, "voxel_order", "it does not name three axes"))?;
     // To voxels in the order of the file's axes, then in that of the matrix.
     let scale = Matrix4::new_nonuniform_scaling(&Vector3::from(sizes.map(|s| 1.0 / s)));

@@ -24,4 +24,4 @@ pub use rigid::{
     FitQuality, FitWarning, RegisterError, RelativeSize, RigidFit, RigidMasks, RigidSettings, register_rigid,
 };
 pub use two_scans::{register_two_scans, register_two_scans_near};
-pub use whole_head::{MeanHead, register_to_mean_head};
+pub use whole_head::{MeanHead, register_to_mean_head, register_to_mean_head_from};

@@ -185,6 +185,7 @@ pub(super) fn optimise(
 }
 
 /// The reach of a coarse search around its guess.
+#[derive(Clone)]
 pub(super) struct Reach {
     /// Turns of the guess.
     pub turns: Vec<Rotation3<f64>>,

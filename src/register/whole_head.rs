@@ -18,7 +18,7 @@ use super::pyramid::{on_grid_of, reduced_to};
 use super::rigid::{FitQuality, RegisterError, RigidFit, side};
 use super::sample::{Draw, draw};
 use super::search::{Freedom, Level, Measure, Reach, TETHER, coarse, optimise, rank, turns_about_axes};
-use crate::geometry::{Frame, Native, RigidTransform};
+use crate::geometry::{Frame, Native, Position, RigidTransform};
 use crate::image::{Mask, Volume, morphology};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -39,7 +39,8 @@ const SEARCHED: usize = 2;
 const SCALES: [f64; 2] = [0.93, 1.08];
 /// Local correlation with the mean head above which no other start is tried.
 const CLEAR: f64 = 0.5;
-/// Local correlation below which no head was found: wrong poses of real heads stay well below, right ones above.
+/// Local correlation below which no head was found. Right poses of whole heads reach .57 and more; a wrong one was seen to
+/// reach .36, so between the two it is said (`FitWarning::HardlyAHead`).
 const LEAST: f64 = 0.35;
 
 /// Loss of local correlation after which the last step is undone.
@@ -189,7 +190,8 @@ fn range_of_tissue(image: &Volume<f32, Native>, inside: &Mask<Native>) -> [f32; 
 /// Finds the rigid motion that takes a head onto the mean head.
 ///
 /// Starts from aligned centres and from where the scan lies, turned by up to 30 degrees; when none of them is clearly a
-/// head, as a brain without scalp and skull, and turned by up to 75 degrees about any axis. Each is refined with 12
+/// head, as a brain without scalp and skull, turned by up to 75 degrees about any axis, turned as a header that has lost its
+/// axes leaves it, and at last around the best of these. Each is refined with 12
 /// parameters held to the sizes of heads, at 4 mm; the best by local correlation over the brain is finished at 2 mm. The
 /// motion is the polar part of the affine map.
 ///
@@ -202,37 +204,80 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
     let moving = side("moving", moving, None)?;
     let subject = Subject::new(&moving.image, None);
     let whole = head.prepared();
+    let guesses = [aligned(&whole, &subject), as_it_lies(&whole)];
     let near = Reach {
         turns: turns_about_axes(20f64.to_radians()),
         shifts_mm: [vec![-15.0, 15.0], vec![-25.0, 0.0, 25.0], vec![-50.0, -25.0, 0.0, 25.0, 50.0]],
         scales: SCALES.to_vec(),
         freedom: Freedom::Affine(TETHER),
     };
-    let mut found = searched(&whole, &subject, &near, 4);
+    let mut found = searched(&whole, &subject, &guesses, &near, 4);
     let mut stripped = None;
     if found.likeness < CLEAR {
         let bare = stripped.insert(head.stripped());
-        found = found.or(searched(bare, &subject, &near, 4), true);
+        found = found.or(searched(bare, &subject, &guesses, &near, 4), true);
     }
-    if found.likeness < CLEAR {
-        let far = Reach { turns: turns_within(75f64.to_radians(), 25f64.to_radians()), ..near };
-        found = found.or(searched(&whole, &subject, &far, 6), false);
-        if let Some(bare) = &stripped {
-            found = found.or(searched(bare, &subject, &far, 6), true);
+    let mut wider = |found: Found, guesses: &[Pose], reach: &Reach| {
+        if found.likeness >= CLEAR {
+            return found;
         }
-    }
+        let found = found.or(searched(&whole, &subject, guesses, reach, 6), false);
+        let bare = stripped.get_or_insert_with(|| head.stripped());
+        found.or(searched(bare, &subject, guesses, reach, 6), true)
+    };
+    let far = Reach { turns: turns_within(75f64.to_radians(), 25f64.to_radians()), ..near.clone() };
+    found = wider(found, &guesses, &far);
+    let anyhow = [-35.0, 0.0, 35.0];
+    let lost =
+        Reach { turns: turns_of_lost_axes(), shifts_mm: std::array::from_fn(|_| anyhow.to_vec()), ..near.clone() };
+    found = wider(found, &guesses, &lost);
+    let around = [found.pose];
+    found = wider(found, &around, &near);
     let head = stripped.filter(|_| found.bare).unwrap_or(whole);
+    finished(&head, &subject, found)
+}
+
+/// The same from one start instead of many: where a hand has laid the head, it is refined from there and judged as any.
+///
+/// # Errors
+/// [`RegisterError`]; [`RegisterError::NoHead`] when what is found from there does not look like a head.
+pub fn register_to_mean_head_from<M: Frame, F: Frame>(
+    moving: &Volume<f32, M>,
+    head: &MeanHead<'_, F>,
+    start: &RigidTransform<M, F>,
+) -> Result<RigidFit<M, F>, RegisterError> {
+    let moving = side("moving", moving, None)?;
+    let subject = Subject::new(&moving.image, None);
+    let moving_from_head = start.inverse();
+    let centre = head.centre_mm();
+    let target = moving_from_head.apply(Position::from_point(Point3::from(centre))).mm.coords;
+    let linear = moving_from_head.rotation.to_rotation_matrix().into_inner();
+    let start = Pose { linear, centre, target };
+    let [likelier, _] = likelier_first(head, &subject, &start);
+    let pose = refined(&search_level(&likelier, &subject, 1, 15_000), &start);
+    // There was no other start that it could stand out from.
+    let distinctness = f64::INFINITY;
+    let found = Found { likeness: likeness(&likelier, &subject, &pose), pose, distinctness, bare: false };
+    finished(&likelier, &subject, found)
+}
+
+/// The last step from what a search found, at the finest level; its rotation and shift.
+fn finished<M: Frame, F: Frame>(
+    head: &Prepared,
+    subject: &Subject,
+    found: Found,
+) -> Result<RigidFit<M, F>, RegisterError> {
     let Found { likeness: likeness_4mm, pose, distinctness, .. } = found;
     if likeness_4mm < LEAST {
         return Err(RegisterError::NoHead { likeness: likeness_4mm, least: LEAST });
     }
-
-    let last = level(&head, &subject, 2, 80_000);
+    let last = level(head, subject, 2, 80_000);
     let stopping = Stopping { longest_step_mm: 1.0, shortest_step_mm: 5e-3, evaluations: 60 };
     let optimum = optimise(&last, &pose, Freedom::Affine(TETHER), None, stopping);
     // The last step climbs another measure than the one that judges: where it ran away, it is not taken.
-    let ran_away = likeness(&head, &subject, &optimum.pose) < likeness_4mm - DRIFT;
-    let finished = if ran_away { pose } else { optimum.pose };
+    let likeness_2mm = likeness(head, subject, &optimum.pose);
+    let ran_away = likeness_2mm < likeness_4mm - DRIFT;
+    let (finished, likeness) = if ran_away { (pose, likeness_4mm) } else { (optimum.pose, likeness_2mm) };
     let at = last.at(&finished);
     let quality = FitQuality {
         mutual_information: at.mutual_information,
@@ -242,6 +287,7 @@ pub fn register_to_mean_head<M: Frame, F: Frame>(
         mirrored_ratio: None,
         evaluations: optimum.evaluations,
         size: None,
+        likeness: Some(likeness),
     };
     let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&finished.linear));
     let moving_from_head: RigidTransform<Native, Native> =
@@ -265,17 +311,24 @@ impl Found {
     }
 }
 
-/// The most likely of the `keep` best poses within reach of aligned centres.
-fn searched(head: &Prepared, subject: &Subject, reach: &Reach, keep: usize) -> Found {
+/// Both centres in one place.
+fn aligned(head: &Prepared, subject: &Subject) -> Pose {
+    Pose { target: head::centre_mm(&subject.foreground), ..as_it_lies(head) }
+}
+
+/// The scan where its header puts it.
+fn as_it_lies(head: &Prepared) -> Pose {
+    Pose { linear: Matrix3::identity(), centre: head.centre_mm, target: head.centre_mm }
+}
+
+/// The most likely of the `keep` best poses within reach of the first of the guesses, or one of the others.
+fn searched(head: &Prepared, subject: &Subject, guesses: &[Pose], reach: &Reach, keep: usize) -> Found {
     /// What an ordinary wrong pose agrees, at least: what more can be said is not a matter of the scan.
     const ORDINARY: f64 = 0.02;
     let start_level = search_level(head, subject, 0, 2500);
     let first = search_level(head, subject, 1, 15_000);
-    let centre = head.centre_mm;
-    let aligned = Pose { linear: Matrix3::identity(), centre, target: head::centre_mm(&subject.foreground) };
-    let as_they_lie = Pose { target: centre, ..aligned };
-    let (starts, ordinary) = coarse(&start_level, &[aligned, as_they_lie], reach, keep);
-    let mut best = Found { likeness: 0.0, pose: aligned, distinctness: 0.0, bare: false };
+    let (starts, ordinary) = coarse(&start_level, guesses, reach, keep);
+    let mut best = Found { likeness: 0.0, pose: guesses[0], distinctness: 0.0, bare: false };
     for start in &starts {
         let pose = refined(&first, start);
         let likeness = likeness(head, subject, &pose);
@@ -325,6 +378,18 @@ fn turns_within(reach_rad: f64, step_rad: f64) -> Vec<Rotation3<f64>> {
     turns
 }
 
+/// The 24 turns that bring axes onto axes, each with the head level and nodding by 20 degrees either way.
+fn turns_of_lost_axes() -> Vec<Rotation3<f64>> {
+    let nods = [0.0, -20f64, 20.0].map(|nod| Rotation3::from_axis_angle(&Vector3::x_axis(), nod.to_radians()));
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let signed = || axes.into_iter().flat_map(|axis| [axis, -axis]);
+    let pairs = signed().flat_map(|x| signed().map(move |y| (x, y))).filter(|(x, y)| x.dot(y) == 0.0);
+    pairs
+        .map(|(x, y)| Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, x.cross(&y)])))
+        .flat_map(|turn| nods.map(|nod| turn * nod))
+        .collect()
+}
+
 /// How much a scan seen through a pose looks like the mean head: the mean local correlation over the brain and its rim at
 /// 4 mm, less where little of it is in the field of view.
 pub(super) fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
@@ -335,7 +400,7 @@ pub(super) fn likeness(head: &Prepared, subject: &Subject, pose: &Pose) -> f64 {
             return None;
         }
         let x = grid.position(Point3::from(grid.voxel(n).map(|i| i as f64))).mm.coords;
-        let p = crate::geometry::Position::from_point(Point3::from(pose.linear * (x - pose.centre) + pose.target));
+        let p = Position::from_point(Point3::from(pose.linear * (x - pose.centre) + pose.target));
         let known = subject.known[1].as_ref().is_none_or(|k| k.nearest(p).unwrap_or(false));
         if known { image.trilinear(p) } else { None }
     };

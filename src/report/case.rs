@@ -15,6 +15,7 @@ use super::shift_figure::{prediction_figure, shift_figure};
 use crate::artefact::{sha256_hex, write_whole};
 use crate::experiment::estimate::{SEEN_AT, SEEN_DISPLACEMENT};
 use crate::experiment::field::BrainShift;
+use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation};
 use crate::geometry::Mni;
@@ -132,7 +133,7 @@ fn read_with_images(folder: &Path) -> Result<(CasePage, Option<CaseImages>), Rep
     page.prediction = case.numbers(layout::PREDICTION_JSON)?;
     page.evaluation = evaluation_of(&case)?;
     page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
-    page.landmarks = case.numbers(layout::LANDMARKS_JSON)?.filter(|_| page.brain_shift.is_some());
+    page.landmarks = landmarks_in(&case)?.filter(|_| page.brain_shift.is_some());
     let estimated = outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some());
     // Sections that need nothing of each other are drawn side by side.
     let ((scans, cuts), (results, (shift, (expected, residuals)))) = rayon::join(
@@ -169,6 +170,27 @@ fn evaluation_of(case: &Case<'_>) -> Result<Option<PredictionEvaluation>, Report
     let sum = case.bytes(layout::PREDICTION_JSON)?.map(|bytes| sha256_hex(&bytes));
     let found: Option<PredictionEvaluation> = case.numbers(layout::EVALUATION_JSON)?;
     Ok(found.filter(|found| sum.as_ref() == Some(&found.prediction_sha256)))
+}
+
+/// Landmarks that were held against the results that are there now.
+fn landmarks_in(case: &Case<'_>) -> Result<Option<Evaluation>, ReportError> {
+    let found: Option<Evaluation> = case.numbers(layout::LANDMARKS_JSON)?;
+    let now = found.is_some().then(|| landmarks_of(case.folder)).transpose()?;
+    Ok(found.filter(|found| now.as_ref() == Some(&found.of_sha256)))
+}
+
+/// Checksum of the results that landmarks in a case are carried by.
+///
+/// # Errors
+/// [`ReportError`] for a file that cannot be read.
+pub fn landmarks_of(folder: &Path) -> Result<String, ReportError> {
+    let case = Case { folder };
+    let results = [layout::SHIFT_JSON, layout::OUTCOME].map(|file| case.bytes(file));
+    let mut all = Vec::new();
+    for bytes in results {
+        all.extend(bytes?.unwrap_or_default());
+    }
+    Ok(sha256_hex(&all))
 }
 
 /// Whose case it is: `sub-01` of `sub-01/hgm`, else the folder's name.

@@ -39,6 +39,16 @@ pub fn landmark_table(found: &Evaluation) -> String {
         let errors: Vec<String> = l.error_mm.iter().map(|e| format!("{e:>7.2}")).collect();
         text += &format!("{:<14} {:<9} {}\n", l.name, l.place, errors.join(" "));
     }
+    let counted = found.summary.first().map_or(0, |s| s.landmarks);
+    if counted < found.landmarks.len() {
+        text += &format!(
+            "\n{} of them outside or in removed tissue: not in the summary\n",
+            found.landmarks.len() - counted
+        );
+    }
+    if !found.left_out.is_empty() {
+        text += &format!("\nin one of the two files alone, not compared: {}\n", found.left_out.join(", "));
+    }
     text
 }
 

@@ -6,11 +6,15 @@ use super::given_brain::GivenBrain;
 use super::overhang::{beyond, onto_the_brain, short};
 use super::posed_scan::PosedScan;
 use super::segmentation::{FoundBrain, find_brain, labelled};
+use super::turned::Turned;
 use super::{AtlasPriors, SegmentError, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation, atlas};
 use crate::geometry::{AffineTransform, Frame, Mni, Position, RigidTransform};
 use crate::image::{Mask, Volume, blank_slices, with_filled};
 use crate::register::deformable::{AtlasFit, DeformableError, DeformableSettings, fit_atlas};
-use crate::register::{MeanHead, RegisterError, RigidFit, register_to_mean_head, subject_from_mean_head, without_gain};
+use crate::register::{
+    MeanHead, RegisterError, RigidFit, register_to_mean_head, register_to_mean_head_from, subject_from_mean_head,
+    without_gain,
+};
 use thiserror::Error;
 
 /// What is left of the misfit between the carried template and a head, mm: about a voxel of the fit's finest level.
@@ -79,6 +83,18 @@ const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 pub fn pose_of_head<F: Frame>(t1: &Volume<f32, F>) -> Result<RigidFit<F, Mni>, RegisterError> {
     let head = atlas::mean_head();
     register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare })
+}
+
+/// Where a head lies in the MNI frame, from where a hand has laid it.
+///
+/// # Errors
+/// The registration's.
+pub fn pose_of_head_from<F: Frame>(
+    t1: &Volume<f32, F>,
+    start: &RigidTransform<F, Mni>,
+) -> Result<RigidFit<F, Mni>, RegisterError> {
+    let head = atlas::mean_head();
+    register_to_mean_head_from(t1, &MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare }, start)
 }
 
 /// The template deformed onto a head; both in the MNI frame reached rigidly.
@@ -295,11 +311,13 @@ pub fn segment_head<F: Frame>(
     let on_template = |p| carried.fit.atlas_from_subject.apply(p);
     segmentation.regions = evidence(&segmentation.labels_mni, &segmentation.t1_mni, on_template);
     segmentation.warnings.extend(gaps.unwrap_or_default());
+    segmentation.warnings.extend(Turned::of(&expected, on_template).noted());
+    let left_out = LeftOut::of(&segmentation.brain_mni, &segmentation.known_mni, on_template);
     if overrides.brain.is_some() {
-        let left_out = LeftOut::of(&segmentation.brain_mni, &segmentation.known_mni, on_template);
         segmentation.warnings.extend(left_out.noted(GivenBrain::Mask));
         return Ok((segmentation, carried.fit));
     }
+    segmentation.warnings.extend(left_out.noted(GivenBrain::Found));
     if outside.share > DOUBTFUL_SHARE || outside.worst.is_some() {
         let (place, percent) = (outside.worst.map(|worst| worst.name), 100.0 * outside.share);
         segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent, place });
@@ -325,12 +343,14 @@ mod tests {
 
     /// The mean head a tenth smaller, turned by half a radian and moved, under a coil that sees one side twice as bright.
     fn a_child_askew() -> (Volume<f32, Pre>, RigidTransform<Pre, Mni>) {
+        a_child_turned_by(Vector3::new(0.35, -0.3, 0.2))
+    }
+
+    /// The same, turned by a rotation vector.
+    fn a_child_turned_by(turn: Vector3<f64>) -> (Volume<f32, Pre>, RigidTransform<Pre, Mni>) {
         let mean = atlas::mean_head();
-        let pose = RigidTransform::<Pre, Mni>::about(
-            Point3::new(0.0, -20.0, 10.0),
-            Vector3::new(0.35, -0.3, 0.2),
-            Vector3::new(12.0, -20.0, 30.0),
-        );
+        let pose =
+            RigidTransform::<Pre, Mni>::about(Point3::new(0.0, -20.0, 10.0), turn, Vector3::new(12.0, -20.0, 30.0));
         let grid = Grid::<Pre>::axis_aligned([70, 76, 70], [3.0; 3], [-115.0, -120.0, -130.0]);
         let middle = Point3::new(0.0, -20.0, 8.0);
         let larger = Matrix3::identity() / 0.9;
@@ -351,14 +371,35 @@ mod tests {
     #[test]
     fn slow_a_small_head_far_askew_under_a_surface_coil_is_found() {
         let (scan, truth) = a_child_askew();
-        let found = pose_of_head(&scan).unwrap().fixed_from_moving;
-        for corner in
-            [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -90.0, 0.0], [0.0, -20.0, 70.0]]
-        {
-            let p = truth.inverse().apply(Position::new(corner[0], corner[1], corner[2]));
-            let apart = found.apply(p).distance_mm(&truth.apply(p));
-            assert!(apart < 1.5, "{apart} mm at {corner:?}");
-        }
+        assert!(apart_mm(&pose_of_head(&scan).unwrap().fixed_from_moving, &truth) < 1.5);
+    }
+
+    /// How far two poses are apart where a head has its sides, front, back and top.
+    fn apart_mm(found: &RigidTransform<Pre, Mni>, truth: &RigidTransform<Pre, Mni>) -> f64 {
+        let corners =
+            [[60.0, -20.0, 10.0], [-60.0, -20.0, 10.0], [0.0, 50.0, 20.0], [0.0, -90.0, 0.0], [0.0, -20.0, 70.0]];
+        let apart = corners.map(|[x, y, z]| {
+            let p = truth.inverse().apply(Position::new(x, y, z));
+            found.apply(p).distance_mm(&truth.apply(p))
+        });
+        apart.into_iter().fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn slow_a_head_upside_down_is_found_from_a_start_by_hand() {
+        // Further than any start of the search lies.
+        let (scan, truth) = a_child_turned_by(Vector3::new(0.0, 2.6, 0.3));
+        let off = RigidTransform::<Mni, Mni>::about(
+            Point3::new(0.0, -18.0, 8.0),
+            Vector3::new(0.2, -0.15, 0.2),
+            Vector3::new(8.0, -10.0, 9.0),
+        );
+        let start = truth.then(&off);
+        assert!(apart_mm(&start, &truth) > 20.0);
+        assert!(apart_mm(&pose_of_head_from(&scan, &start).unwrap().fixed_from_moving, &truth) < 1.5);
+        // From nowhere near there is no head.
+        let upright = RigidTransform::about(Point3::origin(), Vector3::zeros(), Vector3::zeros());
+        assert!(matches!(pose_of_head_from(&scan, &upright), Err(RegisterError::NoHead { .. })));
     }
 
     #[test]

@@ -26,6 +26,7 @@ mod region;
 mod scan_quality;
 mod segmentation;
 mod sulci;
+mod turned;
 mod ventricle;
 mod warning;
 
@@ -33,7 +34,9 @@ pub use crate::anatomy::label;
 pub use agreement::{Disagreement, disagreement};
 pub use bias::LogBias;
 pub use brain::BrainSettings;
-pub use carried::{HeadError, carried_priors, fit_template, pose_of_head, segment_head, without_gaps};
+pub use carried::{
+    HeadError, carried_priors, fit_template, pose_of_head, pose_of_head_from, segment_head, without_gaps,
+};
 pub use confidence::RegionEvidence;
 pub use coverage::LeftOut;
 pub use given_brain::GivenBrain;

@@ -11,7 +11,9 @@ use super::native::{labels_on, mask_on};
 use super::noise::calmed;
 use super::posed_scan::PosedScan;
 use super::priors::AtlasPriors;
-use super::ventricle::{VentricleSettings, enhanced_plexus, ventricles, with_shared_wall, with_white_walls};
+use super::ventricle::{
+    VentricleSettings, enhanced_plexus, not_ventricles, ventricles, with_shared_wall, with_white_walls,
+};
 use super::warning::SegmentWarning;
 use crate::geometry::{Frame, Mni};
 use crate::image::blocks::{coarser, on_finer_grid};
@@ -274,6 +276,7 @@ pub(super) fn labelled<F: Frame>(
     drop(raw);
     let ventricle = if let Some(mask) = overrides.ventricle {
         let given = mask_on(mask, &grid, &t1_from_mni);
+        warnings.extend(not_ventricles(&given, &even, priors, &model));
         at_each(&even, |n| given.data[n] && brain.data[n])
     } else {
         let plexus = enhanced_plexus(&even, model.means[2], priors);

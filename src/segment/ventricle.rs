@@ -4,6 +4,7 @@ use super::brain::at_each;
 use super::label::{GREY_MATTER, WHITE_MATTER};
 use super::mixture::Mixture;
 use super::priors::AtlasPriors;
+use super::warning::SegmentWarning;
 use crate::geometry::Mni;
 use crate::image::components::{Connectivity, fill_holes, without_islands};
 use crate::image::gaussian::gaussian;
@@ -39,6 +40,28 @@ pub(super) fn enhanced_plexus(t1: &Volume<f32, Mni>, white_mean: f64, priors: &A
     let bright = at_each(t1, |n| priors.ventricle_mm.data[n] < -DEPTH_MM && f64::from(t1.data[n]) >= white_mean);
     let around = dilate(&bright, 1.5);
     at_each(t1, |n| around.data[n] && priors.ventricle_mm.data[n] < DEPTH_MM)
+}
+
+/// What to say of a mask of the ventricles that lies on tissue, or far from the template's.
+pub(super) fn not_ventricles(
+    given: &Mask<Mni>,
+    even: &Volume<f32, Mni>,
+    priors: &AtlasPriors,
+    model: &Mixture,
+) -> Option<SegmentWarning> {
+    /// Wide ventricles are followed by the fit, all but this.
+    const FAR_MM: f32 = 15.0;
+    const NOTED_PERCENT: f64 = 35.0;
+    let between = f64::midpoint(model.means[0], model.means[1]);
+    let percent = |of: &dyn Fn(usize) -> bool| {
+        let drawn = (0..given.data.len()).filter(|&n| given.data[n]);
+        let (all, held) = drawn.fold((0usize, 0usize), |(all, held), n| (all + 1, held + usize::from(of(n))));
+        100.0 * held as f64 / all.max(1) as f64
+    };
+    let tissue_percent = percent(&|n| f64::from(even.data[n]) > between);
+    let far_percent = percent(&|n| priors.ventricle_mm.data[n] > FAR_MM);
+    (tissue_percent.max(far_percent) >= NOTED_PERCENT)
+        .then_some(SegmentWarning::NotVentricles { tissue_percent, far_percent })
 }
 
 /// The ventricles among the voxels of `csf`, on the working grid; may be empty.

@@ -79,10 +79,22 @@ pub enum SegmentWarning {
         /// Share of that layer there, in percent.
         percent: f64,
     },
+    /// The template was fitted in another pose than the one found.
+    #[error(
+        "the fitted template is turned by {deg:.0} degrees and moved by {shift_mm:.0} mm from the pose that was found: what is taken \
+         from the frame (gravity, falx, base, names of places) is off by as much; give the pose by hand, or where to look for it"
+    )]
+    PoseOff {
+        /// Angle, degrees.
+        deg: f64,
+        /// Way of the brain's middle, mm.
+        shift_mm: f64,
+    },
     /// A brain that was given leaves out parts of the one that the fitted template expects.
     #[error(
-        "the {given} leaves out {percent:.0} % of the brain that the fitted template expects{}: is it of this scan, and whole?",
-        if parts.is_empty() { String::new() } else { format!("; {}", in_words(parts, "is missing")) }
+        "the {given} leaves out {percent:.0} % of the brain that the fitted template expects{}: {}",
+        if parts.is_empty() { String::new() } else { format!("; {}", in_words(parts, "is missing")) },
+        given.question()
     )]
     LeavesOut {
         /// What was given.
@@ -137,6 +149,17 @@ pub enum SegmentWarning {
         /// Volume, cc.
         cc: f64,
     },
+    /// A mask of the ventricles lies on tissue, or where none are.
+    #[error(
+        "of the ventricle mask {tissue_percent:.0} % is as bright as tissue and {far_percent:.0} % lies far from where the fitted \
+         template has its ventricles: is it of this scan, and of the ventricles?"
+    )]
+    NotVentricles {
+        /// Share that is brighter than half way from fluid to grey matter, percent.
+        tissue_percent: f64,
+        /// Share that is far from the template's ventricles, percent.
+        far_percent: f64,
+    },
     /// No ventricle was found.
     #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
     NoVentricle,
@@ -156,6 +179,13 @@ const STILL_THERE_PERCENT: f64 = 85.0;
 /// plane cuts that part off.
 const HIDDEN_PERCENT: f64 = 16.0;
 
+/// A fit this far from the pose found it wrong: no head lies so.
+const OTHER_POSE_DEG: f64 = 10.0;
+const OTHER_POSE_MM: f64 = 18.0;
+
+/// So much of a ventricle mask on tissue or far from where ventricles are, percent: it is of something else.
+const OF_SOMETHING_ELSE_PERCENT: f64 = 60.0;
+
 impl SegmentWarning {
     /// The warning of a gap in a scan of this grid.
     pub(super) fn blank<F: Frame>(gap: &BlankSlices, grid: &Grid<F>) -> Self {
@@ -168,6 +198,10 @@ impl SegmentWarning {
         match self {
             Self::CavityAtEdge { percent } => *percent >= HIDDEN_PERCENT,
             Self::UnchangedCavity { percent } => *percent >= STILL_THERE_PERCENT,
+            Self::NotVentricles { tissue_percent, far_percent } => {
+                tissue_percent.max(*far_percent) >= OF_SOMETHING_ELSE_PERCENT
+            }
+            Self::PoseOff { deg, shift_mm } => *deg >= OTHER_POSE_DEG || *shift_mm >= OTHER_POSE_MM,
             Self::LeavesOut { given, percent, parts } => given.leaves_too_much(parts, *percent),
             _ => false,
         }

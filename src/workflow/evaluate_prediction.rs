@@ -2,7 +2,8 @@
 
 use super::case::Case;
 use super::error::{EvaluateError, WorkflowError};
-use super::evaluate::{Landmarks, Pair, evaluate_landmarks, pairs};
+use super::evaluate::evaluate_landmarks;
+use super::landmark_pairs::{Landmarks, Pair, Paired, check_frames};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
 use super::outcome::write_page;
@@ -98,6 +99,7 @@ pub fn evaluate_prediction(folder: &Path, seen: &SeenAfterwards) -> Result<Predi
         evaluation.taken = Some(taken_against_plan(&case, later)?);
     }
     evaluation.other_way_round = marked.as_ref().and_then(|marked| marked.other_way_round);
+    evaluation.landmarks_alone = marked.as_ref().map_or(0, |marked| marked.alone);
     evaluation.against.extend(marked.as_ref().map(|_| "landmarks".to_owned()));
     for head in &prediction.heads {
         let foretold = Foretold::read(&case, &head.state)?;
@@ -164,6 +166,8 @@ fn taken_against_plan(prediction: &Case, later: &Case) -> Result<TakenAgainstPla
 /// Landmarks in the frame of the scan before.
 struct Marked {
     file: String,
+    /// How many one file alone holds.
+    alone: usize,
     /// Name, place before, displacement without the rigid motion.
     rows: Vec<(String, [f64; 3], [f64; 3])>,
     /// The rigid motion by hand fits far better turned round.
@@ -181,7 +185,7 @@ fn apart_mm(pairs: &[Pair], pre_from_post: &RigidTransform<Post, Pre>) -> f64 {
 impl Marked {
     fn read(landmarks: &Landmarks, later: Option<&Case>, by_hand: Option<&Path>) -> Result<Self, WorkflowError> {
         let file = shown(&landmarks.pre);
-        let found: Vec<Pair> = pairs(landmarks)?;
+        let Paired { pairs: found, left_out } = Paired::read(landmarks)?;
         let pre_from_post: RigidTransform<Post, Pre> = match (by_hand, later) {
             (Some(path), _) => rigid_from_text(&read_text(path)?, &shown(path))?,
             (None, Some(later)) => transforms(later)?.0,
@@ -192,6 +196,9 @@ impl Marked {
         };
         // What the file would say, were it the other way round.
         let turned = pre_from_post.inverse();
+        if by_hand.is_none() {
+            check_frames(&found, &turned, landmarks)?;
+        }
         let inverse = RigidTransform::new(turned.rotation, turned.translation_mm);
         let other_way_round = OtherWayRound::of(apart_mm(&found, &pre_from_post), apart_mm(&found, &inverse));
         let moved = |(name, x, y): Pair| {
@@ -199,7 +206,7 @@ impl Marked {
             (name, x, [0, 1, 2].map(|a| back[a] - x[a]))
         };
         let rows = found.into_iter().map(moved).collect();
-        Ok(Self { file, rows, other_way_round: other_way_round.filter(|_| by_hand.is_some()) })
+        Ok(Self { file, alone: left_out.len(), rows, other_way_round: other_way_round.filter(|_| by_hand.is_some()) })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The files a user gives: two scans and masks of their own.
 
-use super::error::{InputError, LabelMapError, MaskRole, WorkflowError};
+use super::error::{AskedError, InputError, LabelMapError, MaskRole, WorkflowError};
 use super::labels::labels_of_tool;
 use super::user_file::{read_input, read_text, shown};
 use super::warning::{Warning, all_of};
@@ -28,6 +28,8 @@ pub struct Inputs {
     /// The pose of the pre-operative scan in the MNI frame by hand: a rigid transform as 4x4 text (RAS, mm, maps a point of the
     /// scan) or ITK's.
     pub pose: Option<PathBuf>,
+    /// The same, roughly: the pose is looked for from there.
+    pub pose_start: Option<PathBuf>,
     /// The brain, in the pre-operative scan's grid.
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles before the operation, in the grid of either scan.
@@ -47,6 +49,9 @@ impl Inputs {
     }
 }
 
+/// How far apart two programs may write one voxel of one grid.
+const TOLERANCE_MM: f64 = 0.2;
+
 /// A mask on the grid of an image; what is odd about it is added to the warnings.
 ///
 /// # Errors
@@ -57,8 +62,6 @@ pub fn read_mask_of(
     options: &ReadOptions,
     warnings: &mut Vec<Warning>,
 ) -> Result<Mask<Native>, WorkflowError> {
-    // What two programs may disagree about an origin.
-    const TOLERANCE_MM: f64 = 0.1;
     let name = path.display().to_string();
     let (mask, odd) = nifti::decode_mask(&read_input(path)?, &name, options)?;
     if !mask.grid.coincides(grid, TOLERANCE_MM) {
@@ -115,10 +118,39 @@ impl Scans {
     }
 }
 
+/// Where the pre-operative scan lies in the MNI frame, as a hand has laid it, with the bytes of its file.
+#[derive(Clone, Debug)]
+pub(crate) struct HandPose {
+    pub mni_from_pre: RigidTransform<Pre, Mni>,
+    /// It is where the search begins, and not its end.
+    pub start: bool,
+    bytes: Vec<u8>,
+}
+
+impl HandPose {
+    /// Reads the one that was given.
+    pub fn read(pose: Option<&Path>, start: Option<&Path>, dseg: Option<&Path>) -> Result<Option<Self>, WorkflowError> {
+        let (path, start) = match (pose, start) {
+            (Some(_), Some(_)) => return Err(AskedError::PoseAndStart.into()),
+            (None, Some(_)) if dseg.is_some() => return Err(AskedError::StartBesideLabels.into()),
+            (Some(pose), None) => (pose, false),
+            (None, Some(start)) => (start, true),
+            (None, None) => return Ok(None),
+        };
+        let text = read_text(path)?;
+        Ok(Some(Self { mni_from_pre: rigid_from_text(&text, &shown(path))?, start, bytes: text.into_bytes() }))
+    }
+
+    /// What it is, and its file.
+    pub fn given(&self) -> (MaskRole, &[u8]) {
+        (if self.start { MaskRole::PoseStart } else { MaskRole::Pose }, &self.bytes)
+    }
+}
+
 /// The user's own masks with the bytes of their files.
 #[derive(Debug)]
 pub(crate) struct OwnMasks {
-    pub pose: Option<(RigidTransform<Pre, Mni>, Vec<u8>)>,
+    pub pose: Option<HandPose>,
     pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: Option<(GivenMask, Vec<u8>)>,
     pub ventricle: Option<(GivenMask, Vec<u8>)>,
@@ -134,9 +166,8 @@ impl OwnMasks {
         };
         labels_alone(inputs.dseg.as_deref(), [&inputs.brain_mask, &inputs.ventricle_mask])?;
         let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), &scans.pre, work));
-        let pose = inputs.pose.as_deref().map(given_pose);
         Ok(Self {
-            pose: pose.transpose()?,
+            pose: HandPose::read(inputs.pose.as_deref(), inputs.pose_start.as_deref(), inputs.dseg.as_deref())?,
             labels: labels.transpose()?,
             brain: read(MaskRole::Brain, &inputs.brain_mask)?,
             ventricle: read(MaskRole::Ventricle, &inputs.ventricle_mask)?,
@@ -147,7 +178,7 @@ impl OwnMasks {
 
     /// What says where the pre-operative scan lies, by role.
     pub fn posing(&self) -> impl Iterator<Item = (MaskRole, &[u8])> {
-        let pose = self.pose.as_ref().map(|(_, bytes)| (MaskRole::Pose, bytes.as_slice()));
+        let pose = self.pose.as_ref().map(HandPose::given);
         pose.into_iter().chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
 
@@ -172,12 +203,6 @@ pub(super) fn labels_alone(dseg: Option<&Path>, [brain, ventricle]: [&Option<Pat
         Some((role, _)) => Err(InputError::BesideLabels { role }),
         None => Ok(()),
     }
-}
-
-/// Reads a pose of the pre-operative scan in the MNI frame.
-pub(super) fn given_pose(path: &Path) -> Result<(RigidTransform<Pre, Mni>, Vec<u8>), WorkflowError> {
-    let text = read_text(path)?;
-    Ok((rigid_from_text(&text, &shown(path))?, text.into_bytes()))
 }
 
 /// Reads a label map of the pre-operative scan. Another grid in the scanner's coordinates will do: FreeSurfer and SynthSeg
@@ -232,17 +257,23 @@ fn given_mask(
     scans: &Scans,
     work: &Work<'_>,
 ) -> Result<(GivenMask, Vec<u8>), WorkflowError> {
-    // Half a voxel is what two programs may disagree about an origin; more is another grid.
-    const TOLERANCE_MM: f64 = 0.1;
     let bytes = read_input(path)?;
     let name = format!("{role} {}", shown(path));
     let (mask, odd): (Mask<Native>, _) = nifti::decode_mask(&bytes, &name, &work.settings.image)?;
     let pre: Grid<Native> = scans.pre.grid.relabelled();
     let post: Grid<Native> = scans.post.grid.relabelled();
-    let given = if mask.grid.coincides(&pre, TOLERANCE_MM) {
-        GivenMask::Pre(mask.relabelled())
-    } else if mask.grid.coincides(&post, TOLERANCE_MM) {
+    let [on_pre, on_post] = [&pre, &post].map(|grid| mask.grid.coincides(grid, TOLERANCE_MM));
+    let after = on_post && (!on_pre || role.of_post());
+    if on_pre && on_post {
+        let which = if after { "post" } else { "pre" };
+        work.tell(|p| {
+            p.taken_for(&format!("{name}: both scans have its grid; it is taken to lie on the {which}-operative one"));
+        });
+    }
+    let given = if after {
         GivenMask::Post(mask.relabelled())
+    } else if on_pre {
+        GivenMask::Pre(mask.relabelled())
     } else {
         let (found, name) = (mask.grid.dims, shown(path));
         return Err(InputError::MaskGrid { role, name, found, pre: pre.dims, post: post.dims }.into());

@@ -32,6 +32,7 @@ mod fresh;
 mod generative;
 mod inputs;
 mod labels;
+mod landmark_pairs;
 mod law_fitting;
 mod layer;
 mod lock;
@@ -79,12 +80,13 @@ pub use error::{
     MeshFileError, PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
-pub use evaluate::{Landmarks, evaluate_landmarks};
+pub use evaluate::evaluate_landmarks;
 pub use evaluate_prediction::{Evaluated, SeenAfterwards, evaluate_case, evaluate_prediction};
 pub use facts::{EstimateFacts, MeshFacts};
 pub use generative::{GenerativeFiles, Studies, Wanted, fit_gp, hyperparameters, sample_gp, show_gp};
 pub use inputs::{Inputs, ScanSums, read_mask_of};
 pub use labels::{any_labels, labels_of_tool};
+pub use landmark_pairs::Landmarks;
 pub use law_fitting::{FittedLaw, LawTest, fit_laws};
 pub use layer::Layer;
 pub use maps::{WarpTo, default_state};

@@ -1,7 +1,7 @@
 //! The files a user gives before an operation: one scan, the plan, points, masks of their own.
 
 use super::error::{MaskRole, WorkflowError};
-use super::inputs::{given_labels, given_pose, labels_alone, read_mask_of};
+use super::inputs::{HandPose, given_labels, labels_alone, read_mask_of};
 use super::planned_resection::PlannedResection;
 use super::user_file::{read_input, shown};
 use super::warning::{Warning, all_of};
@@ -32,6 +32,8 @@ pub struct PlanInputs {
     pub labels: Option<String>,
     /// As for a pair.
     pub pose: Option<PathBuf>,
+    /// As for a pair.
+    pub pose_start: Option<PathBuf>,
     /// The brain, in the scan's grid.
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles, in the scan's grid.
@@ -56,7 +58,7 @@ pub(crate) struct PlannedScan {
     pub plan: String,
     /// What is to be taken.
     pub resection: Mask<Pre>,
-    pub pose: Option<(RigidTransform<Pre, Mni>, Vec<u8>)>,
+    pub pose: Option<HandPose>,
     pub labels: Option<(LabelMap<Pre>, Vec<u8>)>,
     pub brain: OwnMask,
     pub ventricle: OwnMask,
@@ -107,7 +109,7 @@ impl PlannedScan {
         let (brain, ventricle) = (own(&inputs.brain_mask)?, own(&inputs.ventricle_mask)?);
         let labels = inputs.dseg.as_deref().map(|path| given_labels(path, inputs.labels.as_deref(), &pre, work));
         let labels = labels.transpose()?;
-        let pose = inputs.pose.as_deref().map(given_pose).transpose()?;
+        let pose = HandPose::read(inputs.pose.as_deref(), inputs.pose_start.as_deref(), inputs.dseg.as_deref())?;
         let (sum, shared) = (sha256_hex(&bytes), Rc::default());
         Ok(Self { sum, pre, warnings, plan_warnings, plan, resection, pose, labels, brain, ventricle, shared })
     }
@@ -128,7 +130,7 @@ impl PlannedScan {
 
     /// What says where the scan lies, by role.
     pub fn posing(&self) -> impl Iterator<Item = (MaskRole, &[u8])> {
-        let pose = self.pose.as_ref().map(|(_, bytes)| (MaskRole::Pose, bytes.as_slice()));
+        let pose = self.pose.as_ref().map(HandPose::given);
         pose.into_iter().chain(self.labels.as_ref().map(|(_, bytes)| (MaskRole::Labels, bytes.as_slice())))
     }
 

@@ -17,6 +17,7 @@ use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, sha256_hex};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
+use crate::experiment::resection::ResectionSettings;
 use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
 use crate::report::refusal::{as_scanned, posed};
@@ -53,6 +54,11 @@ pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
     }
     let refused = |source| WorkflowError::Engine { labels: "the mesh".to_owned(), source };
     work.place.programs.engines().check(settings.mesh.engine).map_err(refused)?;
+    let own = &settings.resection;
+    let usual = ResectionSettings::default();
+    if (own.gravity_m_per_s2, own.gravity_frame) != (usual.gravity_m_per_s2, usual.gravity_frame) {
+        work.tell(|p| p.taken_for("gravity of [resection] is not used: how the head lies is `heads` of [predict]"));
+    }
     Ok(())
 }
 

@@ -145,7 +145,7 @@ pub fn register_files(
         // Both or neither.
         std::fs::remove_file(&transform).ok();
     })?;
-    let doubtful = doubts.iter().find(|doubt| matches!(doubt, FitWarning::LowSimilarity { .. }));
+    let doubtful = doubts.iter().find(|doubt| doubt.denies_the_fit());
     if doubtful.is_some() {
         look(&seen, progress);
     }

@@ -44,9 +44,12 @@ pub struct Segmented {
     pub quality: ScanQuality,
     /// What a reader must know.
     pub warnings: Vec<Warning>,
+    /// Why the quality gate refuses them.
+    #[serde(skip)]
+    pub refused: Vec<String>,
 }
 
-/// Labels a scan.
+/// Labels a scan. Labels that are not to be believed are written all the same ([`Segmented::refused`]).
 ///
 /// # Errors
 /// A name for the labels that does not end in .nii.gz, a scan or mask that cannot be used, a head that cannot be labelled, the disk's.
@@ -100,8 +103,10 @@ pub fn segment_file(
     if let Some(path) = &files.write_brain_mask {
         write_whole(path, &brain)?;
     }
+    let belied = found.warnings.iter().filter(|warning| warning.belies_the_masks());
+    let refused = belied.map(|warning| format!("{}: {warning}", files.t1.display())).collect();
     warnings.extend(fit.warnings.into_iter().map(Warning::from));
     warnings.extend(found.warnings.into_iter().chain(quality.of_regions()).map(Warning::from));
     let labels = files.output.clone();
-    Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, quality, warnings })
+    Ok(Segmented { labels, volumes: found.volumes, tissue_means: found.tissue_means, quality, warnings, refused })
 }

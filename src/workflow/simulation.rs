@@ -17,7 +17,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Raised when the solver's code changes its results.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// The files of a simulation.
 #[derive(Clone, Debug, Default)]
@@ -80,6 +80,10 @@ pub fn simulate(
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
     check_writable(&files.output)?;
+    let made_of = [Some(&files.mesh), Some(&files.scenario), files.start.as_ref(), files.reference.as_ref()];
+    if made_of.into_iter().flatten().any(|input| same_file(input, &files.output)) {
+        return Err(SimulationError::OverInput { output: files.output.clone() }.into());
+    }
     let mesh_bytes = read_input(&files.mesh)?;
     let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
@@ -162,11 +166,30 @@ fn destination(output: &Path) -> Result<(PathBuf, String), SimulationError> {
 /// The mesh in a file's bytes, by the ending of its name.
 pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationError> {
     let name = path.display().to_string();
-    match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
-        Some("vtu") => Ok(vtu::decode(bytes, &name)?.mesh),
-        Some("msh") => Ok(msh::decode(bytes, &name)?),
-        _ => Err(SimulationError::MeshName { name }),
+    let mesh = match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
+        Some("vtu") => vtu::decode(bytes, &name)?.mesh,
+        Some("msh") => msh::decode(bytes, &name)?,
+        _ => return Err(SimulationError::MeshName { name }),
+    };
+    match same_cells(mesh.tets()) {
+        Some([first, second]) => Err(SimulationError::TwiceTheSameCell { name, first, second }),
+        None => Ok(mesh),
     }
+}
+
+/// Two cells of the same nodes, where there are any.
+fn same_cells(tets: &[[u32; 4]]) -> Option<[usize; 2]> {
+    let mut seen: Vec<([u32; 4], usize)> = tets.iter().enumerate().map(|(cell, tet)| (*tet, cell)).collect();
+    for (nodes, _) in &mut seen {
+        nodes.sort_unstable();
+    }
+    seen.sort_unstable();
+    seen.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| [pair[0].1, pair[1].1])
+}
+
+/// Whether two paths lead to one file that is there.
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// The array `displacement` of a result.

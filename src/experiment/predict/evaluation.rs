@@ -21,8 +21,16 @@ pub struct PredictionEvaluation {
     /// How the rigid motion between the scans fits the landmarks, where it fits them far better turned round.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_way_round: Option<OtherWayRound>,
+    /// How many landmarks one of the two files alone holds: not compared.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub landmarks_alone: usize,
     /// What the figures do not say by themselves, in plain words.
     pub limits: Vec<String>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands it so")]
+fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// One way of lying.
@@ -158,6 +166,9 @@ pub enum EvaluationLimit {
     /// Landmarks have an error of their own, which is not known.
     #[error("Landmarks are taken to be without error.")]
     LandmarksAreTrue,
+    /// Landmarks that belong to none of the other scan.
+    #[error("{0} landmarks stand in one of the two files alone and were not compared.")]
+    LandmarksAlone(usize),
 }
 
 impl PredictionEvaluation {
@@ -182,6 +193,7 @@ impl PredictionEvaluation {
             self.taken.filter(TakenAgainstPlan::is_other).map(EvaluationLimit::OtherOperation),
             fused.then_some(EvaluationLimit::FusedTruth),
             landmarks.then_some(EvaluationLimit::LandmarksAreTrue),
+            (self.landmarks_alone > 0).then_some(EvaluationLimit::LandmarksAlone(self.landmarks_alone)),
         ]
         .into_iter()
         .flatten()

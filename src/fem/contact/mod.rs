@@ -375,19 +375,19 @@ impl Supports {
         Some(forces)
     }
 
-    /// What every wall does, and the pressure on every node, Pa, in solver numbering.
-    pub(super) fn outcome(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> (Vec<ContactOutcome>, Vec<f64>) {
+    /// What every wall does, and the pressure on every node, Pa, in solver numbering; `None` where a node meets no wall.
+    pub(super) fn outcome(&self, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> (Vec<ContactOutcome>, Vec<Option<f64>>) {
         if self.walls.is_empty() {
             return (Vec::new(), Vec::new());
         }
         let parts = self.each(u, nodes_m, 1.0, |_, potential, (gap, normal, _)| (gap, potential.at(gap)[1], normal));
         let mut walls: Vec<ContactOutcome> =
             self.walls.iter().map(|w| ContactOutcome { set: w.set.clone(), ..Default::default() }).collect();
-        let mut pressure_pa = vec![0.0; u.len()];
+        let mut pressure_pa = vec![None; u.len()];
         for (s, (gap, pressure, normal)) in self.standing.iter().zip(parts) {
             let wall = &mut walls[s.wall as usize];
             wall.depth_mm = wall.depth_mm.max(-gap / METRES_PER_MM);
-            pressure_pa[s.node as usize] += pressure;
+            *pressure_pa[s.node as usize].get_or_insert(0.0) += pressure;
             if pressure > 0.0 {
                 wall.area_mm2 += s.area_m2 / METRES_PER_MM.powi(2);
                 (0..3).for_each(|i| wall.force_n[i] += s.area_m2 * pressure * normal[i]);

@@ -17,8 +17,8 @@ impl Law for Definition {
     fn card(&self) -> &'static Card {
         &Card {
             name: "gent",
-            formula: "-mu Jm/2 ln(1 - (I1 - 3)/Jm) - mu ln J + lambda/2 ln^2 J",
-            source: "Gent, Rubber Chem. Technol. 69, 1996; compressible as Horgan and Saccomandi, J. Elasticity 77, 2004",
+            formula: "-mu Jm/2 ln(1 - (I1 - 3 - 2 ln J)/Jm) + lambda/2 ln^2 J",
+            source: "Gent, Rubber Chem. Technol. 69, 1996; compressible as the neo-Hookean law, whose energy is what is limited",
             parameters: &[
                 LawParameter {
                     name: "shear_modulus_pa",
@@ -29,7 +29,7 @@ impl Law for Definition {
                 },
                 LawParameter {
                     name: "jm",
-                    meaning: "Jm, the limit of I1 - 3",
+                    meaning: "Jm, the limit of I1 - 3 (with a change of volume, of I1 - 3 - 2 ln J)",
                     role: Role::Shape,
                     range: Range::POSITIVE,
                     default: None,
@@ -140,7 +140,8 @@ impl UniaxialCurve for Definition {
     }
 }
 
-/// Psi of [`Definition`], infinite for J <= 0 and for I1 - 3 >= Jm.
+/// Psi of [`Definition`], infinite for J <= 0 and for I1 - 3 - 2 ln J >= Jm. That number is twice the neo-Hookean energy over mu:
+/// never negative, and of second order at rest, so that mu and lambda are those of small strains whatever Jm is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gent {
     /// mu, Pa.
@@ -154,14 +155,18 @@ pub struct Gent {
 }
 
 impl Gent {
-    fn of_volume(&self, h: &Matrix3<f64>) -> OfVolume {
-        let logarithm = VolumeLogarithm { floor: self.inversion_threshold };
-        logarithm.energy(self.shear_modulus_pa, self.lame_lambda_pa, volume_change(h))
+    fn logarithm(&self, h: &Matrix3<f64>) -> OfVolume {
+        VolumeLogarithm { floor: self.inversion_threshold }.of(volume_change(h))
     }
 
-    /// (I1 - 3) / Jm with I1 - 3 = 2 tr H + |H|^2.
+    /// -shear ln J + lambda/2 ln^2 J.
+    fn of_volume(&self, h: &Matrix3<f64>, shear: f64) -> OfVolume {
+        VolumeLogarithm { floor: self.inversion_threshold }.energy(shear, self.lame_lambda_pa, volume_change(h))
+    }
+
+    /// (I1 - 3 - 2 ln J) / Jm with I1 - 3 = 2 tr H + |H|^2.
     fn share(&self, h: &Matrix3<f64>) -> f64 {
-        (2.0 * h.trace() + h.norm_squared()) / self.jm
+        (2.0 * h.trace() + h.norm_squared() - 2.0 * self.logarithm(h).value) / self.jm
     }
 }
 
@@ -171,20 +176,23 @@ impl Hyperelastic for Gent {
         if share >= 1.0 {
             return f64::INFINITY;
         }
-        -0.5 * self.shear_modulus_pa * self.jm * (-share).ln_1p() + self.of_volume(h).value
+        -0.5 * self.shear_modulus_pa * self.jm * (-share).ln_1p() + self.of_volume(h, 0.0).value
     }
 
     fn first_piola_kirchhoff_pa(&self, h: &Matrix3<f64>) -> Matrix3<f64> {
         let f = Matrix3::identity() + h;
-        f * (self.shear_modulus_pa / (1.0 - self.share(h))) + cofactors(&f) * self.of_volume(h).first
+        let scale = self.shear_modulus_pa / (1.0 - self.share(h));
+        f * scale + cofactors(&f) * self.of_volume(h, scale).first
     }
 
     fn tangent_pa(&self, h: &Matrix3<f64>) -> Tangent {
         let f = Matrix3::identity() + h;
         let scale = self.shear_modulus_pa / (1.0 - self.share(h));
         let outer = 2.0 * scale / (self.jm * (1.0 - self.share(h)));
-        let mut tangent = Tangent::from_fn(|row, col| outer * f[row] * f[col] + if row == col { scale } else { 0.0 });
-        add_tangent_of_volume(&mut tangent, self.of_volume(h), &f);
+        let grown = f - cofactors(&f) * self.logarithm(h).first;
+        let mut tangent =
+            Tangent::from_fn(|row, col| outer * grown[row] * grown[col] + if row == col { scale } else { 0.0 });
+        add_tangent_of_volume(&mut tangent, self.of_volume(h, scale), &f);
         tangent
     }
 

@@ -261,6 +261,23 @@ mod tests {
     }
 
     #[test]
+    fn every_law_resists_small_changes_of_volume_as_poissons_ratio_says() {
+        for law in LAWS {
+            for (values, poisson_ratio) in law.examples().into_iter().flat_map(|v| [(v.clone(), 0.3), (v, 0.45)]) {
+                let material = Material::new(law, values, poisson_ratio);
+                let (mu, lambda) = (material.shear_modulus_pa(), material.lame_lambda_pa());
+                let tangent = material.law().tangent_pa(&nalgebra::Matrix3::zeros());
+                // Columns first: (0, 4) is dP11/dF22, which is lambda, (0, 0) dP11/dF11.
+                let seen = [tangent[(0, 4)], tangent[(0, 0)] - 2.0 * mu];
+                assert!(
+                    seen.iter().all(|l| (l - lambda).abs() < 1e-9 * lambda.max(mu)),
+                    "{law:?}: {seen:?}, not {lambda}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn every_parameter_a_law_lists_can_be_scaled() {
         for law in LAWS {
             for values in law.examples() {

@@ -4,6 +4,7 @@
 //! Coordinates are single precision as the format demands: good to 4e-6 mm within 128 mm of the origin.
 //! Source: GIFTI Surface Data Format 1.0 (2011), <https://www.nitrc.org/projects/gifti/>.
 
+use super::gifti_space::{Transform, to_scanner};
 use super::{Field, ReadError, WriteError, check_fields, line};
 use crate::mesh::TriMesh;
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -110,18 +111,22 @@ fn data_array(xml: &mut String, intent: &str, number: &str, dims: &[usize], abou
     );
 }
 
-/// The surface in the bytes of a `.surf.gii` file; `name` is what messages call the file.
+/// The surface in the bytes of a `.surf.gii` file, in the scanner's frame where the file says the way there; `name` is what messages
+/// call the file.
 ///
 /// # Errors
-/// [`ReadError`] for a damaged file, arrays kept in another file, and triangles that name nodes which are not there.
+/// [`ReadError`] for a damaged file, arrays kept in another file, triangles that name nodes which are not there, and coordinates of
+/// which nobody knows where they lie.
 pub fn decode_surface(bytes: &[u8], name: &str) -> Result<TriMesh, ReadError> {
     let arrays = arrays(bytes, name)?;
-    let find = |intent: &str, what: &str| -> Result<Vec<f64>, ReadError> {
-        let array = arrays.iter().find(|a| a.intent == intent).ok_or_else(|| ReadError::Unsupported {
+    let find = |intent: &str, what: &str| {
+        arrays.iter().find(|a| a.intent == intent).ok_or_else(|| ReadError::Unsupported {
             file: name.to_owned(),
             field: what.to_owned(),
             problem: format!("there is no array of intent {intent}: this is not a surface file (.surf.gii)"),
-        })?;
+        })
+    };
+    let numbers = |array: &Array, what: &str| -> Result<Vec<f64>, ReadError> {
         let damaged = |problem| ReadError::Damaged { file: name.to_owned(), field: what.to_owned(), problem };
         let values = array.values().map_err(damaged)?;
         if values.len() % 3 != 0 || values.len() != array.count {
@@ -129,13 +134,16 @@ pub fn decode_surface(bytes: &[u8], name: &str) -> Result<TriMesh, ReadError> {
         }
         Ok(values)
     };
-    let nodes_mm = find("NIFTI_INTENT_POINTSET", "coordinates")?.as_chunks::<3>().0.to_vec();
+    let points = find("NIFTI_INTENT_POINTSET", "coordinates")?;
+    let mut nodes_mm = numbers(points, "coordinates")?.as_chunks::<3>().0.to_vec();
     let damaged = |field: &str, problem| ReadError::Damaged { file: name.to_owned(), field: field.to_owned(), problem };
     if let Some(node) = nodes_mm.iter().position(|p: &[f64; 3]| p.iter().any(|x| !x.is_finite())) {
         return Err(damaged("coordinates", format!("node {node} has a coordinate that is not a finite number")));
     }
+    to_scanner(&mut nodes_mm, &points.transforms, &points.about).map_err(|problem| damaged("coordinates", problem))?;
     let mut triangles = Vec::new();
-    for (t, triangle) in find("NIFTI_INTENT_TRIANGLE", "triangles")?.as_chunks::<3>().0.iter().enumerate() {
+    let named = numbers(find("NIFTI_INTENT_TRIANGLE", "triangles")?, "triangles")?;
+    for (t, triangle) in named.as_chunks::<3>().0.iter().enumerate() {
         if let Some(n) = triangle.iter().find(|&&n| n < 0.0 || n as usize >= nodes_mm.len() || n.fract() != 0.0) {
             return Err(damaged("triangles", format!("triangle {t} names node {n} of {}", nodes_mm.len())));
         }
@@ -172,6 +180,9 @@ struct Array {
     count: usize,
     name: String,
     text: String,
+    transforms: Vec<Transform>,
+    /// What else the file says of it, by name.
+    about: Vec<(String, String)>,
 }
 
 impl Array {
@@ -223,6 +234,8 @@ fn arrays(bytes: &[u8], file: &str) -> Result<Vec<Array>, ReadError> {
                 let name = element.local_name().as_ref().to_owned();
                 if name == "DataArray" {
                     arrays.push(array(&element).map_err(|e| damaged("DataArray", e))?);
+                } else if let ("CoordinateSystemTransformMatrix", Some(array)) = (name.as_str(), arrays.last_mut()) {
+                    array.transforms.push(Transform::default());
                 }
                 path.push(name);
             }
@@ -247,6 +260,18 @@ fn take(arrays: &mut [Array], path: &[String], key: &mut String, words: &str) {
         [.., "DataArray", "Data"] => array.text += words,
         [.., "DataArray", "MetaData", "MD", "Name"] if !words.trim().is_empty() => words.trim().clone_into(key),
         [.., "DataArray", "MetaData", "MD", "Value"] if key == "Name" => array.name += words,
+        [.., "DataArray", "MetaData", "MD", "Value"] if !words.trim().is_empty() => {
+            array.about.push((key.clone(), words.to_owned()));
+        }
+        [.., "CoordinateSystemTransformMatrix", part] => {
+            let Some(transform) = array.transforms.last_mut() else { return };
+            match part {
+                "DataSpace" => transform.data_space += words,
+                "TransformedSpace" => transform.transformed_space += words,
+                "MatrixData" => transform.matrix += words,
+                _ => {}
+            }
+        }
         _ => {}
     }
 }

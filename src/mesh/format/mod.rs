@@ -4,6 +4,7 @@
 
 pub mod feb;
 pub mod gifti;
+mod gifti_space;
 pub mod inp;
 pub mod msh;
 pub mod ply;

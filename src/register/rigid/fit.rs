@@ -198,6 +198,7 @@ pub(super) fn fit(
     }
     let last = last.ok_or(RegisterError::NoOverlap)?;
     let quality = FitQuality {
+        likeness: None,
         mutual_information: last.mutual_information,
         normalised_information: last.mutual_information / last.entropy.max(1e-12),
         overlap: last.overlap,

@@ -29,6 +29,9 @@ pub struct FitQuality {
     /// How much longer the head is in one of two scans of it; `None` where none or only parts of them were compared so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<RelativeSize>,
+    /// Local correlation of a head with the mean head, 0 to 1, less where little of it is seen; `None` for two scans.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub likeness: Option<f64>,
 }
 
 impl FitQuality {
@@ -65,6 +68,19 @@ impl FitQuality {
             warnings.push(FitWarning::MirrorFitsBetter { mirrored_ratio });
         }
         warnings
+    }
+}
+
+impl FitWarning {
+    /// Whether the transform is not to be believed as it stands.
+    pub fn denies_the_fit(&self) -> bool {
+        /// Noise of the ratio between two scans of one head and its mirror image is far below this.
+        const CLEARLY_MIRRORED: f64 = 1.05;
+        match self {
+            Self::LowSimilarity { .. } => true,
+            Self::MirrorFitsBetter { mirrored_ratio } => *mirrored_ratio > CLEARLY_MIRRORED,
+            Self::LittleOverlap { .. } | Self::OtherSize { .. } => false,
+        }
     }
 }
 

@@ -33,7 +33,7 @@ pub fn in_a_sentence(prediction: &Prediction) -> String {
     });
     format!(
         "With the head {}, once {} cc are taken and fluid drains, the brain is expected to move by about {} mm at most, at ({x}, {y}, {z}) mm \
-         of the scan{no_farther}. About {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
+         of the scan{no_farther}. On average over the draws {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
         head.head,
         number(prediction.plan.resected_cc, 2),
         number(head.largest_mm, 2),

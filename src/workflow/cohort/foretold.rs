@@ -40,6 +40,7 @@ pub fn planned_subject(
         dseg: None,
         labels: None,
         pose: None,
+        pose_start: None,
         brain_mask: None,
         ventricle_mask: None,
     };

@@ -26,4 +26,8 @@ pub enum AskedError {
     PackedNifti { output: PathBuf },
     #[error("masks do not go with the template: its own brain is what is compared")]
     MasksOfTemplate,
+    #[error("a pose and a start for one were given: the pose is final, leave one of the two out")]
+    PoseAndStart,
+    #[error("a start for the pose was given beside a label map, which says the pose: leave one of the two out")]
+    StartBesideLabels,
 }

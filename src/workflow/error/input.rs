@@ -19,6 +19,15 @@ pub enum MaskRole {
     Labels,
     /// The pose of the pre-operative scan.
     Pose,
+    /// Where its pose is looked for.
+    PoseStart,
+}
+
+impl MaskRole {
+    /// Which scan shows it, where both have the mask's grid: the cavity is there after the operation alone.
+    pub(crate) fn of_post(self) -> bool {
+        self == Self::Cavity
+    }
 }
 
 impl fmt::Display for MaskRole {
@@ -30,6 +39,7 @@ impl fmt::Display for MaskRole {
             Self::Resected => "resected mask",
             Self::Labels => "label map",
             Self::Pose => "pose",
+            Self::PoseStart => "start of the pose",
         })
     }
 }

@@ -12,6 +12,19 @@ pub enum LandmarkError {
         "{pre} and {post}: not one landmark of the first has a name of the second, and they hold {of_pre} and {of_post}"
     )]
     NoMatch { pre: String, post: String, of_pre: usize, of_post: usize },
+    #[error(
+        "{file}: the name `{name}` stands there twice, and nobody knows which is meant: give each landmark a name of its own"
+    )]
+    Twice { file: String, name: String },
+    #[error(
+        "{file}: by the rigid motion between the scans the landmarks lie {given_mm:.0} mm apart as they stand, and {other_mm:.0} mm if \
+         {how}: give them in their scanners' frames (mm, RAS+), the pre-operative ones first"
+    )]
+    FitsAs { file: String, given_mm: f64, other_mm: f64, how: String },
+    #[error(
+        "{file}: not one landmark lies in the brain or beside it; landmarks are in their scanners' frames (mm, RAS+)"
+    )]
+    NoneInside { file: String },
     #[error("{file}: holds no landmark")]
     Empty { file: String },
 }

@@ -18,6 +18,12 @@ pub enum SimulationError {
     Scenario { name: String, reason: String },
     #[error("a motion (`method = \"backward-euler\"`) starts at rest: it takes no state to start from")]
     StartOfMotion,
+    #[error("{}: is what the simulation is made of; give its result another name", output.display())]
+    OverInput { output: PathBuf },
+    #[error(
+        "{name}: cells {first} and {second} have the same nodes: their tissue would count twice; write each cell once"
+    )]
+    TwiceTheSameCell { name: String, first: usize, second: usize },
     #[error("{name}: no point array `displacement` of three components; give the result of a simulation")]
     NoDisplacement { name: String },
     #[error("{name}: has {found} nodes, the mesh {nodes}: give a result on the same mesh")]

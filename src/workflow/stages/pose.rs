@@ -15,7 +15,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const NAME: StageName = StageName::Pose;
 
 /// What the report says of the fit.
@@ -41,7 +41,7 @@ pub(crate) fn pose(work: &Work<'_>, made: &mut Made, scan: &PlannedScan) -> Resu
         work.tell(|p| p.doing(OF_POSE));
         let mut produced = Produced::default();
         produced.warn(&scan.warnings);
-        let given = (scan.pose.as_ref().map(|(pose, _)| pose), scan.labels.as_ref().map(|(labels, _)| labels));
+        let given = (scan.pose.as_ref(), scan.labels.as_ref().map(|(labels, _)| labels));
         let (mni_from_pre, fit, odd) = once(&scan.shared.pose, || pose_of(&scan.pre, given))?;
         produced.warn(odd);
         work.tell(|p| p.end());

@@ -10,10 +10,10 @@ use crate::image::{Grid, LabelMap, Volume};
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
 use crate::register::{RigidFit, register_two_scans};
-use crate::segment::{pose_of_head, pose_of_labels};
+use crate::segment::{pose_of_head, pose_of_head_from, pose_of_labels};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::inputs::{OwnMasks, ScanSums, Scans};
+use crate::workflow::inputs::{HandPose, OwnMasks, ScanSums, Scans};
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::{Warning, all_of};
 use crate::workflow::work::{Made, Work, facts};
@@ -21,7 +21,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const NAME: StageName = StageName::Registration;
 /// What the pose is called, and how what is odd about it begins.
 pub(crate) const OF_POSE: &str = "pre to MNI";
@@ -64,7 +64,7 @@ pub(crate) fn registration(
         let mut produced = Produced::default();
         produced.warn(&scans.warnings);
         produced.warn(all_of("post to pre", &pre_from_post.warnings));
-        let given = (own.pose.as_ref().map(|(pose, _)| pose), own.labels.as_ref().map(|(labels, _)| labels));
+        let given = (own.pose.as_ref(), own.labels.as_ref().map(|(labels, _)| labels));
         let (text, itk) = (layout::MNI_FROM_PRE_TEXT, layout::MNI_FROM_PRE_ITK);
         let fit = if let Some(earlier) = earlier {
             // As they stand: a number read and written again may differ in its last digit.
@@ -95,14 +95,15 @@ type FoundPose = (RigidTransform<Pre, Mni>, RegistrationOutcome, Vec<Warning>);
 /// it.
 pub(super) fn pose_of(
     pre: &Volume<f32, Pre>,
-    (given, labels): (Option<&RigidTransform<Pre, Mni>>, Option<&LabelMap<Pre>>),
+    (given, labels): (Option<&HandPose>, Option<&LabelMap<Pre>>),
 ) -> Result<FoundPose, WorkflowError> {
-    let found = match labels {
+    let found = match (labels, given) {
         // A label map says where the brain is, whatever the scan's contrast.
-        Some(labels) => pose_of_labels(labels),
-        None => pose_of_head(pre),
+        (Some(labels), _) => pose_of_labels(labels),
+        (None, Some(HandPose { start: true, mni_from_pre, .. })) => pose_of_head_from(pre, mni_from_pre),
+        (None, _) => pose_of_head(pre),
     };
-    if let Some(pose) = given {
+    if let Some(HandPose { start: false, mni_from_pre: pose, .. }) = given {
         // Where none is found there is nothing to hold it against: that is what it is given for.
         let far = found.ok().and_then(|found| far_from(pose, &found.fixed_from_moving));
         return Ok((*pose, by_hand(pose, &pre.grid), far.map(|far| far.of(OF_POSE)).into_iter().collect()));
