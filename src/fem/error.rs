@@ -13,11 +13,6 @@ pub enum FemError {
     UnknownSet { set: String, known: String },
     #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
     NothingHeld,
-    #[error(
-        "a node of set `{set}` is to move by {mm} mm along {axis} and is held or moved by another set, by {other_mm} mm: give sets that \
-         share no such node, or the same displacement"
-    )]
-    TwoWays { set: String, axis: &'static str, mm: f64, other_mm: f64 },
     #[error("set `{set}` is both {first} and {second}: take one of the two away")]
     TwoSupports { set: String, first: &'static str, second: &'static str },
     #[error(

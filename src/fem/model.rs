@@ -86,18 +86,12 @@ impl Model {
         // Held and moved components, in mesh numbering; a mid-edge node follows its two ends.
         let mut held = vec![[false; 3]; nodes];
         let mut moved = vec![[0.0; 3]; nodes];
-        let mut hold = |set: &str, components: [bool; 3], to_mm: [f64; 3]| -> Result<(), FemError> {
-            let to_m = metres(to_mm);
+        let mut hold = |set: &str, components: [bool; 3], to_m: [f64; 3]| -> Result<(), FemError> {
             let members = node_set(mesh, set)?;
             let inside = |n: u32| members.binary_search(&n).is_ok();
             let middle = edges.iter().enumerate().filter(|(_, e)| inside(e[0]) && inside(e[1]));
             for n in members.iter().map(|&n| n as usize).chain(middle.map(|(k, _)| corners + k)) {
                 for i in (0..3).filter(|&i| components[i]) {
-                    if held[n][i] && moved[n][i] != to_m[i] {
-                        let other_mm = moved[n][i] / METRES_PER_MM;
-                        let (set, axis) = (set.to_owned(), ["x", "y", "z"][i]);
-                        return Err(FemError::TwoWays { set, axis, mm: to_mm[i], other_mm });
-                    }
                     held[n][i] = true;
                     moved[n][i] = to_m[i];
                 }
@@ -105,7 +99,7 @@ impl Model {
             Ok(())
         };
         for p in &scenario.prescribed {
-            hold(&p.set, p.components, p.displacement_mm)?;
+            hold(&p.set, p.components, metres(p.displacement_mm))?;
         }
         for set in scenario.held() {
             hold(set, [true; 3], [0.0; 3])?;

@@ -3,7 +3,7 @@
 use super::SegmentWarning;
 use crate::geometry::{Mni, Position};
 use crate::image::Mask;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// One voxel in so many along each axis is enough for six unknowns.
 const STRIDE: usize = 4;
@@ -47,7 +47,10 @@ impl Turned {
         let moment: Matrix3<f64> = arms.sum();
         let svd = moment.svd(true, true);
         let rotation = Rotation3::from_matrix_unchecked(svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default());
-        Self { deg: rotation.angle().to_degrees(), shift_mm: (middle_there - middle_here).norm() }
+        Self {
+            deg: UnitQuaternion::from_rotation_matrix(&rotation).angle().to_degrees(),
+            shift_mm: (middle_there - middle_here).norm(),
+        }
     }
 }
 

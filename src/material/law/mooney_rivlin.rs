@@ -21,7 +21,7 @@ impl Law for Definition {
     fn card(&self) -> &'static Card {
         &Card {
             name: "mooney-rivlin",
-            formula: "C1 (I1 - 3) + C2 (I2 - 3) - 2 (C1 + 2 C2) ln J + (lambda/2 - 2 C2) ln^2 J",
+            formula: "C1 (I1 - 3) + C2 (I2 - 3) - 2 (C1 + 2 C2) ln J + lambda/2 ln^2 J",
             source: "Holzapfel, Nonlinear Solid Mechanics, 2000, eq. 6.147, with a logarithmic volume term",
             parameters: const { &[modulus("c1_pa", "C1, Pa"), modulus("c2_pa", "C2, Pa")] },
             of_terms: false,
@@ -128,9 +128,8 @@ impl UniaxialCurve for Definition {
     }
 }
 
-/// Psi = C1 (I1 - 3) + C2 (I2 - 3) - 2 (C1 + 2 C2) ln J + (lambda/2 - 2 C2) ln^2 J, infinite for J <= 0 (Holzapfel,
-/// "Nonlinear Solid Mechanics", 2000, eq. 6.147, with a logarithmic volume term). mu = 2 (C1 + C2); I2 itself resists a change of
-/// volume, by 4 C2 at small strains, which the volume term leaves to it: lambda is that of small strains.
+/// Psi = C1 (I1 - 3) + C2 (I2 - 3) - 2 (C1 + 2 C2) ln J + lambda/2 ln^2 J, infinite for J <= 0 (Holzapfel,
+/// "Nonlinear Solid Mechanics", 2000, eq. 6.147, with a logarithmic volume term). mu = 2 (C1 + C2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MooneyRivlin {
     /// C1, Pa.
@@ -152,8 +151,7 @@ impl MooneyRivlin {
 
     fn of_volume(&self, h: &Matrix3<f64>) -> OfVolume {
         let logarithm = VolumeLogarithm { floor: self.inversion_threshold };
-        let of_volume = self.lame_lambda_pa - 4.0 * self.c2_pa;
-        logarithm.energy(2.0 * (self.c1_pa + 2.0 * self.c2_pa), of_volume, volume_change(h))
+        logarithm.energy(2.0 * (self.c1_pa + 2.0 * self.c2_pa), self.lame_lambda_pa, volume_change(h))
     }
 }
 
