@@ -99,6 +99,14 @@ pub fn evaluate(
     Evaluation { summary: summary.collect(), landmarks: (0..names.len()).map(row).collect(), ..Evaluation::default() }
 }
 
+/// Whether another reading of landmarks brings them so much nearer by the rigid motion between the scans (root mean squares, mm) that
+/// no brain shift parts the two: by half and by some millimetres.
+pub fn fits_far_better(other_mm: f64, given_mm: f64) -> bool {
+    const TIMES: f64 = 2.0;
+    const NEARER_MM: f64 = 5.0;
+    given_mm > TIMES * other_mm && given_mm - other_mm > NEARER_MM
+}
+
 /// Between the two nearest of sorted values; 0 of none.
 fn percentile(sorted: &[f64], share: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };

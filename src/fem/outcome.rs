@@ -157,9 +157,7 @@ impl Model {
             warnings,
         }
     }
-}
 
-impl Model {
     /// What nodes of the solver hold, on those of the mesh: where a corner holds nothing of its own (the area of a quadratic face
     /// lies on its mid-edge nodes alone), the mean over the edges that end there.
     fn at_corners(&self, held: &[Option<f64>]) -> Vec<f64> {

@@ -13,5 +13,5 @@ mod smooth_field;
 pub use affine::{AffineTransform, SingularAffine};
 pub use frame::{Frame, Mni, Native, Post, Pre};
 pub use position::{Direction, Position};
-pub use rigid::{NotRigid, RigidTransform};
+pub use rigid::{NotRigid, RigidTransform, nearest_rotation};
 pub use smooth_field::{FieldPoint, SmoothField};

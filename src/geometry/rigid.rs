@@ -70,10 +70,7 @@ impl<From: Frame, To: Frame> RigidTransform<From, To> {
         if !(orthogonality_error < 1e-3 && determinant > 0.0) {
             return Err(NotRigid { orthogonality_error, determinant });
         }
-        let svd = r.svd(true, true);
-        let nearest = svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default();
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nearest));
-        Ok(Self::new(rotation, Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)])))
+        Ok(Self::new(nearest_rotation(&r), Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)])))
     }
 
     /// The homogeneous 4x4 matrix.
@@ -114,6 +111,13 @@ impl<From: Frame, To: Frame> RigidTransform<From, To> {
     pub fn relabelled<A: Frame, B: Frame>(&self) -> RigidTransform<A, B> {
         RigidTransform::new(self.rotation, self.translation_mm)
     }
+}
+
+/// The rotation of a linear map's polar decomposition, which is the nearest to it; the map must not mirror.
+pub fn nearest_rotation(linear: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    let svd = linear.svd(true, true);
+    let nearest = svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default();
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nearest))
 }
 
 #[cfg(test)]

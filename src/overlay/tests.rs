@@ -148,3 +148,21 @@ fn a_surface_has_the_same_triangles_in_every_format() {
     let points = Drawing::decode(b"x,y,z\n1,2,3\n", "g.csv").unwrap();
     assert!(points.surface("g.csv").unwrap().is_none());
 }
+
+/// What carries a place in a way that is not read is refused, never read as if it were not there.
+#[test]
+fn places_in_other_units_axes_or_more_than_points_are_refused() {
+    let refused = |text: &str, name: &str| Drawing::decode(text.as_bytes(), name).unwrap_err().to_string();
+    let markups = |of: &str| format!("{{\"markups\": [{{{of}, \"controlPoints\": [{{\"position\": [1, 2, 3]}}]}}]}}");
+    let said = refused(&markups("\"type\": \"ROI\""), "a.mrk.json");
+    assert!(said.contains("ROI") && said.contains("points"), "{said}");
+    let said = refused(&markups("\"type\": \"Line\", \"coordinateUnits\": \"m\""), "a.mrk.json");
+    assert!(said.contains("coordinateUnits") && said.contains("mm"), "{said}");
+    let row = "1,5,6,7,0,0,0,1,1,1,0,F-1,,\n";
+    let said = refused(&format!("# columns = label,z,y,x\n{row}"), "a.fcsv");
+    assert!(said.contains("columns"), "{said}");
+    for system in ["# CoordinateSystem=LPS", "#CoordinateSystem = LPS", "# coordinatesystem = LPS"] {
+        let read = Drawing::decode(format!("{system}\n{row}").as_bytes(), "a.fcsv").unwrap();
+        assert_eq!(read.points_mm, [[-5.0, -6.0, 7.0]], "{system}");
+    }
+}

@@ -15,12 +15,12 @@ use super::head;
 use super::mutual_information::{Bins, Interpolated, Pose};
 use super::normalised::{LARGEST, normalised};
 use super::pyramid::{on_grid_of, reduced_to};
-use super::rigid::{FitQuality, RegisterError, RigidFit, side};
+use super::rigid::{FitQuality, FitWarning, RegisterError, RigidFit, side};
 use super::sample::{Draw, draw};
 use super::search::{Freedom, Level, Measure, Reach, TETHER, coarse, optimise, rank, turns_about_axes};
-use crate::geometry::{Frame, Native, Position, RigidTransform};
+use crate::geometry::{Frame, Native, Position, RigidTransform, nearest_rotation};
 use crate::image::{Mask, Volume, morphology};
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
 /// Resolutions: for the starts, for the judgement, for the result.
@@ -39,8 +39,8 @@ const SEARCHED: usize = 2;
 const SCALES: [f64; 2] = [0.93, 1.08];
 /// Local correlation with the mean head above which no other start is tried.
 const CLEAR: f64 = 0.5;
-/// Local correlation below which no head was found. Right poses of whole heads reach .57 and more; a wrong one was seen to
-/// reach .36, so between the two it is said (`FitWarning::HardlyAHead`).
+/// Local correlation below which no head was found; from here to [`CLEAR`] it is said ([`FitWarning::HardlyAHead`]), since wrong
+/// poses have been seen to reach it (docs/evidence/choices.md).
 const LEAST: f64 = 0.35;
 
 /// Loss of local correlation after which the last step is undone.
@@ -191,9 +191,8 @@ fn range_of_tissue(image: &Volume<f32, Native>, inside: &Mask<Native>) -> [f32; 
 ///
 /// Starts from aligned centres and from where the scan lies, turned by up to 30 degrees; when none of them is clearly a
 /// head, as a brain without scalp and skull, turned by up to 75 degrees about any axis, turned as a header that has lost its
-/// axes leaves it, and at last around the best of these. Each is refined with 12
-/// parameters held to the sizes of heads, at 4 mm; the best by local correlation over the brain is finished at 2 mm. The
-/// motion is the polar part of the affine map.
+/// axes leaves it, and at last around the best of these. Each is refined with 12 parameters held to the sizes of heads, at
+/// 4 mm; the best by local correlation over the brain is finished at 2 mm. The motion is the polar part of the affine map.
 ///
 /// # Errors
 /// [`RegisterError`]; [`RegisterError::NoHead`] when nothing at any start looks like a head.
@@ -289,10 +288,14 @@ fn finished<M: Frame, F: Frame>(
         size: None,
         likeness: Some(likeness),
     };
-    let rotation = UnitQuaternion::from_rotation_matrix(&nearest_rotation(&finished.linear));
+    let rotation = nearest_rotation(&finished.linear);
     let moving_from_head: RigidTransform<Native, Native> =
         RigidTransform::new(rotation, finished.target - rotation * finished.centre);
-    Ok(RigidFit { fixed_from_moving: moving_from_head.inverse().relabelled(), quality, warnings: quality.warnings() })
+    let mut warnings = quality.warnings();
+    if likeness < CLEAR {
+        warnings.push(FitWarning::HardlyAHead { likeness });
+    }
+    Ok(RigidFit { fixed_from_moving: moving_from_head.inverse().relabelled(), quality, warnings })
 }
 
 /// The best pose of a search.
@@ -347,12 +350,6 @@ pub(super) fn likelier_first<F: Frame>(head: &MeanHead<'_, F>, subject: &Subject
     let (whole, bare) = (head.prepared(), head.stripped());
     let [likely, likely_bare] = [&whole, &bare].map(|look| likeness(look, subject, pose));
     if likely >= CLEAR || likely >= likely_bare { [whole, bare] } else { [bare, whole] }
-}
-
-/// The rotation of a linear map's polar decomposition.
-fn nearest_rotation(linear: &Matrix3<f64>) -> Rotation3<f64> {
-    let svd = linear.svd(true, true);
-    Rotation3::from_matrix_unchecked(svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default())
 }
 
 fn refined(level: &Level<'_>, pose: &Pose) -> Pose {

@@ -175,7 +175,7 @@ fn evaluation_of(case: &Case<'_>) -> Result<Option<PredictionEvaluation>, Report
 /// Landmarks that were held against the results that are there now.
 fn landmarks_in(case: &Case<'_>) -> Result<Option<Evaluation>, ReportError> {
     let found: Option<Evaluation> = case.numbers(layout::LANDMARKS_JSON)?;
-    let now = found.is_some().then(|| landmarks_of(case.folder)).transpose()?;
+    let now = found.is_some().then(|| results_sha256(case.folder)).transpose()?;
     Ok(found.filter(|found| now.as_ref() == Some(&found.of_sha256)))
 }
 
@@ -183,7 +183,7 @@ fn landmarks_in(case: &Case<'_>) -> Result<Option<Evaluation>, ReportError> {
 ///
 /// # Errors
 /// [`ReportError`] for a file that cannot be read.
-pub fn landmarks_of(folder: &Path) -> Result<String, ReportError> {
+pub fn results_sha256(folder: &Path) -> Result<String, ReportError> {
     let case = Case { folder };
     let results = [layout::SHIFT_JSON, layout::OUTCOME].map(|file| case.bytes(file));
     let mut all = Vec::new();
@@ -367,5 +367,18 @@ mod tests {
         assert!(message.contains(layout::OUTCOME), "{message}");
         write(folder.path(), layout::REST_MESH, b"<VTKFile");
         assert!(read_case(folder.path()).is_err());
+    }
+
+    #[test]
+    fn landmarks_of_results_that_are_no_longer_there_are_not_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |file: &str, text: &str| write_whole(&folder.path().join(file), text.as_bytes()).unwrap();
+        write(layout::OUTCOME, "{}");
+        let kept = Evaluation { of_sha256: results_sha256(folder.path()).unwrap(), ..Evaluation::default() };
+        write(layout::LANDMARKS_JSON, &serde_json::to_string(&kept).unwrap());
+        let shown = || landmarks_in(&Case { folder: folder.path() }).unwrap();
+        assert_eq!(shown(), Some(kept));
+        write(layout::OUTCOME, "{\"made\": \"again\"}");
+        assert_eq!(shown(), None);
     }
 }

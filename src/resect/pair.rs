@@ -14,7 +14,7 @@ use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
 use crate::segment::native::labels_on;
 use crate::segment::{
-    GivenBrain, HeadError, LeftOut, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation,
+    BrainSource, HeadError, LeftOut, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation,
     carried_priors, fit_template_to_labels, label, segment_by_labels, segment_head, segment_with_priors, without_gaps,
 };
 use schemars::JsonSchema;
@@ -351,7 +351,7 @@ pub fn take_head_apart(
         let (mut before, scale) = segment_by_labels(pre, labels);
         let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
         let on_template = |p| fit.atlas_from_subject.apply(p);
-        let left_out = LeftOut::of(&before.brain_mni, &before.known_mni, on_template).noted(GivenBrain::Labels);
+        let left_out = LeftOut::of(&before.brain_mni, &before.known_mni, on_template).noted(BrainSource::Labels);
         before.warnings.extend(left_out);
         return Ok((before, fit, scale));
     }

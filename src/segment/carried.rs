@@ -1,8 +1,8 @@
 //! The template carried onto a head by a deformable fit, and the head segmented with it.
 
+use super::brain_source::BrainSource;
 use super::confidence::evidence;
 use super::coverage::LeftOut;
-use super::given_brain::GivenBrain;
 use super::overhang::{beyond, onto_the_brain, short};
 use super::posed_scan::PosedScan;
 use super::segmentation::{FoundBrain, find_brain, labelled};
@@ -76,13 +76,18 @@ const MUCH_WORSE: f64 = 0.02;
 /// The brain found over the brain expected; hydrocephalus and atrophy change both.
 const VOLUME_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.2;
 
+/// The mean of many heads, to be compared with.
+fn mean_head() -> MeanHead<'static, Mni> {
+    let head = atlas::mean_head();
+    MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare }
+}
+
 /// The pose of a head in the template's frame, found against the mean of whole heads.
 ///
 /// # Errors
 /// [`RegisterError`].
 pub fn pose_of_head<F: Frame>(t1: &Volume<f32, F>) -> Result<RigidFit<F, Mni>, RegisterError> {
-    let head = atlas::mean_head();
-    register_to_mean_head(t1, &MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare })
+    register_to_mean_head(t1, &mean_head())
 }
 
 /// Where a head lies in the MNI frame, from where a hand has laid it.
@@ -93,8 +98,7 @@ pub fn pose_of_head_from<F: Frame>(
     t1: &Volume<f32, F>,
     start: &RigidTransform<F, Mni>,
 ) -> Result<RigidFit<F, Mni>, RegisterError> {
-    let head = atlas::mean_head();
-    register_to_mean_head_from(t1, &MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare }, start)
+    register_to_mean_head_from(t1, &mean_head(), start)
 }
 
 /// The template deformed onto a head; both in the MNI frame reached rigidly.
@@ -167,9 +171,7 @@ fn where_known(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> Volume<f32, Mni
 
 /// From the template to a head that lies rigidly aligned with it: by way of the mean head in its natural size.
 fn stretch(subject: &Volume<f32, Mni>, known: &Mask<Mni>) -> AffineTransform<Mni, Mni> {
-    let head = atlas::mean_head();
-    let mean = MeanHead { t1: &head.t1, brain: &head.brain, bare: &head.bare };
-    atlas::head_from_template().then(&subject_from_mean_head(subject, &mean, Some(known)))
+    atlas::head_from_template().then(&subject_from_mean_head(subject, &mean_head(), Some(known)))
 }
 
 /// The template's maps read through `template_from_patient`, a map that [`fit_template`] made, where brain may be.
@@ -314,10 +316,10 @@ pub fn segment_head<F: Frame>(
     segmentation.warnings.extend(Turned::of(&expected, on_template).noted());
     let left_out = LeftOut::of(&segmentation.brain_mni, &segmentation.known_mni, on_template);
     if overrides.brain.is_some() {
-        segmentation.warnings.extend(left_out.noted(GivenBrain::Mask));
+        segmentation.warnings.extend(left_out.noted(BrainSource::Mask));
         return Ok((segmentation, carried.fit));
     }
-    segmentation.warnings.extend(left_out.noted(GivenBrain::Found));
+    segmentation.warnings.extend(left_out.noted(BrainSource::Found));
     if outside.share > DOUBTFUL_SHARE || outside.worst.is_some() {
         let (place, percent) = (outside.worst.map(|worst| worst.name), 100.0 * outside.share);
         segmentation.warnings.push(SegmentWarning::BeyondTemplate { percent, place });
@@ -383,6 +385,14 @@ mod tests {
             found.apply(p).distance_mm(&truth.apply(p))
         });
         apart.into_iter().fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn slow_a_head_whose_header_has_lost_its_axes_is_found() {
+        // A quarter turn about two axes, nodding a little.
+        let (scan, truth) = a_child_turned_by(Vector3::new(1.4, -1.3, 1.2));
+        let found = pose_of_head(&scan).unwrap();
+        assert!(apart_mm(&found.fixed_from_moving, &truth) < 1.5 && found.warnings.is_empty(), "{:?}", found.warnings);
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! How much of the brain that the template expects is in a brain that somebody gave, part by part.
+//! How much of the brain that the template expects is in what is taken for the brain, part by part.
 
-use super::{GivenBrain, Region, SegmentWarning, atlas};
+use super::{BrainSource, Region, SegmentWarning, atlas};
 use crate::geometry::{Mni, Position};
 use crate::image::Mask;
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 /// One voxel in so many along each axis is looked at.
 const STRIDE: usize = 2;
 
-/// What a given brain leaves out of what the fitted template expects where the scan shows something.
+/// What a brain leaves out of what the fitted template expects where the scan shows something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeftOut {
     /// Each part of the brain and the share of it that is left out, 0 to 1.
@@ -18,7 +18,7 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    /// Compares a given brain with the template's, as far as the scan is known.
+    /// Compares a brain with the template's, as far as the scan is known.
     pub fn of(
         brain: &Mask<Mni>,
         known: &Mask<Mni>,
@@ -46,13 +46,13 @@ impl LeftOut {
     }
 
     /// What is to be said of it, the parts that miss most first.
-    pub fn noted(&self, given: GivenBrain) -> Option<SegmentWarning> {
+    pub fn noted(&self, source: BrainSource) -> Option<SegmentWarning> {
         let percent = 100.0 * self.whole;
         let mut parts: Vec<(Region, f64)> = self.parts.iter().map(|(region, share)| (*region, 100.0 * share)).collect();
-        parts.retain(|(_, part)| *part >= given.noted_percent());
+        parts.retain(|(_, part)| *part >= source.noted_percent());
         parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        (percent >= given.most_percent() || !parts.is_empty()).then_some(SegmentWarning::LeavesOut {
-            given,
+        (percent >= source.most_percent() || !parts.is_empty()).then_some(SegmentWarning::LeavesOut {
+            brain: source,
             percent,
             parts,
         })
@@ -63,7 +63,7 @@ impl LeftOut {
 mod tests {
     use super::*;
 
-    fn noted(given: GivenBrain, keeps: &(dyn Fn(Position<Mni>) -> bool + Sync)) -> Option<SegmentWarning> {
+    fn noted(given: BrainSource, keeps: &(dyn Fn(Position<Mni>) -> bool + Sync)) -> Option<SegmentWarning> {
         let t1 = &atlas::template().t1;
         let brain = Mask::from_fn(t1.grid, |n| t1.data[n] > 0 && keeps(t1.grid.centre(t1.grid.voxel(n))));
         LeftOut::of(&brain, &Mask::filled(t1.grid, true), |p| p).noted(given)
@@ -74,15 +74,25 @@ mod tests {
         let belied = |given, keeps: &(dyn Fn(Position<Mni>) -> bool + Sync)| {
             noted(given, keeps).map(|warning| (warning.to_string(), warning.belies_the_masks()))
         };
-        assert_eq!(belied(GivenBrain::Labels, &|_| true), None);
-        assert_eq!(belied(GivenBrain::Mask, &|p| p.mm.y < 45.0), None, "the tip of the frontal pole");
-        let (said, belied_half) = belied(GivenBrain::Mask, &|p| p.mm.x > 0.0).unwrap();
+        assert_eq!(belied(BrainSource::Labels, &|_| true), None);
+        assert_eq!(belied(BrainSource::Mask, &|p| p.mm.y < 45.0), None, "the tip of the frontal pole");
+        let (said, belied_half) = belied(BrainSource::Mask, &|p| p.mm.x > 0.0).unwrap();
         assert!(belied_half && said.contains("brain mask") && said.contains("left frontal lobe: 100 %"), "{said}");
-        let (said, belied_lobe) = belied(GivenBrain::Labels, &|p| Region::at(p) != Region::Cerebellum).unwrap();
+        let (said, belied_lobe) = belied(BrainSource::Labels, &|p| Region::at(p) != Region::Cerebellum).unwrap();
         assert!(belied_lobe && said.contains("label map") && said.contains("cerebellum: 100 %"), "{said}");
         let temporal = |p: Position<Mni>| Region::at(p) != Region::LeftTemporal || p.mm.y < -20.0;
-        let (said, belied_lobectomy) = belied(GivenBrain::Labels, &temporal).unwrap();
+        let (said, belied_lobectomy) = belied(BrainSource::Labels, &temporal).unwrap();
         assert!(!belied_lobectomy && said.contains("left temporal lobe"), "an earlier operation: {said}");
+    }
+
+    #[test]
+    fn what_a_brain_that_was_found_leaves_out_is_told_and_left_to_a_person() {
+        let hemisphere = noted(BrainSource::Found, &|p| p.mm.x > 0.0).unwrap();
+        assert!(
+            !hemisphere.belies_the_masks() && hemisphere.to_string().contains("a lesion, or the outline"),
+            "{hemisphere}"
+        );
+        assert_eq!(noted(BrainSource::Found, &|p| p.mm.y < 55.0), None, "the tip of the frontal pole");
     }
 
     #[test]
@@ -90,6 +100,6 @@ mod tests {
         let t1 = &atlas::template().t1;
         let shown = Mask::from_fn(t1.grid, |n| t1.grid.centre(t1.grid.voxel(n)).mm.z > 0.0);
         let brain = Mask::from_fn(t1.grid, |n| t1.data[n] > 0 && shown.data[n]);
-        assert_eq!(LeftOut::of(&brain, &shown, |p| p).noted(GivenBrain::Labels), None);
+        assert_eq!(LeftOut::of(&brain, &shown, |p| p).noted(BrainSource::Labels), None);
     }
 }

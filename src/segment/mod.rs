@@ -7,13 +7,13 @@ mod atlas_labels;
 mod bias;
 mod border;
 mod brain;
+mod brain_source;
 mod carried;
 mod cerebellum;
 mod coil;
 mod confidence;
 mod coverage;
 mod folia;
-mod given_brain;
 mod import;
 mod labelled;
 mod mixture;
@@ -34,12 +34,12 @@ pub use crate::anatomy::label;
 pub use agreement::{Disagreement, disagreement};
 pub use bias::LogBias;
 pub use brain::BrainSettings;
+pub use brain_source::BrainSource;
 pub use carried::{
     HeadError, carried_priors, fit_template, pose_of_head, pose_of_head_from, segment_head, without_gaps,
 };
 pub use confidence::RegionEvidence;
 pub use coverage::LeftOut;
-pub use given_brain::GivenBrain;
 pub use import::{ImportError, ImportedLabels, import_labels};
 pub use labelled::{Scale, fit_template_to_labels, pose_of_labels, segment_by_labels};
 pub use overhang::VaultPart;

@@ -1,9 +1,9 @@
 //! How far the fitted template says that a rigid pose is off.
 
 use super::SegmentWarning;
-use crate::geometry::{Mni, Position};
+use crate::geometry::{Mni, Position, nearest_rotation};
 use crate::image::Mask;
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// One voxel in so many along each axis is enough for six unknowns.
 const STRIDE: usize = 4;
@@ -45,12 +45,8 @@ impl Turned {
         let (middle_here, middle_there) = (middle(&here), middle(&there));
         let arms = here.iter().zip(&there).map(|(p, q)| (q - middle_there) * (p - middle_here).transpose());
         let moment: Matrix3<f64> = arms.sum();
-        let svd = moment.svd(true, true);
-        let rotation = Rotation3::from_matrix_unchecked(svd.u.unwrap_or_default() * svd.v_t.unwrap_or_default());
-        Self {
-            deg: UnitQuaternion::from_rotation_matrix(&rotation).angle().to_degrees(),
-            shift_mm: (middle_there - middle_here).norm(),
-        }
+        let deg = nearest_rotation(&moment).angle().to_degrees();
+        Self { deg, shift_mm: (middle_there - middle_here).norm() }
     }
 }
 
@@ -78,5 +74,13 @@ mod tests {
         assert!(none.deg < 1e-6 && none.shift_mm < 1.0, "{none:?}");
         let turned = Turned::of(&brain, |p| turn.apply(stretched(p)));
         assert!((turned.deg - 0.2f64.to_degrees()).abs() < 1e-6 && (turned.shift_mm - 6.0).abs() < 1.0, "{turned:?}");
+    }
+
+    #[test]
+    fn a_pose_is_told_where_no_head_lies_so_and_denied_further_off() {
+        let told = |deg, shift_mm| Turned { deg, shift_mm }.noted().map(|said| said.belies_the_masks());
+        assert_eq!(told(1.7, 2.8), None);
+        assert_eq!((told(6.0, 0.0), told(0.0, 10.0)), (Some(false), Some(false)));
+        assert_eq!((told(12.0, 0.0), told(0.0, 20.0)), (Some(true), Some(true)));
     }
 }

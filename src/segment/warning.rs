@@ -1,6 +1,6 @@
 //! What is told of a segmentation that does not stop the work.
 
-use super::given_brain::GivenBrain;
+use super::brain_source::BrainSource;
 use super::overhang::VaultPart;
 use super::region::Region;
 use crate::geometry::Frame;
@@ -90,15 +90,15 @@ pub enum SegmentWarning {
         /// Way of the brain's middle, mm.
         shift_mm: f64,
     },
-    /// A brain that was given leaves out parts of the one that the fitted template expects.
+    /// What is taken for the brain leaves out parts of the one that the fitted template expects.
     #[error(
-        "the {given} leaves out {percent:.0} % of the brain that the fitted template expects{}: {}",
+        "the {brain} leaves out {percent:.0} % of the brain that the fitted template expects{}: {}",
         if parts.is_empty() { String::new() } else { format!("; {}", in_words(parts, "is missing")) },
-        given.question()
+        brain.question()
     )]
     LeavesOut {
-        /// What was given.
-        given: GivenBrain,
+        /// What is taken for the brain.
+        brain: BrainSource,
         /// Share of the whole brain, in percent.
         percent: f64,
         /// The parts that miss most, percent of each.
@@ -202,7 +202,7 @@ impl SegmentWarning {
                 tissue_percent.max(*far_percent) >= OF_SOMETHING_ELSE_PERCENT
             }
             Self::PoseOff { deg, shift_mm } => *deg >= OTHER_POSE_DEG || *shift_mm >= OTHER_POSE_MM,
-            Self::LeavesOut { given, percent, parts } => given.leaves_too_much(parts, *percent),
+            Self::LeavesOut { brain, percent, parts } => brain.leaves_too_much(parts, *percent),
             _ => false,
         }
     }

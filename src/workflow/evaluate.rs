@@ -12,7 +12,7 @@ use crate::experiment::landmarks::{CarriedLandmarks, Evaluation, evaluate};
 use crate::geometry::Position;
 use crate::layout::{ESTIMATE_STATE, LANDMARKS_JSON};
 use crate::overlay::Carried;
-use crate::report::case::landmarks_of;
+use crate::report::case::results_sha256;
 use std::path::Path;
 
 /// Carries landmarks in every way that the case knows, compares them with where they were found, and keeps the result in
@@ -55,7 +55,7 @@ pub fn evaluate_landmarks(folder: &Path, landmarks: &Landmarks) -> Result<Evalua
     let names: Vec<String> = pairs.iter().map(|(name, _, _)| name.clone()).collect();
     let found: Vec<[f64; 3]> = pairs.iter().map(|(_, _, y)| *y).collect();
     let evaluation = Evaluation { left_out, ..evaluate(&names, &places, &found, &carried) };
-    let mut kept = Evaluation { of_sha256: landmarks_of(folder)?, left_out: Vec::new(), ..evaluation.clone() };
+    let mut kept = Evaluation { of_sha256: results_sha256(folder)?, left_out: Vec::new(), ..evaluation.clone() };
     for (n, landmark) in kept.landmarks.iter_mut().enumerate() {
         landmark.name = (n + 1).to_string();
     }

@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::error::{EvaluateError, WorkflowError};
 use super::evaluate::evaluate_landmarks;
-use super::landmark_pairs::{Landmarks, Pair, Paired, check_frames};
+use super::landmark_pairs::{Landmarks, Pair, Paired, apart_mm, check_frames};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
 use super::outcome::write_page;
@@ -174,14 +174,6 @@ struct Marked {
     other_way_round: Option<OtherWayRound>,
 }
 
-/// How far landmarks lie apart by a rigid motion between the scans, mm (root mean square).
-fn apart_mm(pairs: &[Pair], pre_from_post: &RigidTransform<Post, Pre>) -> f64 {
-    let of = |(_, x, y): &Pair| {
-        (pre_from_post.apply(Position::new(y[0], y[1], y[2])).mm.coords - Vector3::from(*x)).norm_squared()
-    };
-    (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
-}
-
 impl Marked {
     fn read(landmarks: &Landmarks, later: Option<&Case>, by_hand: Option<&Path>) -> Result<Self, WorkflowError> {
         let file = shown(&landmarks.pre);
@@ -200,7 +192,8 @@ impl Marked {
             check_frames(&found, &turned, landmarks)?;
         }
         let inverse = RigidTransform::new(turned.rotation, turned.translation_mm);
-        let other_way_round = OtherWayRound::of(apart_mm(&found, &pre_from_post), apart_mm(&found, &inverse));
+        let apart = |motion: &RigidTransform<Post, Pre>| apart_mm(found.iter().map(|(_, x, y)| (*y, *x)), motion);
+        let other_way_round = OtherWayRound::of(apart(&pre_from_post), apart(&inverse));
         let moved = |(name, x, y): Pair| {
             let back = pre_from_post.apply(Position::new(y[0], y[1], y[2])).mm;
             (name, x, [0, 1, 2].map(|a| back[a] - x[a]))

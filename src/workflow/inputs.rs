@@ -262,18 +262,16 @@ fn given_mask(
     let (mask, odd): (Mask<Native>, _) = nifti::decode_mask(&bytes, &name, &work.settings.image)?;
     let pre: Grid<Native> = scans.pre.grid.relabelled();
     let post: Grid<Native> = scans.post.grid.relabelled();
-    let [on_pre, on_post] = [&pre, &post].map(|grid| mask.grid.coincides(grid, TOLERANCE_MM));
-    let after = on_post && (!on_pre || role.of_post());
-    if on_pre && on_post {
+    let on = [&pre, &post].map(|grid| mask.grid.coincides(grid, TOLERANCE_MM));
+    let lies = role.scan_of(on);
+    if let ([true, true], Some(after)) = (on, lies) {
         let which = if after { "post" } else { "pre" };
         work.tell(|p| {
             p.taken_for(&format!("{name}: both scans have its grid; it is taken to lie on the {which}-operative one"));
         });
     }
-    let given = if after {
-        GivenMask::Post(mask.relabelled())
-    } else if on_pre {
-        GivenMask::Pre(mask.relabelled())
+    let given = if let Some(after) = lies {
+        if after { GivenMask::Post(mask.relabelled()) } else { GivenMask::Pre(mask.relabelled()) }
     } else {
         let (found, name) = (mask.grid.dims, shown(path));
         return Err(InputError::MaskGrid { role, name, found, pre: pre.dims, post: post.dims }.into());

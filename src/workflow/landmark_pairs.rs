@@ -2,6 +2,7 @@
 
 use super::error::{LandmarkError, WorkflowError};
 use super::user_file::{read_input, shown};
+use crate::experiment::landmarks::fits_far_better;
 use crate::geometry::{Frame, Position, RigidTransform};
 use crate::overlay::Drawing;
 use nalgebra::Vector3;
@@ -92,6 +93,18 @@ impl Paired {
     }
 }
 
+/// How far points lie from their fellows by a rigid motion, mm (root mean square).
+pub(super) fn apart_mm<A: Frame, B: Frame>(
+    pairs: impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])>,
+    after_from_before: &RigidTransform<A, B>,
+) -> f64 {
+    let count = pairs.len().max(1) as f64;
+    let of = |([x, y, z], after): ([f64; 3], [f64; 3])| {
+        (after_from_before.apply(Position::new(x, y, z)).mm.coords - Vector3::from(after)).norm_squared()
+    };
+    (pairs.map(of).sum::<f64>() / count).sqrt()
+}
+
 /// Refuses landmarks that fit the rigid motion between the scans far better when they are read in another way: a brain shift does not
 /// part the two so far.
 ///
@@ -102,14 +115,8 @@ pub(super) fn check_frames<A: Frame, B: Frame>(
     after_from_before: &RigidTransform<A, B>,
     files: &Landmarks,
 ) -> Result<(), LandmarkError> {
-    const TIMES: f64 = 2.0;
-    const NEARER_MM: f64 = 5.0;
     let apart = |before: &dyn Fn(&Pair) -> [f64; 3], after: &dyn Fn(&Pair) -> [f64; 3]| {
-        let of = |pair: &Pair| {
-            let [x, y, z] = before(pair);
-            (after_from_before.apply(Position::new(x, y, z)).mm.coords - Vector3::from(after(pair))).norm_squared()
-        };
-        (pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
+        apart_mm(pairs.iter().map(|pair| (before(pair), after(pair))), after_from_before)
     };
     let (first, second) = (|pair: &Pair| pair.1, |pair: &Pair| pair.2);
     let (first_turned, second_turned) = (|pair: &Pair| turned(pair.1), |pair: &Pair| turned(pair.2));
@@ -122,7 +129,7 @@ pub(super) fn check_frames<A: Frame, B: Frame>(
         (apart(&second, &first), "the two are exchanged".to_owned()),
     ];
     let better = readings.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    match better.filter(|(mm, _)| given_mm > TIMES * mm && given_mm - mm > NEARER_MM) {
+    match better.filter(|(mm, _)| fits_far_better(*mm, given_mm)) {
         Some((other_mm, how)) => Err(LandmarkError::FitsAs { file: pre, given_mm, other_mm, how }),
         None => Ok(()),
     }

@@ -164,3 +164,21 @@ fn what_cannot_be_simulated_is_refused_by_file_and_key() {
         assert!(!folder.path().join("y.vtu").exists());
     }
 }
+
+#[test]
+fn what_a_result_is_made_of_is_not_written_over_and_no_cell_counts_twice() {
+    let folder = folder();
+    let before = std::fs::read(folder.path().join("bar.vtu")).unwrap();
+    let over = simulate(folder.path(), &["bar.vtu", "s.toml", "-o", "bar.vtu", "--force"]);
+    assert_eq!(over.status.code(), Some(3), "{}", String::from_utf8_lossy(&over.stderr));
+    assert_eq!(std::fs::read(folder.path().join("bar.vtu")).unwrap(), before);
+    let twice = TetMesh::new(
+        bar().nodes_mm().to_vec(),
+        bar().tets().iter().chain(&bar().tets()[..1]).copied().collect(),
+        bar().labels().iter().chain(&bar().labels()[..1]).copied().collect(),
+    );
+    std::fs::write(folder.path().join("twice.vtu"), vtu::encode(&twice.unwrap(), &[], &[]).unwrap()).unwrap();
+    let said = simulate(folder.path(), &["twice.vtu", "s.toml", "-o", "out.vtu"]);
+    assert_eq!(said.status.code(), Some(3), "{}", String::from_utf8_lossy(&said.stderr));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("same nodes"));
+}

@@ -1,6 +1,7 @@
 //! A prediction against what was seen afterwards, as `sim/evaluation.json` keeps it.
 
 use super::score::Scores;
+use crate::experiment::landmarks::fits_far_better;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -22,15 +23,10 @@ pub struct PredictionEvaluation {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_way_round: Option<OtherWayRound>,
     /// How many landmarks one of the two files alone holds: not compared.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default)]
     pub landmarks_alone: usize,
     /// What the figures do not say by themselves, in plain words.
     pub limits: Vec<String>,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands it so")]
-fn is_none(count: &usize) -> bool {
-    *count == 0
 }
 
 /// One way of lying.
@@ -84,15 +80,9 @@ pub struct OtherWayRound {
 }
 
 impl OtherWayRound {
-    /// A brain that shifts does not part the two so far: its inverse has to bring landmarks nearer by so many times ...
-    const TIMES: f64 = 2.0;
-    /// ... and by so much, mm.
-    const NEARER_MM: f64 = 5.0;
-
     /// Something to say, where the inverse fits far better.
     pub fn of(given_rms_mm: f64, inverse_rms_mm: f64) -> Option<Self> {
-        let better = given_rms_mm > Self::TIMES * inverse_rms_mm && given_rms_mm - inverse_rms_mm > Self::NEARER_MM;
-        better.then_some(Self { given_rms_mm, inverse_rms_mm })
+        fits_far_better(inverse_rms_mm, given_rms_mm).then_some(Self { given_rms_mm, inverse_rms_mm })
     }
 }
 

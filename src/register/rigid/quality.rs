@@ -74,12 +74,12 @@ impl FitQuality {
 impl FitWarning {
     /// Whether the transform is not to be believed as it stands.
     pub fn denies_the_fit(&self) -> bool {
-        /// Noise of the ratio between two scans of one head and its mirror image is far below this.
+        /// Two heads come near to 1 ([`ONE_HEAD`]); the mirror image of the sample reaches 1.5.
         const CLEARLY_MIRRORED: f64 = 1.05;
         match self {
             Self::LowSimilarity { .. } => true,
             Self::MirrorFitsBetter { mirrored_ratio } => *mirrored_ratio > CLEARLY_MIRRORED,
-            Self::LittleOverlap { .. } | Self::OtherSize { .. } => false,
+            Self::LittleOverlap { .. } | Self::OtherSize { .. } | Self::HardlyAHead { .. } => false,
         }
     }
 }
@@ -103,6 +103,15 @@ pub enum FitWarning {
     LittleOverlap {
         /// See [`FitQuality::overlap`].
         overlap: f64,
+    },
+    /// What was found looks little like a head.
+    #[error(
+        "what was found looks little like the mean head ({likeness:.2} of 1, a good scan .6 and more): look at it in its pose before \
+         relying on that"
+    )]
+    HardlyAHead {
+        /// See [`FitQuality::likeness`].
+        likeness: f64,
     },
     /// One head in two sizes.
     #[error(

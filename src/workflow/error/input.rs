@@ -24,9 +24,14 @@ pub enum MaskRole {
 }
 
 impl MaskRole {
-    /// Which scan shows it, where both have the mask's grid: the cavity is there after the operation alone.
-    pub(crate) fn of_post(self) -> bool {
-        self == Self::Cavity
+    /// Whether a mask lies on the post-operative scan, by whose grid it has (before, after); `None` where it has neither. Where both
+    /// scans have it: the cavity is there after the operation alone, all else is drawn on the scan before.
+    pub(crate) fn scan_of(self, on: [bool; 2]) -> Option<bool> {
+        match on {
+            [true, true] => Some(self == Self::Cavity),
+            [false, false] => None,
+            [_, after] => Some(after),
+        }
     }
 }
 
@@ -85,4 +90,19 @@ pub enum InputError {
 
 fn size([x, y, z]: [usize; 3]) -> String {
     format!("{x} x {y} x {z}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_on_the_grid_of_both_scans_lies_where_its_role_says() {
+        assert_eq!(MaskRole::Cavity.scan_of([true, true]), Some(true));
+        assert_eq!(MaskRole::Resected.scan_of([true, true]), Some(false));
+        for role in [MaskRole::Cavity, MaskRole::Ventricle] {
+            let by_grid = [[true, false], [false, true], [false, false]].map(|on| role.scan_of(on));
+            assert_eq!(by_grid, [Some(false), Some(true), None]);
+        }
+    }
 }

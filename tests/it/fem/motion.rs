@@ -120,3 +120,20 @@ fn a_damped_body_rests_at_the_static_solution() {
         }
     }
 }
+
+/// Nothing that is only slow is at rest: much damping, or steps of no length.
+#[test]
+fn a_body_out_of_balance_is_not_at_rest_however_slow_it_is() {
+    let mesh = two_tissue_cube(2, 60.0);
+    let white = GREY.replace("grey", "white");
+    for dynamics in ["stiffness_damping_s = 1e5\ntime_step_s = 10.0\nsteps = 3", "time_step_s = 1e-8\nsteps = 3"] {
+        let text = format!(
+            "fixed = ['z0']\n{GREY}{white}[loads]\ngravity_m_per_s2 = [0, 0, -9.81]\n[solver]\nmethod = 'backward-euler'\n\
+             [dynamics]\n{dynamics}\n"
+        );
+        let outcome = moved(&mesh, &text);
+        let motion = outcome.motion.as_ref().unwrap();
+        assert!(!motion.rested && outcome.convergence.relative_residual > 0.1, "{dynamics}: {motion:?}");
+        assert!(outcome.warnings.iter().any(|said| said.to_string().contains("still moves")), "{:?}", outcome.warnings);
+    }
+}

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Where what is taken for a brain comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum GivenBrain {
+pub enum BrainSource {
     /// A mask; the template is fitted to the scan.
     Mask,
     /// A label map; the template is fitted to the map itself, and follows a part of what it leaves out.
@@ -15,7 +15,7 @@ pub enum GivenBrain {
     Found,
 }
 
-impl GivenBrain {
+impl BrainSource {
     /// From how many percent of one part of the brain on it is told. Of maps of six heads 1 % at most of any part was left out
     /// (FreeSurfer's, hgm's own), of hgm's masks of four heads without their fluid, or drawn in by 2 mm, 24 % (docs/evidence/choices.md);
     /// of brains found in nine heads 10, and 12 beside a stroke's cavity.
@@ -55,7 +55,7 @@ impl GivenBrain {
     }
 }
 
-impl std::fmt::Display for GivenBrain {
+impl std::fmt::Display for BrainSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Mask => "brain mask",
