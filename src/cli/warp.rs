@@ -1,7 +1,7 @@
 //! `hgm warp`: a user's image, points, streamlines or surface carried by a case.
 
 use super::flags::word;
-use super::{Failure, Session};
+use super::{Failure, Session, session::warn};
 use crate::report::in_words::warped;
 use crate::workflow::{Layer, Through, Warp, WarpTo, warp};
 use anyhow::anyhow;
@@ -46,6 +46,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let reading = session.settings(Layer::default())?.image;
     let asked = Warp { file: file.clone(), output: args.output.clone(), through, labels: args.labels, reading };
     let done = warp(&asked)?;
+    warn(&done.warnings);
     session
         .emit(&done, &warped(&done.output, done.kind, &done.state, done.points.map(|p| [p.all, p.removed, p.outside])))
 }

@@ -6,7 +6,7 @@ use super::setting::{
     LEVELS_RULE, POISSON_RULE, SETS_RULE, SettingError, TISSUES_RULE, first_broken, levels_hold, sets_hold,
 };
 use super::skull::{SkullSettings, level_when_drained};
-use super::verdict_of_samples::compared;
+use super::verdict::Finding;
 use crate::fem::{CsfLevel, Loads, PressureLoad, Scenario, SolverSettings, Support};
 use crate::geometry::Frame;
 use crate::image::LabelMap;
@@ -242,7 +242,7 @@ impl ResectionSettings {
 
 /// Whether `deformed` is better than `rest` by more than the measurement is worth, in words.
 pub fn improvement(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> &'static str {
-    compared(rest_mm, deformed_mm, floor).short()
+    Finding::against_rest(rest_mm, deformed_mm, floor.combined_mm().unwrap_or(0.0)).short()
 }
 
 #[cfg(test)]

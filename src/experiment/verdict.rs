@@ -56,6 +56,17 @@ pub enum Finding {
 }
 
 impl Finding {
+    /// A state's distance from what was seen against that at rest, mm: a difference below the floor means nothing.
+    pub fn against_rest(rest_mm: f64, deformed_mm: f64, floor_mm: f64) -> Self {
+        if rest_mm - deformed_mm > floor_mm {
+            Self::Better
+        } else if deformed_mm - rest_mm > floor_mm {
+            Self::Worse
+        } else {
+            Self::NotDistinguishable
+        }
+    }
+
     /// Whether the figures of the stiffness may be read as an answer.
     pub fn has_stiffness(self) -> bool {
         matches!(
@@ -168,6 +179,15 @@ pub enum Reason {
         /// The nearest one.
         nearest: String,
     },
+    /// A phantom's own modulus lies outside those of its samples.
+    OutOfReach {
+        /// The tissue.
+        tissue: String,
+        /// Its own, Pa.
+        own_pa: f64,
+        /// From and to of the samples, Pa.
+        tried_pa: [f64; 2],
+    },
     /// Samples without an equilibrium, of all of them.
     WithoutEquilibrium {
         /// How many.
@@ -251,6 +271,9 @@ impl Reason {
             }
             Self::Phantom { best, nearest } => {
                 format!("{best} explains the reference best, but {nearest} has the moduli nearest to its own")
+            }
+            Self::OutOfReach { tissue, own_pa, tried_pa } => {
+                format!("{} of {} Pa lies outside the {} that were tried", words(tissue), pa(*own_pa), range(*tried_pa))
             }
             Self::WithoutEquilibrium { samples, of } => {
                 format!("{samples} of {of} samples reached no equilibrium")

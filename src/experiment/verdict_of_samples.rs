@@ -1,6 +1,6 @@
 //! The verdict of an outcome: its estimate's, else that of its samples against rest.
 
-use super::outcome::{Answer, ExperimentKind, ExperimentOutcome, NoiseFloor, SampleOutcome};
+use super::outcome::{Answer, ExperimentKind, ExperimentOutcome, SampleOutcome};
 use super::phantom::REFERENCE;
 use super::verdict::{Claim, Finding, Reason, Verdict};
 
@@ -51,15 +51,18 @@ fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
     let floor_mm = floor.combined_mm().unwrap_or(0.0);
     let moduli = as_good(outcome, set, deformed_mm + floor_mm);
     if let Some(nearest) = nearest_to_reference(outcome).filter(|_| outcome.kind == ExperimentKind::Phantom) {
-        let finding = if nearest.id == best.id { Finding::Recovered } else { Finding::NotRecovered };
-        let reason = Reason::Phantom { best: best.id.clone(), nearest: nearest.id.clone() };
-        return Verdict::new(finding, None, moduli, std::iter::once(reason).chain(failed).collect());
+        let mut reasons = out_of_reach(outcome);
+        let found = nearest.id == best.id && reasons.is_empty();
+        reasons.push(Reason::Phantom { best: best.id.clone(), nearest: nearest.id.clone() });
+        reasons.extend(failed);
+        let finding = if found { Finding::Recovered } else { Finding::NotRecovered };
+        return Verdict::new(finding, None, moduli, reasons);
     }
     let Some(&rest_mm) = outcome.rest_rmse_mm.get(set) else {
         // Without rest to be compared with, the samples are compared with each other.
         return Verdict::new(Finding::Better, None, moduli, failed.into_iter().collect());
     };
-    let finding = compared(rest_mm, deformed_mm, &floor);
+    let finding = Finding::against_rest(rest_mm, deformed_mm, floor_mm);
     let mut reasons = vec![Reason::Surface { set: set.to_owned(), rest_mm, deformed_mm, floor_mm }];
     for (tissue, answer) in &moduli {
         if let Claim::Range { range_pa } = answer {
@@ -83,16 +86,16 @@ pub fn nearest_to_reference(outcome: &ExperimentOutcome) -> Option<&SampleOutcom
     of_prior.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// A state against rest: a difference below the floor means nothing.
-pub fn compared(rest_mm: f64, deformed_mm: f64, floor: &NoiseFloor) -> Finding {
-    let floor_mm = floor.combined_mm().unwrap_or(0.0);
-    if rest_mm - deformed_mm > floor_mm {
-        Finding::Better
-    } else if deformed_mm - rest_mm > floor_mm {
-        Finding::Worse
-    } else {
-        Finding::NotDistinguishable
-    }
+/// A phantom's moduli beyond all of its samples': of those the nearest is the best one, and finds nothing again.
+fn out_of_reach(outcome: &ExperimentOutcome) -> Vec<Reason> {
+    let tried = |tissue: &str| {
+        let samples = outcome.samples.iter().filter(|s| s.id != REFERENCE && s.converged);
+        let moduli = samples.filter_map(|s| s.shear_modulus_pa.get(tissue).copied());
+        moduli.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], m| [low.min(m), high.max(m)])
+    };
+    let own = outcome.reference_shear_modulus_pa.iter().map(|(tissue, pa)| (tissue, *pa, tried(tissue)));
+    let beyond = own.filter(|(_, pa, [low, high])| !(low..=high).contains(&pa));
+    beyond.map(|(tissue, own_pa, tried_pa)| Reason::OutOfReach { tissue: tissue.clone(), own_pa, tried_pa }).collect()
 }
 
 /// The range of moduli of the samples whose error at `set` is not above `limit_mm`, tissue by tissue.
@@ -109,6 +112,7 @@ fn as_good(outcome: &ExperimentOutcome, set: &str, limit_mm: f64) -> Vec<(String
 
 #[cfg(test)]
 mod tests {
+    use super::super::outcome::NoiseFloor;
     use super::*;
     use std::collections::BTreeMap;
 
@@ -140,5 +144,24 @@ mod tests {
         assert_eq!(still.finding, Finding::NotDistinguishable);
         assert!(still.sentence.contains("No stiffness"), "{}", still.sentence);
         assert_eq!(of_samples(&swept(0.5, &[(300.0, 1.2), (500.0, 1.0)])).finding, Finding::Worse);
+    }
+
+    #[test]
+    fn a_phantom_stiffer_than_all_its_samples_is_not_found_again() {
+        let of = |own_pa: f64| {
+            let reference_shear_modulus_pa = BTreeMap::from([("brain".to_owned(), own_pa)]);
+            let best_sample = Some("sample-02".to_owned());
+            let swept = swept(3.0, &[(300.0, 1.2), (500.0, 1.0), (900.0, 0.1)]);
+            of_samples(&ExperimentOutcome {
+                kind: ExperimentKind::Phantom,
+                reference_shear_modulus_pa,
+                best_sample,
+                ..swept
+            })
+        };
+        assert_eq!(of(880.0).finding, Finding::Recovered);
+        let beyond = of(2000.0);
+        assert_eq!(beyond.finding, Finding::NotRecovered);
+        assert!(beyond.sentence.contains("2,000 Pa") && beyond.sentence.contains("300 to 900 Pa"), "{beyond:?}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::contact::{Support, Wall};
 use super::order::Graph;
-use super::scenario::{Materials, Scenario};
+use super::scenario::{Materials, Prescribed, Scenario};
 use super::{FemError, FemWarning};
 use crate::mesh::TetMesh;
 
@@ -98,7 +98,8 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
 
 /// No set is held in two ways that exclude each other. Not of a model that is changed while it is looked at: there a set that slides
 /// may be held for a while.
-pub(super) fn check_supports(scenario: &Scenario) -> Result<(), FemError> {
+pub(super) fn check_supports(mesh: &TetMesh, scenario: &Scenario) -> Result<(), FemError> {
+    check_movements(mesh, scenario)?;
     let sliding = |set: &String| scenario.supports.get(set) == Some(&Support::Sliding);
     if let Some(set) = scenario.fixed.iter().find(|set| sliding(set)) {
         return Err(FemError::TwoSupports {
@@ -112,6 +113,37 @@ pub(super) fn check_supports(scenario: &Scenario) -> Result<(), FemError> {
         Some(set) => Err(FemError::TwoSupports { set: set.clone(), first: "held", second: "moved in `prescribed`" }),
         None => Ok(()),
     }
+}
+
+/// No node is moved to two places.
+fn check_movements(mesh: &TetMesh, scenario: &Scenario) -> Result<(), FemError> {
+    let apart = |p: &Prescribed, q: &Prescribed| {
+        (0..3).any(|a| p.components[a] && q.components[a] && p.displacement_mm[a] != q.displacement_mm[a])
+    };
+    for (n, second) in scenario.prescribed.iter().enumerate() {
+        for first in scenario.prescribed[..n].iter().filter(|first| apart(first, second)) {
+            let (of_first, of_second) = (node_set(mesh, &first.set)?, node_set(mesh, &second.set)?);
+            if let Some(&node) = of_first.iter().find(|node| of_second.binary_search(node).is_ok()) {
+                let [first, second] = [first, second].map(|p| p.set.clone());
+                return Err(FemError::TwoMovements { first, second, node });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Nodes of a set that moves which a set that is held keeps where they are: the edge between two faces, or a slip.
+pub(super) fn stays_held(mesh: &TetMesh, scenario: &Scenario) -> Result<Vec<FemWarning>, FemError> {
+    let held: Vec<&[u32]> = scenario.held().map(|set| node_set(mesh, set)).collect::<Result<_, _>>()?;
+    let mut found = Vec::new();
+    for moved in scenario.prescribed.iter().filter(|p| p.displacement_mm != [0.0; 3]) {
+        let of_set = node_set(mesh, &moved.set)?;
+        let nodes = of_set.iter().filter(|node| held.iter().any(|held| held.binary_search(node).is_ok())).count();
+        if nodes > 0 {
+            found.push(FemWarning::StaysHeld { set: moved.set.clone(), nodes, of: of_set.len() });
+        }
+    }
+    Ok(found)
 }
 
 /// Tissue lighter than the fluid around it floats.

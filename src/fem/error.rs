@@ -16,6 +16,11 @@ pub enum FemError {
     #[error("set `{set}` is both {first} and {second}: take one of the two away")]
     TwoSupports { set: String, first: &'static str, second: &'static str },
     #[error(
+        "sets `{first}` and `{second}` share nodes, among them node {node}, and `prescribed` moves them to different places: take these \
+         nodes out of one of the two"
+    )]
+    TwoMovements { first: String, second: String, node: u32 },
+    #[error(
         "the whole body lies beyond the plane before set `{set}`, by {least_mm:.1} mm and more: turn `wall.normal`, which points to \
          the side that is free, or move `wall.point_mm`"
     )]

@@ -55,7 +55,7 @@ use crate::mesh::TetMesh;
 /// # Errors
 /// [`FemError`] names what is wrong with the input, or why there is no equilibrium.
 pub fn simulate(mesh: &TetMesh, scenario: &Scenario, progress: &dyn Fn(&Progress)) -> Result<Outcome, FemError> {
-    check::check_supports(scenario)?;
+    check::check_supports(mesh, scenario)?;
     let model = Model::new(mesh, scenario)?;
     match scenario.solver.method {
         Method::Static => model.solve(&scenario.materials, None, progress).map(|(outcome, _)| outcome),
@@ -75,7 +75,7 @@ pub fn simulate_from(
     start_mm: &[[f64; 3]],
     progress: &dyn Fn(&Progress),
 ) -> Result<Outcome, FemError> {
-    check::check_supports(scenario)?;
+    check::check_supports(mesh, scenario)?;
     let model = Model::new(mesh, scenario)?;
     let start = model.state(start_mm)?;
     model.solve(&scenario.materials, Some(&start), progress).map(|(outcome, _)| outcome)

@@ -2,7 +2,7 @@
 //! every solve.
 
 use super::buoyancy::Buoyancy;
-use super::check::{check_held_together, check_materials, check_settings, floating, node_set};
+use super::check::{check_held_together, check_materials, check_settings, floating, node_set, stays_held};
 use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
 use super::linear::{Symbolic, Tangent};
@@ -196,6 +196,7 @@ impl Model {
         let mut warnings = unstable_laws(&scenario.materials);
         warnings.extend(tiny(&nodes_m));
         warnings.extend(floating(scenario));
+        warnings.extend(stays_held(mesh, scenario)?);
         warnings.extend(supports.idle.iter().cloned());
         warnings.extend(idle_loads(&load_parts, &row_of, scenario));
         if let Some(limit) = element.locks_above() {

@@ -65,6 +65,11 @@ pub enum FemWarning {
         idle.words()
     )]
     NoEffect { set: String, idle: Idle },
+    #[error(
+        "{nodes} of the {of} nodes of set `{set}`, which is moved in `prescribed`, are held by another set and stay: where that is not \
+         meant, take them out of one of the two"
+    )]
+    StaysHeld { set: String, nodes: usize, of: usize },
     #[error("{cells} cells are inside out, among them cell {worst}: lower the load or raise the modulus")]
     InsideOut { cells: usize, worst: usize },
     #[error("{cells} cells are squeezed below a tenth of their volume: treat stresses with care")]

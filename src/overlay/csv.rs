@@ -56,6 +56,11 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
             }
         };
         let columns = [named("x")?, named("y")?, named("z")?];
+        if first.iter().any(|cell| cell == "t") {
+            let problem = "x, y, z, t are the columns of ANTs, whose x and y are those of LPS: turn the signs of x and y, and take t \
+                           away (or call it otherwise, if the points are RAS)";
+            return Err(damaged(name, "the first row", problem));
+        }
         (Some(rows.remove(0)), columns)
     };
     let mut points_mm = Vec::with_capacity(rows.len());
@@ -111,19 +116,29 @@ fn refuse_other_separator(bytes: &[u8], name: &str) -> Result<(), OverlayError> 
 }
 
 impl Kept for Table {
-    /// The table with the points where they are now, and two columns more: `sd_mm` and `state`.
+    /// The table with the points where they are now, and two columns more, `sd_mm` and `state`, where an earlier carrying has not
+    /// left them.
     fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
         let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
         let mut write = |row: Vec<String>| writer.write_record(row).expect("writing to memory does not fail");
+        let place = |key: &str| self.header.iter().flatten().position(|cell| cell == key);
+        let own = [place("sd_mm"), place("state")];
         if let Some(header) = &self.header {
-            write(header.iter().cloned().chain(["sd_mm".to_owned(), "state".to_owned()]).collect());
+            let more = ["sd_mm", "state"].into_iter().zip(own).filter(|(_, at)| at.is_none());
+            write(header.iter().cloned().chain(more.map(|(key, _)| key.to_owned())).collect());
         }
         for (row, point) in self.rows.iter().zip(carried) {
             let mut row = row.clone();
             for (c, x) in self.columns.iter().zip(point.mm) {
                 row[*c] = written(x);
             }
-            row.extend([point.sd_mm.map_or_else(String::new, written), point.state.to_string()]);
+            let values = [point.sd_mm.map_or_else(String::new, written), point.state.to_string()];
+            for (value, at) in values.into_iter().zip(own) {
+                match at {
+                    Some(at) => row[at] = value,
+                    None => row.push(value),
+                }
+            }
             write(row);
         }
         writer.into_inner().expect("writing to memory does not fail")

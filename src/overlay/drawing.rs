@@ -21,6 +21,11 @@ pub(super) trait Kept: fmt::Debug {
     /// The file again with its points carried.
     fn encode(&self, carried: &[Carried], names: &[String]) -> Vec<u8>;
 
+    /// What of it does not move with the points.
+    fn not_carried(&self) -> Option<NotCarried> {
+        None
+    }
+
     /// How many lines a file of streamlines holds.
     fn streamlines(&self) -> Option<usize> {
         None
@@ -30,6 +35,21 @@ pub(super) trait Kept: fmt::Debug {
     fn triangles(&self, _points: usize, _name: &str) -> Option<Result<Vec<[u32; 3]>, OverlayError>> {
         None
     }
+}
+
+/// What of a file does not move with its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum NotCarried {
+    /// Directions at the points.
+    #[error(
+        "its normals, vectors and tensors are written as they were: they are those of the points before, compute them again"
+    )]
+    Directions,
+    /// Further arrays of a GIFTI file.
+    #[error(
+        "{0} more arrays of the file, beside the points and triangles, are not written: take them from the file itself"
+    )]
+    Arrays(usize),
 }
 
 /// Where points are now, mm.
@@ -110,6 +130,11 @@ impl Drawing {
     pub fn surface(&self, name: &str) -> Result<Option<TriMesh>, OverlayError> {
         let triangles = self.kept.triangles(self.points_mm.len(), name).transpose()?.filter(|t| !t.is_empty());
         Ok(triangles.map(|triangles| TriMesh { nodes_mm: self.points_mm.clone(), triangles }))
+    }
+
+    /// What of the file [`Drawing::encode`] writes as it was, or not at all.
+    pub fn not_carried(&self) -> Option<NotCarried> {
+        self.kept.not_carried()
     }
 
     /// How many lines a file of streamlines holds.

@@ -18,7 +18,7 @@ mod tck;
 mod trk;
 mod vtk;
 
-pub use drawing::{Carried, Drawing, OverlayError, PointState};
+pub use drawing::{Carried, Drawing, NotCarried, OverlayError, PointState};
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! PLY, text or binary in either order: the vertices move, everything else stays.
 
-use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned, written};
+use super::drawing::{Carried, Drawing, Kept, NotCarried, OverlayError, damaged, places, says_lps, turned, written};
 use super::ply_faces::{Numbers, triangles};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +24,8 @@ pub(super) struct Vertices {
     places: [(usize, usize); 3],
     /// Bytes of a row.
     row: usize,
+    /// Whether normals are among them.
+    normals: bool,
 }
 
 fn size_of(kind: &str) -> Option<usize> {
@@ -52,7 +54,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     let count =
         lines.next().and_then(|l| l.strip_prefix("element vertex ")).and_then(|n| n.trim().parse::<usize>().ok());
     let count = count.ok_or_else(|| damaged(name, "element", "the vertices do not come first"))?;
-    let (mut row, mut word, mut found) = (0, 0, [None; 3]);
+    let (mut row, mut word, mut found, mut normals) = (0, 0, [None; 3], false);
     for line in lines.take_while(|l| !l.starts_with("element")).filter(|l| l.starts_with("property")) {
         let mut words = line.split_whitespace().skip(1);
         let (kind, property) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
@@ -60,6 +62,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         if let Some(axis) = ["x", "y", "z"].iter().position(|a| *a == property) {
             found[axis] = Some(if order == Order::Text { (word, size) } else { (row, size) });
         }
+        normals |= ["nx", "ny", "nz"].contains(&property);
         row += size;
         word += 1;
     }
@@ -96,7 +99,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         }
         end
     };
-    let kept = Box::new(Vertices { bytes: bytes.to_vec(), order, lps, first, end, places, row });
+    let kept = Box::new(Vertices { bytes: bytes.to_vec(), order, lps, first, end, places, row, normals });
     Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept })
 }
 
@@ -142,6 +145,10 @@ impl Kept for Vertices {
         }
         bytes.extend(&self.bytes[self.end..]);
         bytes
+    }
+
+    fn not_carried(&self) -> Option<NotCarried> {
+        self.normals.then_some(NotCarried::Directions)
     }
 
     fn triangles(&self, points: usize, name: &str) -> Option<Result<Vec<[u32; 3]>, OverlayError>> {

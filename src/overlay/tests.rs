@@ -1,4 +1,6 @@
 use super::*;
+use crate::mesh::TriMesh;
+use crate::mesh::format::gifti::{Space, encode_surface};
 
 fn moved(drawing: &Drawing, by: [f64; 3]) -> Vec<Carried> {
     let to =
@@ -39,6 +41,43 @@ fn pairs_of_a_tag_file_are_read_and_a_table_without_names_of_columns_too() {
     assert_eq!(drawing.pairs_mm, [[4.0, 5.0, 6.0], [10.0, 11.0, 12.0]]);
     let table = Drawing::decode(b"a, 1, 2, 3\nb, 4, 5, 6\n", "a.csv").unwrap();
     assert_eq!((table.points_mm.len(), table.names), (2, vec!["a".to_owned(), "b".to_owned()]));
+}
+
+#[test]
+fn what_does_not_move_with_the_points_is_told() {
+    let ply = |more: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n{more}end_header\n1 2 3 0 0 1\n"
+        )
+    };
+    let normals = "property float nx\nproperty float ny\nproperty float nz\n";
+    let of = |text: &str, name: &str| Drawing::decode(text.as_bytes(), name).unwrap().not_carried();
+    assert_eq!(of(&ply(normals), "a.ply"), Some(NotCarried::Directions));
+    assert_eq!(of(&ply(&normals.replace('n', "c")), "a.ply"), None);
+    let vtk = "# vtk DataFile Version 4.2\nof\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n5 6 7\nVERTICES 1 2\n1 0\n";
+    assert_eq!(of(vtk, "a.vtk"), None);
+    let with = format!("{vtk}POINT_DATA 1\nNORMALS n float\n0 0 1\n");
+    assert_eq!(of(&with, "a.vtk"), Some(NotCarried::Directions));
+    let surface = TriMesh { nodes_mm: vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], triangles: vec![[0, 1, 2]] };
+    let gifti = String::from_utf8(encode_surface(&surface, Space::Scanner, "made")).unwrap();
+    assert_eq!(of(&gifti, "a.gii"), None);
+    let start = gifti.find("<DataArray ").unwrap();
+    let end = gifti.rfind("</GIFTI>").unwrap();
+    let shape = gifti[start..end].replace("NIFTI_INTENT_POINTSET", "NIFTI_INTENT_SHAPE");
+    let shape = &shape[..shape.find("</DataArray>").unwrap() + "</DataArray>".len()];
+    let three = format!("{}{shape}{}", &gifti[..end], &gifti[end..]);
+    assert_eq!(of(&three, "a.gii"), Some(NotCarried::Arrays(1)));
+}
+
+#[test]
+fn a_table_carried_twice_has_its_columns_once_and_one_of_ants_is_not_taken_for_ras() {
+    let drawing = Drawing::decode(b"name,x,y,z\nF-1,5,-6,7\n", "a.csv").unwrap();
+    let once = drawing.encode(&moved(&drawing, [10.0, 0.0, 0.0]));
+    let again = Drawing::decode(&once, "a.csv").unwrap();
+    let twice = again.encode(&moved(&again, [10.0, 0.0, 0.0]));
+    assert_eq!(String::from_utf8(twice).unwrap(), "name,x,y,z,sd_mm,state\nF-1,25,-6,7,0.75,tissue\n");
+    let ants = Drawing::decode(b"x,y,z,t,label\n5,-6,7,0,1\n", "a.csv").unwrap_err().to_string();
+    assert!(ants.contains("LPS") && ants.contains("take t away"), "{ants}");
 }
 
 /// What is not placed stays where it is, and no point takes its place.
@@ -120,7 +159,7 @@ fn lines_keep_their_lengths_and_their_numbers() {
 #[test]
 fn a_surface_has_the_same_triangles_in_every_format() {
     use crate::mesh::TriMesh;
-    use crate::mesh::format::{gifti, ply, stl};
+    use crate::mesh::format::{ply, stl};
     let solid = TriMesh {
         nodes_mm: vec![[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]],
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
@@ -131,7 +170,7 @@ fn a_surface_has_the_same_triangles_in_every_format() {
     for found in [
         read(text.as_bytes(), "a.ply"),
         read(&ply::encode(&solid, &[]).unwrap(), "b.ply"),
-        read(&gifti::encode_surface(&solid, gifti::Space::Scanner, "c"), "c.surf.gii"),
+        read(&encode_surface(&solid, Space::Scanner, "c"), "c.surf.gii"),
     ] {
         assert_eq!(found, solid);
     }

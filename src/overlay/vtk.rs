@@ -1,6 +1,6 @@
 //! VTK's legacy files (`.vtk`), text or binary: the points move, whatever hangs on them stays.
 
-use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, places, says_lps, turned, written};
+use super::drawing::{Carried, Drawing, Kept, NotCarried, OverlayError, damaged, places, says_lps, turned, written};
 
 /// The file with the place of its points.
 #[derive(Clone, Debug)]
@@ -93,5 +93,11 @@ impl Kept for Points {
         }
         bytes.extend(&self.after);
         bytes
+    }
+
+    fn not_carried(&self) -> Option<NotCarried> {
+        let begins = |key: &[u8]| self.after.windows(key.len()).any(|w| w == key);
+        let any = [&b"\nNORMALS "[..], b"\nVECTORS ", b"\nTENSORS "].into_iter().any(begins);
+        any.then_some(NotCarried::Directions)
     }
 }

@@ -103,7 +103,7 @@ impl Map {
             let others = || -> Result<_, WorkflowError> {
                 let of = SHIFT_SD.of(&state);
                 let sd = (part == Part::Points).then(|| -> Result<_, WorkflowError> {
-                    Ok(nifti::decode_intensities(&made.read(&of)?, &of, &options)?)
+                    Ok(nifti::decode_intensities(&made.read(&of)?, &of, &options)?.0)
                 });
                 Ok((sd.transpose()?, mask_of(&SHIFT_MASK.of(&state))?, taken()?))
             };

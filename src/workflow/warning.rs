@@ -2,6 +2,7 @@
 
 use crate::fem::FemWarning;
 use crate::image::nifti::NiftiWarning;
+use crate::overlay::NotCarried;
 use crate::register::FitWarning;
 use crate::segment::SegmentWarning;
 use crate::tag::TagWarning;
@@ -24,6 +25,8 @@ pub enum Warning {
     Head(#[from] SegmentWarning),
     #[error(transparent)]
     Set(#[from] TagWarning),
+    #[error(transparent)]
+    Drawing(#[from] NotCarried),
     #[error(transparent)]
     Simulation(#[from] FemWarning),
     #[error(

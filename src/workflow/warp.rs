@@ -4,6 +4,7 @@ use super::case::Case;
 use super::error::{WarpError, WorkflowError};
 use super::maps::{Map, Part, WarpTo};
 use super::user_file::{read_input, shown};
+use super::warning::{Warning, all_of};
 use crate::artefact::{check_writable, write_whole};
 use crate::experiment::field::{Between, looks_like_labels, seen_through};
 use crate::geometry::{Native, Position};
@@ -60,6 +61,9 @@ pub struct Warped {
     /// Largest motion of a point apart from the rigid one, or of none where it is not known, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub streamlines: Option<usize>,
+    /// What a reader must know.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<Warning>,
 }
 
 /// How many points lay where.
@@ -114,13 +118,14 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
     };
     if image {
         let (volume, map) = rayon::join(|| nifti::decode_intensities(&bytes, &name, &asked.reading), map);
-        let volume = volume?;
+        let (volume, odd) = volume?;
         let labels = asked.labels.unwrap_or_else(|| looks_like_labels(&volume));
         let (map, state) = map?;
         let carried = image_through(&volume, &map, labels);
         write_whole(&asked.output, &encode_intensities(&carried))?;
         let kind = if labels { "labels" } else { "image" };
-        return Ok(Warped { output: asked.output.clone(), kind, state, points: None, streamlines: None });
+        let warnings = all_of(&name, &odd).collect();
+        return Ok(Warped { output: asked.output.clone(), kind, state, points: None, streamlines: None, warnings });
     }
     let drawing = Drawing::decode(&bytes, &name)?;
     let (map, state) = map()?;
@@ -132,7 +137,9 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
         _ => "points",
     };
     let points = Some(PointCounts::of(&carried));
-    Ok(Warped { output: asked.output.clone(), kind, state, points, streamlines: drawing.streamlines() })
+    let warnings = all_of(&name, drawing.not_carried().as_slice()).collect();
+    let streamlines = drawing.streamlines();
+    Ok(Warped { output: asked.output.clone(), kind, state, points, streamlines, warnings })
 }
 
 /// Carries points (mm) of one of a case's frames, as [`warp`] carries those of a file; returns the state that carried them

@@ -354,15 +354,21 @@ impl<'a> Body<'a> {
         Ok((state, Solved { outcome, sensitivities }))
     }
 
-    fn residuals(&self, solved: &Solved) -> Linearisation {
+    /// Distances (mm) from what was observed to where the body is before anything moves.
+    pub(super) fn residuals_at_rest(&self) -> DVector<f64> {
+        self.residuals(&vec![[0.0; 3]; self.mesh.nodes_mm().len()], &[]).residuals_mm
+    }
+
+    /// Of a displacement, and how they change with each unknown whose sensitivities are given.
+    fn residuals(&self, displacement_mm: &[[f64; 3]], sensitivities: &[Vec<[f64; 3]>]) -> Linearisation {
         let rows: Vec<(f64, Vec<f64>)> = match &self.observation {
             Observation::Nodes(observed) => observed
                 .iter()
                 .flat_map(|(n, target)| {
                     let n = *n as usize;
                     (0..3).map(move |a| {
-                        let row = solved.sensitivities.iter().map(|s| s[n][a]).collect();
-                        (solved.outcome.displacement_mm[n][a] - target[a], row)
+                        let row = sensitivities.iter().map(|s| s[n][a]).collect();
+                        (displacement_mm[n][a] - target[a], row)
                     })
                 })
                 .collect(),
@@ -374,7 +380,7 @@ impl<'a> Body<'a> {
                         .par_iter()
                         .map(|&n| {
                             let n = n as usize;
-                            let (x, u) = (Vector3::from(self.mesh.nodes_mm()[n]), solved.outcome.displacement_mm[n]);
+                            let (x, u) = (Vector3::from(self.mesh.nodes_mm()[n]), displacement_mm[n]);
                             let at = x + Vector3::from(u);
                             let hit = tree.find(at.into());
                             let normal = normal_of(
@@ -388,8 +394,7 @@ impl<'a> Body<'a> {
                             } else {
                                 normal
                             };
-                            let row =
-                                solved.sensitivities.iter().map(|s| direction.dot(&Vector3::from(s[n]))).collect();
+                            let row = sensitivities.iter().map(|s| direction.dot(&Vector3::from(s[n]))).collect();
                             (direction.dot(&away), row)
                         })
                         .collect::<Vec<_>>()
@@ -398,7 +403,7 @@ impl<'a> Body<'a> {
         };
         Linearisation {
             residuals_mm: DVector::from_iterator(rows.len(), rows.iter().map(|r| r.0)),
-            jacobian_mm: DMatrix::from_fn(rows.len(), self.unknowns.len(), |r, c| rows[r].1[c]),
+            jacobian_mm: DMatrix::from_fn(rows.len(), sensitivities.len(), |r, c| rows[r].1[c]),
         }
     }
 }
@@ -408,7 +413,7 @@ impl Forward for Body<'_> {
 
     fn linearise(&mut self, log_parameters: &[f64]) -> Result<Linearisation, BodyError> {
         let solved = self.solve(log_parameters)?;
-        Ok(self.residuals(&solved))
+        Ok(self.residuals(&solved.outcome.displacement_mm, &solved.sensitivities))
     }
 }
 

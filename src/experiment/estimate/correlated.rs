@@ -232,6 +232,7 @@ pub(super) fn fit(
         noise_mm: total_sd_mm,
         independent: independent(&findings.factor, &fit.places_mm, total_sd_mm),
         residual_rms_mm,
+        rest_rms_mm: root_mean_square(fit.body.residuals_at_rest().as_slice()).unwrap_or(0.0),
         observations,
         taken_out_rms_mm,
         taken_up,

@@ -43,6 +43,8 @@ pub(super) struct Fitted {
     pub independent: f64,
     /// Root mean square of the residuals, mm.
     pub residual_rms_mm: f64,
+    /// The same of a body that has not moved, mm.
+    pub rest_rms_mm: f64,
     /// Observations.
     pub observations: usize,
     /// What was taken out of one observation, mm.

@@ -197,9 +197,9 @@ mod tests {
         let mesh = block(3);
         let (scenario, unknowns) = (scenario(IN_FLUID), [moduli(), vec![drained()]].concat());
         let u = solved(&mesh, &scenario, &unknowns, &[7.0, 7.0, -0.847]);
-        let errors = Errors::Independent { share: 0.02 };
+        let errors = Errors::Independent { share: 0.00125 };
         let problem = posed(&mesh, &scenario, true, (seen(&u, 0.0, 0), errors));
-        let settings = EstimateSettings { noise_mm: 2.0, ..EstimateSettings::default() };
+        let settings = EstimateSettings { noise_mm: 0.5, ..EstimateSettings::default() };
         let fluid = solve_problem(problem, &settings).unwrap().outcome.fluid.unwrap();
         assert_eq!(fluid.knowledge, Knowledge::PriorDominated);
         assert!(fluid.sentence().contains("the interval is the prior's"), "{}", fluid.sentence());

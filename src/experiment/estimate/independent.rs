@@ -45,6 +45,7 @@ pub(super) fn fit_independent(
         noise_mm,
         independent: share * residuals.len() as f64,
         residual_rms_mm,
+        rest_rms_mm: root_mean_square(body.residuals_at_rest().as_slice()).unwrap_or(0.0),
         observations: residuals.len(),
         taken_out_rms_mm,
         taken_up,

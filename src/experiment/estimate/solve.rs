@@ -182,6 +182,7 @@ mod tests {
     use crate::experiment::estimate::{
         Average, CorrelatedErrors, Instrument, InstrumentError, Process, Scale, Shown, Turn, material,
     };
+    use crate::experiment::observed::ObservedSurfaces;
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
@@ -189,7 +190,7 @@ mod tests {
     use crate::fem::{Scenario, simulate};
     use crate::material::law::{gent, mooney_rivlin, ogden};
     use crate::material::meta_model::MetaModel;
-    use crate::mesh::TetMesh;
+    use crate::mesh::{TetMesh, TriMesh};
 
     fn problem<'a>(mesh: &'a TetMesh, scenario: &'a Scenario, observed: Vec<(u32, [f64; 3])>) -> Problem<'a> {
         let unknown = |tissue: Tissue| {
@@ -504,6 +505,25 @@ mod tests {
         let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]).outcome;
         assert!(!found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
         assert!(found.shift.unwrap().seen, "{:?}", found.odds);
+    }
+
+    #[test]
+    fn surfaces_no_further_from_rest_than_they_are_known_claim_no_stiffness() {
+        let (mesh, scenario, observed) = phantom(4);
+        let found = |share: f64| {
+            let moved = mesh.nodes_mm().iter().zip(&observed);
+            let nodes: Vec<[f64; 3]> = moved.map(|(x, (_, u))| std::array::from_fn(|a| x[a] + share * u[a])).collect();
+            let (surface, _) = TriMesh::from_facets(&nodes, &mesh.boundary_facets(|_| true));
+            let surfaces = BTreeMap::from([("superior".to_owned(), surface)]);
+            let seen = Observation::Surfaces(ObservedSurfaces::new(&mesh, surfaces).unwrap());
+            let posed = problem(&mesh, &scenario, Vec::new());
+            let noise = EstimateSettings { noise_mm: 0.3, ..EstimateSettings::default() };
+            solve_problem(Problem { observation: seen, ..posed }, &noise).unwrap().outcome.verdict
+        };
+        let still = found(0.05);
+        assert_eq!(still.finding, Finding::NoShift, "{still:?}");
+        assert!(still.sentence.contains("mm at rest") && still.moduli.iter().all(|(_, c)| *c == Claim::Withheld));
+        assert!(found(1.0).finding.has_stiffness());
     }
 
     /// The block, pushed hard enough that a law's shape shows, with the truth's law and the prior of that law.

@@ -56,11 +56,17 @@ pub(super) fn verdict_of_fit(
         if found.odds.model_to_any_movement < STRONG {
             unexplained.push(Reason::NoBetterThanAnyMovement { log_odds: found.odds.model_to_any_movement });
         }
-    } else if fitted.residual_rms_mm > settings.noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt())
-    {
+    } else {
+        let (rest_mm, deformed_mm, noise_mm) = (fitted.rest_rms_mm, fitted.residual_rms_mm, settings.noise_mm);
+        // As of samples.
+        if Finding::against_rest(rest_mm, deformed_mm, noise_mm) != Finding::Better {
+            let set = "all that is seen".to_owned();
+            still = Some(Reason::Surface { set, rest_mm, deformed_mm, floor_mm: noise_mm });
+        }
         // A root mean square of n independent ones is known to its 1 / sqrt(2 n).
-        let (discrepancy_mm, noise_mm) = (fitted.residual_rms_mm, settings.noise_mm);
-        unexplained.push(Reason::Discrepancy { discrepancy_mm, noise_mm });
+        if deformed_mm > noise_mm * (1.0 + CONTRADICTION_SD / (2.0 * fitted.independent).sqrt()) {
+            unexplained.push(Reason::Discrepancy { discrepancy_mm: deformed_mm, noise_mm });
+        }
     }
     // What was not found explains nothing.
     if fitted.descent.convergence == Convergence::IterationsExhausted {

@@ -16,6 +16,9 @@ const LEAST_PATIENTS: usize = 5;
 /// A mean known no better than this share of the literature's own spread is one more study among the literature's.
 const LEAST_KNOWN: f64 = 0.5;
 
+/// Figures that differ by less than this, relative to 1 and themselves, are the same.
+const SAME: f64 = 1e-6;
+
 /// A population, as its file has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -72,6 +75,27 @@ pub struct Taught {
     pub literature_log_sd: f64,
     /// Whether the next patient's prior is this one; else the cohort is one study's worth and the literature's prior stands.
     pub moves_prior: bool,
+}
+
+impl Taught {
+    /// Every figure that follows from the moments.
+    fn figures(&self) -> Vec<(&'static str, f64)> {
+        let one = [
+            ("log_mean", self.log_mean),
+            ("log_spread", self.log_spread),
+            ("median", self.median),
+            ("next_log_mean", self.next_log_mean),
+            ("next_log_sd", self.next_log_sd),
+        ];
+        let intervals = [
+            ("log_mean_95", self.log_mean_95),
+            ("log_spread_95", self.log_spread_95),
+            ("median_95", self.median_95),
+            ("next_95", self.next_95),
+        ];
+        let ends = intervals.into_iter().flat_map(|(key, ends)| ends.map(|end| (key, end)));
+        one.into_iter().chain(ends).collect()
+    }
 }
 
 /// Why a population's file is refused.
@@ -202,8 +226,31 @@ impl PopulationFile {
             let line = crate::material::toml_text::line_of(&error, text);
             refused(format!("line {line}: {}", error.message().trim().replace('\n', " ")))
         })?;
-        read.check().map_err(refused)?;
+        read.check().map_err(&refused)?;
+        read.check_figures().map_err(refused)?;
         Ok(read)
+    }
+
+    /// A figure that does not follow from the moments was written by hand, or for other patients.
+    fn check_figures(&self) -> Result<(), String> {
+        let known = |t: &Taught| (t.name.clone(), (t.literature_log_mean, t.literature_log_sd));
+        let parameters: Vec<(String, Literature)> = self.parameters.iter().map(known).collect();
+        let cohort = (self.law, self.density_kg_per_m3);
+        let again = Self::new(cohort, &parameters, self.moments.clone(), BTreeMap::new()).map_err(|e| e.to_string())?;
+        for (read, follows) in self.parameters.iter().zip(&again.parameters) {
+            let name = &read.name;
+            if (read.patients, read.moves_prior) != (follows.patients, follows.moves_prior) {
+                let of = |t: &Taught| format!("`patients` {} and `moves_prior` {}", t.patients, t.moves_prior);
+                return Err(format!("`{name}` has {}, its moments {}", of(read), of(follows)));
+            }
+            let mut figures = read.figures().into_iter().zip(follows.figures());
+            if let Some(((key, is), (_, should))) =
+                figures.find(|((_, a), (_, b))| (a - b).abs() > SAME * (1.0 + b.abs()))
+            {
+                return Err(format!("`{key}` of `{name}` is {is}, and its moments give {should}"));
+            }
+        }
+        Ok(())
     }
 
     fn check(&self) -> Result<(), String> {

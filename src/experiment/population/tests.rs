@@ -213,6 +213,9 @@ fn a_file_reads_back_and_a_slip_in_it_is_refused_by_name() {
         ("next_log_sd = ", "next_log_sd = -", "`next_log_sd`"),
         ("information = [", "information = [1.0, ", "must have 2 numbers"),
         ("law = \"neo-hookean\"", "law = \"neo\"", "neo"),
+        ("next_log_mean = ", "next_log_mean = 1", "its moments give"),
+        ("median_95 = [", "median_95 = [1", "`median_95`"),
+        ("moves_prior = true", "moves_prior = false", "`moves_prior` false"),
     ] {
         let broken = text.replacen(from, to, 1);
         assert_ne!(broken, text, "{from}");

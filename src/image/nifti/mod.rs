@@ -87,12 +87,16 @@ pub fn decode_scan(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Ni
     Ok(image)
 }
 
-/// Reads numbers or labels of any kind: a scan, a label map, a map of one value.
+/// Reads numbers or labels of any kind: a scan, a label map, a map of one value. Returns the warnings beside it.
 ///
 /// # Errors
 /// [`NiftiError`] as [`decode`], but for an image of one value.
-pub fn decode_intensities(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Volume<f32, Native>, NiftiError> {
-    read(bytes, name, options).map(|image| image.volume)
+pub fn decode_intensities(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+) -> Result<(Volume<f32, Native>, Vec<NiftiWarning>), NiftiError> {
+    read(bytes, name, options).map(|image| (image.volume, image.warnings))
 }
 
 /// Reads a label map: whole numbers from 0 to 255. Returns the warnings beside it.

@@ -49,7 +49,7 @@ impl Earlier {
             &self.head;
         let labels_mni = self.on_mni(self.labels(PRE_LABELS)?, PRE_LABELS)?;
         let brain_mni = self.on_mni(self.labels(PRE_BRAIN)?, PRE_BRAIN)?.map(|l| l > 0);
-        let even = nifti::decode_intensities(&self.case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &ReadOptions::default())?;
+        let (even, _) = nifti::decode_intensities(&self.case.read(PRE_EVEN_T1)?, PRE_EVEN_T1, &ReadOptions::default())?;
         let t1_mni = self.on_mni(even.data, PRE_EVEN_T1)?;
         let of_pre = |name: &str| -> Result<LabelMap<Pre>, WorkflowError> {
             let data = self.labels(name)?;

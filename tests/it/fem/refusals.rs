@@ -85,6 +85,24 @@ fn a_set_is_not_held_in_two_ways_at_once() {
 }
 
 #[test]
+fn a_node_is_not_moved_to_two_places_and_one_that_is_held_all_the_same_is_told() {
+    let mesh = cube(2, 10.0);
+    let moved = |set: &str, x: f64, z: bool| {
+        format!("[[prescribed]]\nset = '{set}'\ndisplacement_mm = [{x}, 0, 0]\ncomponents = [true, false, {z}]\n")
+    };
+    let pair = |second: &str| format!("fixed = ['z0']\n{}{second}{GREY}", moved("x1", 1.0, false));
+    let (error, message) = refusal(&mesh, &pair(&moved("y1", 2.0, false)));
+    assert!(matches!(error, FemError::TwoMovements { .. }), "{error:?}");
+    assert!(message.contains("`x1` and `y1`") && message.contains("take these nodes out"), "{message}");
+    // To the same place, or along other axes, is no contradiction.
+    let solved = |text: &str| simulate(&mesh, &Scenario::from_toml(text).unwrap(), &|_| ()).unwrap();
+    solved(&pair(&moved("y1", 1.0, true)));
+    // Three of the nine nodes of a face are on the edge of the one that is held.
+    let held = solved(&pair("")).warnings;
+    assert_eq!(held, [FemWarning::StaysHeld { set: "x1".to_owned(), nodes: 3, of: 9 }]);
+}
+
+#[test]
 fn what_acts_on_held_nodes_alone_is_said_to_have_no_effect() {
     let mesh = cube(2, 10.0);
     let weight = "[loads]\ngravity_m_per_s2 = [0, 0, -9.81]\n";
