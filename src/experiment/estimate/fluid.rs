@@ -77,6 +77,7 @@ mod tests {
         solve_problem,
     };
     use crate::experiment::phantom::block;
+    use crate::experiment::rmse::root_mean_square;
     use crate::experiment::sample::Tissue;
     use crate::fem::Scenario;
     use crate::material::random::CounterRng;
@@ -197,9 +198,11 @@ mod tests {
         let mesh = block(3);
         let (scenario, unknowns) = (scenario(IN_FLUID), [moduli(), vec![drained()]].concat());
         let u = solved(&mesh, &scenario, &unknowns, &[7.0, 7.0, -0.847]);
-        let errors = Errors::Independent { share: 0.00125 };
+        // A shift that is seen, by few observations.
+        let noise_mm = 0.5 * root_mean_square(u.as_flattened()).unwrap();
+        let errors = Errors::Independent { share: 0.0005 };
         let problem = posed(&mesh, &scenario, true, (seen(&u, 0.0, 0), errors));
-        let settings = EstimateSettings { noise_mm: 0.5, ..EstimateSettings::default() };
+        let settings = EstimateSettings { noise_mm, ..EstimateSettings::default() };
         let fluid = solve_problem(problem, &settings).unwrap().outcome.fluid.unwrap();
         assert_eq!(fluid.knowledge, Knowledge::PriorDominated);
         assert!(fluid.sentence().contains("the interval is the prior's"), "{}", fluid.sentence());
