@@ -94,7 +94,7 @@ fn out_of_reach(outcome: &ExperimentOutcome) -> Vec<Reason> {
         moduli.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], m| [low.min(m), high.max(m)])
     };
     let own = outcome.reference_shear_modulus_pa.iter().map(|(tissue, pa)| (tissue, *pa, tried(tissue)));
-    let beyond = own.filter(|(_, pa, [low, high])| !(low..=high).contains(&pa));
+    let beyond = own.filter(|(_, pa, [low, high])| low <= high && !(low..=high).contains(&pa));
     beyond.map(|(tissue, own_pa, tried_pa)| Reason::OutOfReach { tissue: tissue.clone(), own_pa, tried_pa }).collect()
 }
 

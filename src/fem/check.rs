@@ -60,8 +60,17 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
         if contact.gap_mm < 0.0 {
             return refuse(&key("gap_mm"), contact.gap_mm, "0 or more");
         }
-        if matches!(contact.wall, Wall::Plane { normal, .. } if normal == [0.0; 3]) {
-            return refuse(&key("wall.normal"), 0.0, "a direction, not [0, 0, 0]");
+        if let Wall::Plane { normal, .. } = contact.wall {
+            if normal == [0.0; 3] {
+                return refuse(&key("wall.normal"), 0.0, "a direction, not [0, 0, 0]");
+            }
+            if contact.gap_mm != 0.0 {
+                return refuse(
+                    &key("gap_mm"),
+                    contact.gap_mm,
+                    "left out before a plane, which stands where `wall.point_mm` is",
+                );
+            }
         }
     }
     for tether in &scenario.tethers {

@@ -26,8 +26,8 @@ pub struct Contact {
     pub set: String,
     /// The wall.
     pub wall: Wall,
-    /// Room between surface and wall at rest, mm, as [`Wall`] says; of no meaning for a plane. Half of `softness_mm` is left
-    /// in any case, so that the body at rest is not pressed.
+    /// Room between surface and wall at rest, mm, as [`Wall`] says; none before a plane, which stands where its point is. Half of
+    /// `softness_mm` is left in any case, so that the body at rest is not pressed.
     #[serde(default)]
     pub gap_mm: f64,
     /// Pressure per depth beyond the wall, Pa/mm. Depth is pressure over this: by default 1500 Pa, a column of brain of 150 mm,

@@ -178,6 +178,8 @@ fn walls_and_sheets_that_cannot_be_are_refused() {
     assert!(contact("wall = { shape = 'plane', point_mm = [0, 0, 0], normal = [0, 0, 0] }").contains("a direction"));
     assert!(contact("wall = { shape = 'own-surface' }\nsoftness_mm = 0.0").contains("softness_mm"));
     assert!(contact("wall = { shape = 'own-surface' }\ngap_mm = -1.0").contains("0 or more"));
+    let plane = "wall = { shape = 'plane', point_mm = [0, 0, -1], normal = [0, 0, 1] }\ngap_mm = 2.0";
+    assert!(contact(plane).contains("`wall.point_mm`"));
     assert!(contact("wall = { shape = 'field', name = 'skull' }").contains("`skull`"));
     assert!(Scenario::from_toml("[[contact]]\nset = 'z0'\nwall = { shape = 'cone' }").is_err());
     assert!(Scenario::from_toml("[supports]\nfalx = 'loose'").is_err());
