@@ -23,6 +23,9 @@ pub(super) fn check_settings(scenario: &Scenario) -> Result<(), FemError> {
     for p in &loads.pressure {
         numbers.push((format!("loads.pressure.pressure_pa` of set `{}", p.set), p.pressure_pa));
     }
+    if let Some(p) = scenario.prescribed.iter().find(|p| p.components == [false; 3]) {
+        return Err(FemError::NothingPrescribed { set: p.set.clone() });
+    }
     for p in &scenario.prescribed {
         let key = format!("prescribed.displacement_mm` of set `{}", p.set);
         numbers.extend(p.displacement_mm.iter().map(|&v| (key.clone(), v)));

@@ -119,7 +119,7 @@ impl Moving<'_> {
         };
         let mass_factor = 1.0 / (h * h) + mass_damping / h;
         let momentum = self.mass.product(&self.v.iter().map(|v| v.map(|x| x / h)).collect::<Vec<_>>());
-        let reference = reduce::norm(&self.model.free_part(&self.model.load_n)) + reduce::norm(&momentum);
+        let mut reference = reduce::norm(&self.model.free_part(&self.model.load_n)) + reduce::norm(&momentum);
         // Displacement of the step on the free rows.
         let mut moved = vec![[0.0; 3]; self.v.len()];
         let mut forces = vec![[0.0; 3]; self.u.len()];
@@ -143,6 +143,10 @@ impl Moving<'_> {
             let size = reduce::norm(&rhs);
             if !size.is_finite() {
                 return Err(INSIDE_OUT);
+            }
+            // What moves the body may be nothing but moved nodes: then the measure is what that stirs up.
+            if iteration == 0 && !self.model.prescribed.is_empty() {
+                reference = reference.max(reduce::norm(&forces));
             }
             let relative = if reference > 0.0 { size / reference } else { 0.0 };
             if iteration == most || (!fixed_count && relative <= goal) || size == 0.0 {

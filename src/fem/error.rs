@@ -16,6 +16,10 @@ pub enum FemError {
     #[error("set `{set}` is both {first} and {second}: take one of the two away")]
     TwoSupports { set: String, first: &'static str, second: &'static str },
     #[error(
+        "`prescribed` of set `{set}` moves no component: name one of x, y and z at least in `components`, or take it away"
+    )]
+    NothingPrescribed { set: String },
+    #[error(
         "sets `{first}` and `{second}` share nodes, among them node {node}, and `prescribed` moves them to different places: take these \
          nodes out of one of the two"
     )]

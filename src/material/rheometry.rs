@@ -30,6 +30,21 @@ pub struct Rheometry {
     pub values_pa: Vec<f64>,
 }
 
+impl Rheometry {
+    /// Whether the stress of either side of rest, tension and compression, has its sign but for noise.
+    fn signs_hold(&self) -> bool {
+        /// The part of all the work that may have the wrong sign on one side.
+        const NOISE: f64 = 0.1;
+        let work = |side: &dyn Fn(f64) -> bool| -> f64 {
+            let points = self.stretches.iter().zip(&self.values_pa).filter(|(l, _)| side(**l));
+            points.map(|(l, value)| (l - 1.0) * value).sum()
+        };
+        let (pressed, pulled) = (work(&|l| l < 1.0), work(&|l| l > 1.0));
+        let all = pressed.abs() + pulled.abs();
+        pressed + pulled >= 0.0 && pressed.min(pulled) >= -NOISE * all
+    }
+}
+
 /// A table that is no test.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum RheometryError {
@@ -94,6 +109,17 @@ pub enum RheometryError {
         line: usize,
         /// It.
         stretch: f64,
+    },
+    /// A strain beyond one whose header has no unit.
+    #[error(
+        "line {line}: the strain is {strain} and its column names no unit: write `strain (%)` for per cent, `strain (-)` where 1 is twice \
+         the length"
+    )]
+    StrainUnit {
+        /// Line.
+        line: usize,
+        /// It.
+        strain: f64,
     },
     /// An energy below zero.
     #[error(
@@ -188,6 +214,10 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
             return Err(RheometryError::Cells { line, found: row.cells.len(), expected: header.cells.len() });
         }
         let extension = number(row, header, deformation.0)? * deformation.2;
+        let without_unit = !header.cells[deformation.0].contains(['(', '[']);
+        if deformation.1 == Quantity::Strain && without_unit && extension.abs() > 1.0 {
+            return Err(RheometryError::StrainUnit { line, strain: extension });
+        }
         let stretch = if deformation.1 == Quantity::Strain { 1.0 + extension } else { extension };
         if !(stretch > 0.0 && stretch <= 10.0) {
             return Err(RheometryError::Stretch { line, stretch });
@@ -203,8 +233,7 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
         test.stretches.push(stretch);
         test.values_pa.push(value_pa);
     }
-    let work: f64 = test.stretches.iter().zip(&test.values_pa).map(|(l, value)| (l - 1.0) * value).sum();
-    if test.measured == Measured::NominalStress && work < 0.0 {
+    if test.measured == Measured::NominalStress && !test.signs_hold() {
         return Err(RheometryError::Sign);
     }
     Ok(test)
@@ -279,8 +308,10 @@ mod tests {
 
     #[test]
     fn malformed_tables_are_refused_with_line_and_remedy() {
-        let cases: [(&[u8], &str); 13] = [
+        let cases: [(&[u8], &str); 15] = [
             (b"stretch,stress (Pa)\n1.0,0\n0.9,100\n0.8,300\n", "tension as positive"),
+            (b"stretch,stress (Pa)\n0.9,90\n0.95,40\n1.1,120\n1.2,300\n", "tension as positive"),
+            (b"strain,stress (Pa)\n0,0\n8,70\n", "line 3: the strain is 8"),
             (b"", "no rows"),
             (b"stretch,stress (kPa)\n", "no rows"),
             (b"stretch,stress\n1,2\n", "line 1: the column `stress` names no unit"),

@@ -2,6 +2,7 @@
 
 use super::{TET_FACES, TetMesh};
 use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
 
 impl TetMesh {
     /// Normal times area of a facet, mm2, pointing where its nodes run counter-clockwise.
@@ -14,6 +15,28 @@ impl TetMesh {
     pub fn facet_centroid_mm(&self, facet: [u32; 3]) -> [f64; 3] {
         let [a, b, c] = facet.map(|n| Vector3::from(self.nodes_mm()[n as usize]));
         ((a + b + c) / 3.0).into()
+    }
+
+    /// Facets of sets that are part of the outer surface, once each and as they are seen from outside: other programs turn a
+    /// surface as it was drawn.
+    pub fn turn_facets_outwards(&mut self) {
+        let sorted = |facet: &[u32; 3]| {
+            let mut key = *facet;
+            key.sort_unstable();
+            key
+        };
+        let outer: BTreeMap<[u32; 3], [u32; 3]> =
+            self.boundary_facets(|_| true).into_iter().map(|facet| (sorted(&facet), facet)).collect();
+        for facets in self.facet_sets.values_mut() {
+            let mut seen = BTreeSet::new();
+            facets.retain(|facet| !outer.contains_key(&sorted(facet)) || seen.insert(sorted(facet)));
+            for facet in facets {
+                let Some(&[a, b, c]) = outer.get(&sorted(facet)) else { continue };
+                if ![[a, b, c], [b, c, a], [c, a, b]].contains(facet) {
+                    facet.swap(1, 2);
+                }
+            }
+        }
     }
 
     /// The facets of the outside that are in none of these facet sets, outward, in order of tetrahedron.

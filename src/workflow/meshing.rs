@@ -5,7 +5,7 @@ use super::labels::any_labels;
 use super::programs::Programs;
 use super::progress::Progress;
 use super::settings::Settings;
-use super::stages::mesh_outcome;
+use super::stages::{WithReading, mesh_outcome};
 use super::user_file::read_input;
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError, check_writable, write_whole};
@@ -56,6 +56,9 @@ pub struct MeshedFile {
     pub edge_mm: f64,
     /// Parts of the label map that were too small.
     pub islands: usize,
+    /// How much of each label lay apart from the rest and is not in the mesh, mm3, where it is more than half a cc.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub left_out_mm3: BTreeMap<u8, f64>,
     /// The boundary sets.
     pub sets: Vec<SetReport>,
     /// Why the quality gate refuses the mesh.
@@ -98,7 +101,8 @@ pub fn mesh_file(
     let folder = files.output.parent().map(Path::to_path_buf).unwrap_or_default();
     let file = files.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let frame = if in_mni { "MNI" } else { "native" };
-    let stage = Stage::new(&format!("mesh-{file}"), VERSION, &folder, &(&posed, in_mni.then_some(tags)));
+    let read = WithReading { settings: &posed, image: settings.image };
+    let stage = Stage::new(&format!("mesh-{file}"), VERSION, &folder, &(&read, in_mni.then_some(tags)));
     let mut stage = stage.input("labels", &bytes).frame(frame);
     if files.numbers.is_some() {
         // What a table of the user's own makes of the file.
@@ -112,7 +116,7 @@ pub fn mesh_file(
             write_whole(path, &preview(&mesh, None, PREVIEW_PIXELS))?;
         }
         if let Some(folder) = &files.surfaces {
-            write_surfaces(&mesh, folder)?;
+            write_surfaces(&mesh, folder, if in_mni { gifti::Space::Mni152 } else { gifti::Space::Scanner })?;
         }
         let bytes = encode(&mesh, &extension).map_err(|source| MeshFileError::Format { file: file.clone(), source })?;
         Ok(Produced { files: vec![(file.clone(), bytes)], facts: facts(&meshed), warnings: meshed.refused })
@@ -142,14 +146,19 @@ fn make(
     }
     refused.extend(lost_labels(labels, &mesh, settings, record.edge_mm));
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
+    let mut left_out_mm3 = BTreeMap::new();
+    for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > 1000.0 * LEAST_CC) {
+        *left_out_mm3.entry(island.label).or_default() += island.volume_mm3;
+    }
     let islands = record.islands.len();
-    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, sets, refused }))
+    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, refused }))
 }
+
+/// Less than this may go without a word.
+const LEAST_CC: f64 = 0.5;
 
 /// Labels of the map of which the mesh has nothing.
 fn lost_labels(map: &LabelMap<Native>, mesh: &TetMesh, settings: &MeshSettings, edge_mm: f64) -> Vec<String> {
-    /// Less than this may go without a word.
-    const LEAST_CC: f64 = 0.5;
     let mut voxels = [0usize; 256];
     map.data.iter().for_each(|&l| voxels[usize::from(l)] += 1);
     let lost = (1..=255u8).filter(|l| !settings.without.contains(l) && !mesh.labels().contains(l));
@@ -175,7 +184,7 @@ fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
 }
 
 /// The closed, outward surfaces that the mesh has, each in three formats.
-fn write_surfaces(mesh: &TetMesh, folder: &Path) -> Result<(), WorkflowError> {
+fn write_surfaces(mesh: &TetMesh, folder: &Path, space: gifti::Space) -> Result<(), WorkflowError> {
     let all = mesh.boundary_facets(|_| true);
     let of = |l: u8| mesh.boundary_facets(|own| own == l);
     let surfaces = [
@@ -186,7 +195,7 @@ fn write_surfaces(mesh: &TetMesh, folder: &Path) -> Result<(), WorkflowError> {
     ];
     for (name, facets) in surfaces.into_iter().filter(|s| !s.1.is_empty()) {
         let (surface, _) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
-        let gii = gifti::encode_surface(&surface, gifti::Space::Mni152, name);
+        let gii = gifti::encode_surface(&surface, space, name);
         write_whole(&folder.join(format!("{name}.surf.gii")), &gii)?;
         write_whole(&folder.join(format!("{name}.stl")), &stl::encode(&surface))?;
         write_whole(&folder.join(format!("{name}.ply")), &ply::encode(&surface, &[])?)?;

@@ -11,6 +11,7 @@ use super::user_file::shown;
 use super::why::Explained;
 use crate::material::rheometry::Measured;
 use crate::report::in_words::fit_in_words;
+use crate::segment::label;
 use serde_json::Value;
 use std::path::Path;
 
@@ -96,6 +97,10 @@ pub fn meshed(found: &MeshedFile, output: &Path) -> String {
     );
     for (name, percent) in &m.volume_error_percent {
         text += &format!("  {name}: volume {percent:+.2} %, Dice {:.3}\n", figure(m.dice.get(name).copied()));
+    }
+    for (number, mm3) in &found.left_out_mm3 {
+        let name = label::name(*number).map_or_else(|| format!("label {number}"), str::to_owned);
+        text += &format!("  left out: {:.2} cc of {name}, apart from the rest\n", mm3 / 1000.0);
     }
     for set in &found.sets {
         let ([x, y, z], name, nodes, mm2) = (set.centroid_mm, &set.name, set.nodes, set.area_mm2);

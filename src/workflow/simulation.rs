@@ -80,9 +80,10 @@ pub fn simulate(
 ) -> Result<(Simulation, bool), WorkflowError> {
     let (folder, file) = destination(&files.output)?;
     check_writable(&files.output)?;
+    let stem = file.strip_suffix(".vtu").unwrap_or(&file).to_owned();
     let made_of = [Some(&files.mesh), Some(&files.scenario), files.start.as_ref(), files.reference.as_ref()];
-    if made_of.into_iter().flatten().any(|input| same_file(input, &files.output)) {
-        return Err(SimulationError::OverInput { output: files.output.clone() }.into());
+    if let Some(input) = made_of.into_iter().flatten().find(|input| written_by(input, &folder, &stem)) {
+        return Err(SimulationError::OverInput { input: input.clone(), output: files.output.clone() }.into());
     }
     let mesh_bytes = read_input(&files.mesh)?;
     let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
@@ -99,7 +100,6 @@ pub fn simulate(
     }
     let reference = files.reference.as_deref().map(|path| displacement(path, &mesh)).transpose()?;
 
-    let stem = file.trim_end_matches(".vtu").to_owned();
     let mut stage = Stage::new(&format!("simulate-{stem}"), VERSION, &folder, &scenario).input("mesh", &mesh_bytes);
     for (role, field) in [("start", &start), ("reference", &reference)] {
         if let Some(field) = field {
@@ -111,7 +111,8 @@ pub fn simulate(
     let compute = || -> Result<Produced, SimulationError> {
         let found = simulate_mesh(&mesh, &scenario, start.as_deref(), progress);
         let outcome = found.map_err(|source| SimulationError::Fem { names: names(), source })?;
-        produced(&mesh, &scenario, outcome, reference.as_deref(), &stem)
+        let misnamed = misnamed(&files.mesh, &mesh_bytes, &mesh, &scenario);
+        produced(&mesh, &scenario, outcome, (reference.as_deref(), misnamed), &stem)
     };
     let outcome = stage.run(force, compute).map_err(|error| match error {
         StageError::Compute(error) => WorkflowError::from(error),
@@ -177,6 +178,26 @@ pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationEr
     }
 }
 
+/// Volumes of a gmsh file that are called otherwise than the tissue that the scenario takes their numbers for.
+fn misnamed(path: &Path, bytes: &[u8], mesh: &TetMesh, scenario: &Scenario) -> Vec<String> {
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) {
+        return Vec::new();
+    }
+    let of_mesh = msh::volume_names(bytes).into_iter().filter(|(number, _)| mesh.labels().contains(number));
+    let other = of_mesh.filter(|(number, name)| scenario.label_number(name).is_some_and(|known| known != *number));
+    let said = |(number, name): (u8, String)| {
+        let taken = scenario.label_name(number).unwrap_or("nothing");
+        format!(
+            "physical volume {number} is called `{name}` in the mesh and taken for `{taken}`, by its number: give its number in the \
+             scenario's [labels]"
+        )
+    };
+    other.map(said).collect()
+}
+
+/// Nodes of two files nearer than this are one, mm: what six digits lose.
+const SAME_PLACE_MM: f64 = 1e-2;
+
 /// Two cells of the same nodes, where there are any.
 fn same_cells(tets: &[[u32; 4]]) -> Option<[usize; 2]> {
     let mut seen: Vec<([u32; 4], usize)> = tets.iter().enumerate().map(|(cell, tet)| (*tet, cell)).collect();
@@ -187,9 +208,14 @@ fn same_cells(tets: &[[u32; 4]]) -> Option<[usize; 2]> {
     seen.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| [pair[0].1, pair[1].1])
 }
 
-/// Whether two paths lead to one file that is there.
-fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+/// Whether a file that is there has the name of a result, or of a moment of a motion.
+fn written_by(input: &Path, folder: &Path, stem: &str) -> bool {
+    let (Ok(input), Ok(folder)) = (input.canonicalize(), folder.canonicalize()) else { return false };
+    let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let Some(rest) = name.strip_prefix(stem) else { return false };
+    let moment = rest.strip_prefix('-').and_then(|rest| rest.strip_suffix(".vtu"));
+    let of_motion = moment.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()));
+    input.parent() == Some(&folder) && (of_motion || [".vtu", ".pvd"].contains(&rest))
 }
 
 /// The array `displacement` of a result.
@@ -200,14 +226,24 @@ fn displacement(path: &Path, mesh: &TetMesh) -> Result<Vec<[f64; 3]>, Simulation
         return Err(SimulationError::NoDisplacement { name });
     };
     let (found, nodes) = (vectors.len(), mesh.nodes_mm().len());
-    if found == nodes { Ok(vectors) } else { Err(SimulationError::OtherMesh { name, found, nodes }) }
+    if found != nodes {
+        return Err(SimulationError::OtherMesh { name, found, nodes });
+    }
+    let apart = |n: &usize| {
+        let (a, b) = (state.mesh.nodes_mm()[*n], mesh.nodes_mm()[*n]);
+        (0..3).any(|axis| (a[axis] - b[axis]).abs() > SAME_PLACE_MM)
+    };
+    match (0..nodes).find(apart) {
+        Some(node) => Err(SimulationError::OtherNodes { name, node }),
+        None => Ok(vectors),
+    }
 }
 
 fn produced(
     mesh: &TetMesh,
     scenario: &Scenario,
     mut outcome: Outcome,
-    reference: Option<&[[f64; 3]]>,
+    (reference, misnamed): (Option<&[[f64; 3]]>, Vec<String>),
     stem: &str,
 ) -> Result<Produced, SimulationError> {
     let output = format!("{stem}.vtu");
@@ -254,7 +290,7 @@ fn produced(
         contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
-        warnings: outcome.warnings.iter().map(ToString::to_string).collect(),
+        warnings: misnamed.into_iter().chain(outcome.warnings.iter().map(ToString::to_string)).collect(),
     };
     let bytes = vtu::encode(mesh, &points, &cells).map_err(refused(&output))?;
     files.push((output, bytes));

@@ -44,7 +44,9 @@ pub fn synthetic_patient(
     force: bool,
     progress: &mut dyn Progress,
 ) -> Result<serde_json::Value, WorkflowError> {
-    let stage = Stage::new("synth", VERSION, &files.output, &settings.synth);
+    // How a head is read and taken apart is part of what comes of it.
+    let of_head = files.head.as_ref().map(|_| (settings.image, &settings.anat));
+    let stage = Stage::new("synth", VERSION, &files.output, &(&settings.synth, of_head));
     let mut stage = stage.frame("pre, post").seed(settings.synth.seed);
     let mut given = None;
     if let Some(path) = &files.head {

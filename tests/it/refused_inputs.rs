@@ -2,7 +2,9 @@
 //! written.
 
 use crate::job::{CHEAP, output, sample};
+use hgm::geometry::Native;
 use hgm::image::nifti::{ReadOptions, decode, encode_u8};
+use hgm::image::{Grid, LabelMap, Volume};
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -212,6 +214,34 @@ fn a_volume_or_an_affine_chosen_on_the_command_line_is_taken() {
     assert!((0..3).all(|row| by_qform[4 * row + 3].abs() < 0.05), "{by_qform:?}");
     let by_sform = register("forms.nii", &["--prefer", "sform"]);
     assert!((0..3).any(|row| by_sform[4 * row + 3].abs() > 50.0), "{by_sform:?}");
+}
+
+#[test]
+fn a_mesh_of_the_same_file_by_its_other_affine_is_made_again_and_its_surfaces_are_the_scanners() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let grid = Grid::axis_aligned([24; 3], [2.0; 3], [0.0; 3]);
+    let ball: LabelMap<Native> = Volume::from_fn(grid, |n| {
+        let apart = grid.voxel(n).map(|v| v as f64 - 11.5);
+        2 * u8::from(apart.iter().map(|x| x * x).sum::<f64>() < 81.0)
+    });
+    let plain = unpacked(&encode_u8(&ball));
+    let x = f32::from_le_bytes(plain[292..296].try_into().unwrap());
+    std::fs::write(path("ball.nii"), with(&plain, 292, &(x + 60.0).to_le_bytes())).unwrap();
+    let middle = |prefer: &str| {
+        let (file, mesh, surfaces) = (path("ball.nii"), path("ball.vtu"), path("surfaces"));
+        let asked = ["mesh", &file, "-o", &mesh, "--cells", "800", "--prefer", prefer];
+        // Surfaces are asked for beside the first alone: they make a mesh again whatever has changed.
+        let more = if prefer == "qform" { &["--surfaces", &surfaces][..] } else { &[] };
+        let ended = output(&[&asked[..], more].concat());
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        let mesh = hgm::mesh::format::vtu::decode(&std::fs::read(&mesh).unwrap(), "ball.vtu").unwrap().mesh;
+        mesh.nodes_mm().iter().map(|p| p[0]).sum::<f64>() / mesh.nodes_mm().len() as f64
+    };
+    let (by_qform, by_sform) = (middle("qform"), middle("sform"));
+    assert!((by_sform - by_qform - 60.0).abs() < 1.0, "{by_qform} {by_sform}");
+    let surface = std::fs::read_to_string(path("surfaces/pial.surf.gii")).unwrap();
+    assert!(surface.contains("SCANNER_ANAT") && !surface.contains("MNI_152"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `hgm simulate` from the command line: files in, files out, refusals by name.
 
 use hgm::mesh::TetMesh;
-use hgm::mesh::format::{msh, vtu};
+use hgm::mesh::format::{Field, msh, vtu};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -181,4 +181,50 @@ fn what_a_result_is_made_of_is_not_written_over_and_no_cell_counts_twice() {
     let said = simulate(folder.path(), &["twice.vtu", "s.toml", "-o", "out.vtu"]);
     assert_eq!(said.status.code(), Some(3), "{}", String::from_utf8_lossy(&said.stderr));
     assert!(String::from_utf8_lossy(&said.stderr).contains("same nodes"));
+}
+
+#[test]
+fn a_mesh_is_not_written_over_by_its_own_results_whatever_they_are_called() {
+    let folder = folder();
+    let said = |mesh: &str, output: &str| {
+        std::fs::copy(folder.path().join("bar.vtu"), folder.path().join(mesh)).unwrap();
+        let ended = simulate(folder.path(), &[mesh, "s.toml", "-o", output]);
+        (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned())
+    };
+    for mesh in ["m-0001.vtu", "m.vtu"] {
+        let (code, text) = said(mesh, "m.vtu");
+        assert!(code == Some(3) && text.contains(mesh) && text.contains("another name"), "{text}");
+    }
+    let (code, text) = said("in.vtu", "in.vtu.vtu");
+    assert!(code == Some(0) && folder.path().join("in.vtu.vtu").exists(), "{text}");
+    assert_eq!(
+        std::fs::read(folder.path().join("in.vtu")).unwrap(),
+        std::fs::read(folder.path().join("bar.vtu")).unwrap()
+    );
+}
+
+#[test]
+fn a_reference_with_its_nodes_elsewhere_is_refused_and_a_volume_called_otherwise_is_told() {
+    let folder = folder();
+    let run = |arguments: &[&str]| {
+        let ended = simulate(folder.path(), arguments);
+        (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned())
+    };
+    assert_eq!(run(&["bar.vtu", "s.toml", "-o", "out.vtu"]).0, Some(0));
+    let nodes: Vec<[f64; 3]> = bar().nodes_mm().iter().rev().copied().collect();
+    let last = nodes.len() as u32 - 1;
+    let tets = bar().tets().iter().map(|tet| tet.map(|n| last - n)).collect();
+    let turned = TetMesh::new(nodes, tets, bar().labels().to_vec()).unwrap();
+    let still = vec![[0.0; 3]; turned.nodes_mm().len()];
+    let field = [Field::vector("displacement", &still)];
+    std::fs::write(folder.path().join("other.vtu"), vtu::encode(&turned, &field, &[]).unwrap()).unwrap();
+    let (code, text) = run(&["bar.vtu", "s.toml", "-o", "r.vtu", "--reference", "other.vtu"]);
+    assert!(code == Some(3) && text.contains("other.vtu: node 0") && text.contains("same mesh"), "{text}");
+
+    let mesh = String::from_utf8(msh::encode(&bar()).unwrap()).unwrap();
+    std::fs::write(folder.path().join("named.msh"), mesh.replace("\"grey_matter\"", "\"white_matter\"")).unwrap();
+    let (code, text) = run(&["named.msh", "s.toml", "-o", "n.vtu"]);
+    assert!(code == Some(0) && text.contains("volume 2 is called `white_matter`"), "{text}");
+    let (_, text) = run(&["bar.vtu", "s.toml", "-o", "m.vtu"]);
+    assert!(!text.contains("is called"), "{text}");
 }

@@ -133,8 +133,8 @@ fn extent<'a>(mesh: &TetMesh, nodes: impl Iterator<Item = &'a u32>) -> String {
 
 /// A mesh from the bytes of an MSH 4.1 file, text or binary; `name` is what messages call the file.
 ///
-/// Labels are the tags of the physical volumes. Physical points become node sets, physical surfaces facet sets, and,
-/// where no physical point group has the same name, node sets too. Nodes and tetrahedra come in order of their tags.
+/// Labels are the tags of the physical volumes. Physical points become node sets, physical surfaces facet sets (turned
+/// outwards where they are part of the outer surface), and, where no physical point group has the same name, node sets too. Nodes and tetrahedra come in order of their tags.
 ///
 /// # Errors
 /// [`ReadError`] for another version, a damaged file, tetrahedra without a physical volume, elements of volume that
@@ -167,6 +167,23 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<TetMesh, ReadError> {
     assemble(&file, &names, &groups, nodes, elements)
 }
 
+/// The names of the physical volumes by their tags; none where the file has no such section.
+pub fn volume_names(bytes: &[u8]) -> BTreeMap<u8, String> {
+    let mut file = File { name: "", rest: bytes, binary: false, section: "MeshFormat" };
+    let mut names = Names::new();
+    while let Ok(Some(section)) = file.next_section() {
+        if section == "PhysicalNames" {
+            names = file.read_names().unwrap_or_default();
+            break;
+        }
+        if file.skip_to_end(section).is_err() {
+            break;
+        }
+    }
+    let volumes = names.into_iter().filter(|((dimension, _), _)| *dimension == 3);
+    volumes.filter_map(|((_, tag), name)| Some((u8::try_from(tag).ok()?, name))).collect()
+}
+
 type Names = BTreeMap<(i64, i64), String>;
 type Groups = BTreeMap<(i64, i64), Vec<i64>>;
 
@@ -197,7 +214,14 @@ fn assemble(
     let (mut tets, mut labels) = (Vec::new(), Vec::new());
     for &(tag, entity, [a, b, c, d]) in &elements.tets {
         tets.push([number(a)?, number(b)?, number(c)?, number(d)?]);
-        let group = groups.get(&(3, entity)).and_then(|g| g.first()).ok_or_else(|| {
+        let of_volume = groups.get(&(3, entity)).map_or(&[][..], Vec::as_slice);
+        if let Some([first, second]) = of_volume.windows(2).find(|pair| pair[0] != pair[1]) {
+            return Err(file.unsupported(format!(
+                "tetrahedron {tag} lies in volume {entity}, which is in the physical groups {first} and {second}: leave it in the one \
+                 that is its tissue"
+            )));
+        }
+        let group = of_volume.first().ok_or_else(|| {
             file.unsupported(format!(
                 "tetrahedron {tag} lies in volume {entity}, which is in no physical group; \
                  add `Physical Volume(\"grey_matter\", 2) = {{...}};` and the like"
@@ -234,6 +258,7 @@ fn assemble(
             }
         }
     }
+    mesh.turn_facets_outwards();
     for (set, facets) in &mesh.facet_sets {
         if !mesh.node_sets.contains_key(set) {
             mesh.node_sets.insert(set.clone(), facets.as_flattened().to_vec());
@@ -482,6 +507,25 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_of_gmsh_are_turned_outwards_and_its_volumes_have_their_names() {
+        let mut mesh = two_tets();
+        let outer = mesh.boundary_facets(|_| true);
+        mesh.facet_sets.insert("pial".into(), outer.clone());
+        let mut drawn = mesh.clone();
+        let as_drawn = outer.iter().enumerate().map(|(n, &[a, b, c])| if n % 2 == 0 { [b, a, c] } else { [c, a, b] });
+        // One of them twice, as where two surfaces of a group overlap.
+        drawn.facet_sets.insert("pial".into(), as_drawn.chain([outer[0]]).collect());
+        let bytes = encode(&drawn).unwrap();
+        let read = decode(&bytes, "a.msh").unwrap();
+        let areas =
+            |mesh: &TetMesh| -> Vec<_> { mesh.facet_sets["pial"].iter().map(|f| mesh.area_vector_mm2(*f)).collect() };
+        assert_eq!(areas(&read).len(), outer.len());
+        assert!(areas(&read).iter().zip(areas(&mesh)).all(|(a, b)| (a - b).norm() < 1e-12));
+        let names = volume_names(&bytes);
+        assert_eq!((names[&2].as_str(), names[&3].as_str(), names.len()), ("grey_matter", "white_matter", 2));
+    }
+
+    #[test]
     fn every_refusal_names_file_and_section() {
         let good = String::from_utf8(encode(&two_tets()).unwrap()).unwrap();
         let says = |text: String, words: &[&str]| {
@@ -492,6 +536,7 @@ mod tests {
         says(good.replace("\n2 1 2 3 4", "\n2 1 3 2 4"), &["inverted or flat"]);
         says(good.replace("\n2 1 2 3 4", "\n2 1 2 3 9"), &["$Elements", "node 9"]);
         says(good.replace("\n2 1 2 3 4", "\n2 1 2 x 4"), &["$Elements", "`x`"]);
+        says(good.replace("1 3 0\n$EndEnt", "2 3 2 0\n$EndEnt"), &["volume 3", "groups 3 and 2"]);
         says(good.replace("1 3 0\n$EndEnt", "0 0\n$EndEnt"), &["volume 3", "no physical group"]);
         says(good.replace("1 3 0\n$EndEnt", "1 999 0\n$EndEnt"), &["999", "1 to 255"]);
         says(good.replace("3 2 4 1", "3 2 5 1"), &["$Elements", "gmsh type 5"]);

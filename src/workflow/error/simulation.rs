@@ -18,8 +18,11 @@ pub enum SimulationError {
     Scenario { name: String, reason: String },
     #[error("a motion (`method = \"backward-euler\"`) starts at rest: it takes no state to start from")]
     StartOfMotion,
-    #[error("{}: is what the simulation is made of; give its result another name", output.display())]
-    OverInput { output: PathBuf },
+    #[error(
+        "{}: the simulation is made of it, and results called {} would be written over it; give them another name",
+        input.display(), output.display()
+    )]
+    OverInput { input: PathBuf, output: PathBuf },
     #[error(
         "{name}: cells {first} and {second} have the same nodes: their tissue would count twice; write each cell once"
     )]
@@ -28,6 +31,8 @@ pub enum SimulationError {
     NoDisplacement { name: String },
     #[error("{name}: has {found} nodes, the mesh {nodes}: give a result on the same mesh")]
     OtherMesh { name: String, found: usize, nodes: usize },
+    #[error("{name}: node {node} (counted from 0) lies elsewhere than in the mesh: give a result on the same mesh")]
+    OtherNodes { name: String, node: usize },
     #[error("{names}: {source}")]
     Fem { names: String, source: FemError },
     #[error("{name}: {source}")]

@@ -137,3 +137,22 @@ fn a_body_out_of_balance_is_not_at_rest_however_slow_it_is() {
         assert!(outcome.warnings.iter().any(|said| said.to_string().contains("still moves")), "{:?}", outcome.warnings);
     }
 }
+
+#[test]
+fn a_face_that_is_moved_takes_the_body_along_however_many_iterations_are_asked_for() {
+    let mesh = cube(2, 30.0);
+    let text = |iterations: usize| {
+        format!(
+            "fixed = ['z0']\n[[prescribed]]\nset = 'z1'\ndisplacement_mm = [0, 0, 1]\n{GREY}[solver]\nmethod = 'backward-euler'\n\
+             [dynamics]\nsteps = 200\nnewton_iterations = {iterations}\n"
+        )
+    };
+    let [until, three] = [0, 3].map(|iterations| moved(&mesh, &text(iterations)));
+    let inner = |found: &Outcome| -> Vec<f64> {
+        let held = |n: &u32| ["z0", "z1"].iter().any(|set| mesh.node_sets[*set].contains(n));
+        (0..mesh.nodes_mm().len() as u32).filter(|n| !held(n)).map(|n| found.displacement_mm[n as usize][2]).collect()
+    };
+    for (a, b) in inner(&until).iter().zip(inner(&three)) {
+        assert!(*b > 0.2 && (a - b).abs() < 1e-4, "{a} instead of {b}");
+    }
+}

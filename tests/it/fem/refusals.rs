@@ -90,6 +90,8 @@ fn a_node_is_not_moved_to_two_places_and_one_that_is_held_all_the_same_is_told()
     let moved = |set: &str, x: f64, z: bool| {
         format!("[[prescribed]]\nset = '{set}'\ndisplacement_mm = [{x}, 0, 0]\ncomponents = [true, false, {z}]\n")
     };
+    let none = moved("x1", 1.0, false).replace("true", "false");
+    assert!(refusal(&mesh, &format!("fixed = ['z0']\n{none}{GREY}")).1.contains("moves no component"));
     let pair = |second: &str| format!("fixed = ['z0']\n{}{second}{GREY}", moved("x1", 1.0, false));
     let (error, message) = refusal(&mesh, &pair(&moved("y1", 2.0, false)));
     assert!(matches!(error, FemError::TwoMovements { .. }), "{error:?}");
