@@ -66,6 +66,11 @@ pub enum FemWarning {
     )]
     NoEffect { set: String, idle: Idle },
     #[error(
+        "volume {number} is called `{name}` in the mesh and taken for `{taken}`, by its number: give its number in the scenario's \
+         `[labels]`"
+    )]
+    CalledOtherwise { number: u8, name: String, taken: String },
+    #[error(
         "{nodes} of the {of} nodes of set `{set}`, which is moved in `prescribed`, are held by another set and stay: where that is not \
          meant, take them out of one of the two"
     )]

@@ -138,6 +138,8 @@ pub enum RheometryError {
 enum Quantity {
     Stretch,
     Strain,
+    /// A strain whose column names no unit: per cent, if it is large.
+    BareStrain,
     NominalStress,
     TrueStress,
     Energy,
@@ -154,6 +156,7 @@ fn column(name: &str) -> Option<(Quantity, Option<f64>)> {
     };
     let quantity = match words.trim() {
         "stretch" | "lambda" => Quantity::Stretch,
+        "strain" | "engineering strain" if unit.is_empty() => Quantity::BareStrain,
         "strain" | "engineering strain" => Quantity::Strain,
         "stress" | "nominal stress" | "engineering stress" | "first piola-kirchhoff stress" => Quantity::NominalStress,
         "true stress" | "cauchy stress" => Quantity::TrueStress,
@@ -161,7 +164,7 @@ fn column(name: &str) -> Option<(Quantity, Option<f64>)> {
         _ => return None,
     };
     let factor = match (quantity, unit) {
-        (Quantity::Stretch | Quantity::Strain, "" | "-" | "1") => Some(1.0),
+        (Quantity::BareStrain, _) | (Quantity::Stretch | Quantity::Strain, "" | "-" | "1") => Some(1.0),
         (Quantity::Strain, "%") => Some(0.01),
         (Quantity::Stretch | Quantity::Strain, _) => None,
         _ => factor(unit),
@@ -195,7 +198,7 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
         let Some((quantity, factor)) = column(name) else { continue };
         let factor = factor.ok_or_else(|| RheometryError::Unit { line, column: name.clone() })?;
         let slot = match quantity {
-            Quantity::Stretch | Quantity::Strain => &mut deformation,
+            Quantity::Stretch | Quantity::Strain | Quantity::BareStrain => &mut deformation,
             _ => &mut measured,
         };
         if slot.replace((index, quantity, factor)).is_some() {
@@ -214,11 +217,10 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
             return Err(RheometryError::Cells { line, found: row.cells.len(), expected: header.cells.len() });
         }
         let extension = number(row, header, deformation.0)? * deformation.2;
-        let without_unit = !header.cells[deformation.0].contains(['(', '[']);
-        if deformation.1 == Quantity::Strain && without_unit && extension.abs() > 1.0 {
+        if deformation.1 == Quantity::BareStrain && extension.abs() > 1.0 {
             return Err(RheometryError::StrainUnit { line, strain: extension });
         }
-        let stretch = if deformation.1 == Quantity::Strain { 1.0 + extension } else { extension };
+        let stretch = if deformation.1 == Quantity::Stretch { extension } else { 1.0 + extension };
         if !(stretch > 0.0 && stretch <= 10.0) {
             return Err(RheometryError::Stretch { line, stretch });
         }

@@ -5,7 +5,7 @@ use super::labels::any_labels;
 use super::programs::Programs;
 use super::progress::Progress;
 use super::settings::Settings;
-use super::stages::{WithReading, mesh_outcome};
+use super::stages::{LARGE_ISLAND_MM3, WithReading, mesh_outcome};
 use super::user_file::read_input;
 use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError, check_writable, write_whole};
@@ -147,28 +147,31 @@ fn make(
     refused.extend(lost_labels(labels, &mesh, settings, record.edge_mm));
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let mut left_out_mm3 = BTreeMap::new();
-    for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > 1000.0 * LEAST_CC) {
+    for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > LARGE_ISLAND_MM3) {
         *left_out_mm3.entry(island.label).or_default() += island.volume_mm3;
     }
     let islands = record.islands.len();
     Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, refused }))
 }
 
-/// Less than this may go without a word.
-const LEAST_CC: f64 = 0.5;
+/// What a label is called.
+pub(super) fn name_of_label(number: u8) -> String {
+    label::name(number).map_or_else(|| format!("label {number}"), str::to_owned)
+}
 
 /// Labels of the map of which the mesh has nothing.
 fn lost_labels(map: &LabelMap<Native>, mesh: &TetMesh, settings: &MeshSettings, edge_mm: f64) -> Vec<String> {
     let mut voxels = [0usize; 256];
     map.data.iter().for_each(|&l| voxels[usize::from(l)] += 1);
     let lost = (1..=255u8).filter(|l| !settings.without.contains(l) && !mesh.labels().contains(l));
-    let lost = lost.map(|l| (l, voxels[usize::from(l)] as f64 * map.grid.voxel_volume_mm3() / 1000.0));
-    lost.filter(|&(_, cc)| cc >= LEAST_CC)
-        .map(|(l, cc)| {
-            let name = label::name(l).map_or_else(|| format!("label {l}"), str::to_owned);
+    let lost = lost.map(|l| (l, voxels[usize::from(l)] as f64 * map.grid.voxel_volume_mm3()));
+    lost.filter(|&(_, mm3)| mm3 >= LARGE_ISLAND_MM3)
+        .map(|(l, mm3)| {
             format!(
-                "the mesh has nothing of {name}: all its {cc:.1} cc lie apart from the rest or in pieces too small for \
-                 tetrahedra of {edge_mm:.1} mm; look at the label map"
+                "the mesh has nothing of {}: all its {:.1} cc lie apart from the rest or in pieces too small for tetrahedra of \
+                 {edge_mm:.1} mm; look at the label map",
+                name_of_label(l),
+                mm3 / 1000.0
             )
         })
         .collect()

@@ -1,7 +1,7 @@
 //! What single steps have found in a few lines of text. (Of a case, a prediction and their kin: `report`.)
 
 use super::law_fitting::{FittedLaw, LawTest};
-use super::meshing::MeshedFile;
+use super::meshing::{MeshedFile, name_of_label};
 use super::programs::Finding;
 use super::segmenting::Segmented;
 use super::settings::Settings;
@@ -11,7 +11,6 @@ use super::user_file::shown;
 use super::why::Explained;
 use crate::material::rheometry::Measured;
 use crate::report::in_words::fit_in_words;
-use crate::segment::label;
 use serde_json::Value;
 use std::path::Path;
 
@@ -99,8 +98,7 @@ pub fn meshed(found: &MeshedFile, output: &Path) -> String {
         text += &format!("  {name}: volume {percent:+.2} %, Dice {:.3}\n", figure(m.dice.get(name).copied()));
     }
     for (number, mm3) in &found.left_out_mm3 {
-        let name = label::name(*number).map_or_else(|| format!("label {number}"), str::to_owned);
-        text += &format!("  left out: {:.2} cc of {name}, apart from the rest\n", mm3 / 1000.0);
+        text += &format!("  left out: {:.2} cc of {}, apart from the rest\n", mm3 / 1000.0, name_of_label(*number));
     }
     for set in &found.sets {
         let ([x, y, z], name, nodes, mm2) = (set.centroid_mm, &set.name, set.nodes, set.area_mm2);

@@ -8,7 +8,8 @@ use super::work::facts;
 use crate::artefact::{Produced, Stage, StageError, check_writable};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
-    self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, Method, Motion, Outcome, Scenario, simulate_from,
+    self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, FemWarning, Method, Motion, Outcome, Scenario,
+    simulate_from,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, msh, pvd, vtu};
@@ -110,9 +111,9 @@ pub fn simulate(
     let names = || format!("{} on {}", files.scenario.display(), files.mesh.display());
     let compute = || -> Result<Produced, SimulationError> {
         let found = simulate_mesh(&mesh, &scenario, start.as_deref(), progress);
-        let outcome = found.map_err(|source| SimulationError::Fem { names: names(), source })?;
-        let misnamed = misnamed(&files.mesh, &mesh_bytes, &mesh, &scenario);
-        produced(&mesh, &scenario, outcome, (reference.as_deref(), misnamed), &stem)
+        let mut outcome = found.map_err(|source| SimulationError::Fem { names: names(), source })?;
+        outcome.warnings.extend(called_otherwise(&files.mesh, &mesh_bytes, &mesh, &scenario));
+        produced(&mesh, &scenario, outcome, reference.as_deref(), &stem)
     };
     let outcome = stage.run(force, compute).map_err(|error| match error {
         StageError::Compute(error) => WorkflowError::from(error),
@@ -179,20 +180,14 @@ pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationEr
 }
 
 /// Volumes of a gmsh file that are called otherwise than the tissue that the scenario takes their numbers for.
-fn misnamed(path: &Path, bytes: &[u8], mesh: &TetMesh, scenario: &Scenario) -> Vec<String> {
+fn called_otherwise(path: &Path, bytes: &[u8], mesh: &TetMesh, scenario: &Scenario) -> Vec<FemWarning> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) {
         return Vec::new();
     }
     let of_mesh = msh::volume_names(bytes).into_iter().filter(|(number, _)| mesh.labels().contains(number));
     let other = of_mesh.filter(|(number, name)| scenario.label_number(name).is_some_and(|known| known != *number));
-    let said = |(number, name): (u8, String)| {
-        let taken = scenario.label_name(number).unwrap_or("nothing");
-        format!(
-            "physical volume {number} is called `{name}` in the mesh and taken for `{taken}`, by its number: give its number in the \
-             scenario's [labels]"
-        )
-    };
-    other.map(said).collect()
+    let taken = |number: u8| scenario.label_name(number).unwrap_or("nothing").to_owned();
+    other.map(|(number, name)| FemWarning::CalledOtherwise { number, name, taken: taken(number) }).collect()
 }
 
 /// Nodes of two files nearer than this are one, mm: what six digits lose.
@@ -243,7 +238,7 @@ fn produced(
     mesh: &TetMesh,
     scenario: &Scenario,
     mut outcome: Outcome,
-    (reference, misnamed): (Option<&[[f64; 3]]>, Vec<String>),
+    reference: Option<&[[f64; 3]]>,
     stem: &str,
 ) -> Result<Produced, SimulationError> {
     let output = format!("{stem}.vtu");
@@ -290,7 +285,7 @@ fn produced(
         contact: outcome.contact,
         convergence: outcome.convergence,
         motion: outcome.motion,
-        warnings: misnamed.into_iter().chain(outcome.warnings.iter().map(ToString::to_string)).collect(),
+        warnings: outcome.warnings.iter().map(ToString::to_string).collect(),
     };
     let bytes = vtu::encode(mesh, &points, &cells).map_err(refused(&output))?;
     files.push((output, bytes));

@@ -195,7 +195,9 @@ t = Tractogram(lines, affine_to_rasmm=np.eye(4), data_per_point={'fa': [rng.rand
 header = {'voxel_to_rasmm': image.affine, 'voxel_sizes': image.header.get_zooms(), 'dimensions': image.shape, 'voxel_order': ''.join(nib.aff2axcodes(image.affine))}
 TrkFile(t, header).save('a.trk')
 TckFile(Tractogram(lines, affine_to_rasmm=np.eye(4))).save('a.tck')
-np.savetxt('a.csv', lines[1], delimiter=',', header='x,y,z', comments='')",
+np.savetxt('a.csv', lines[1], delimiter=',', header='x,y,z', comments='')
+hole = image.get_fdata(dtype=np.float32).copy(); hole[30, 30, 30] = np.nan
+nib.save(nib.Nifti1Image(hole, image.affine), 'hole.nii.gz')",
     );
     for (from, to) in [("a.trk", "b.trk"), ("a.tck", "b.tck"), ("a.csv", "b.csv"), ("t1.nii.gz", "moved.nii.gz")] {
         let ended = output(&["warp", "--field", &path("field.nii.gz"), &path(from), "-o", &path(to)]);
@@ -221,6 +223,9 @@ print(np.abs(np.array(np.unravel_index(d.argmax(), d.shape)) - [33, 34, 34]).max
         let (off, count) = line.split_once(' ').unwrap();
         assert!(off.parse::<f64>().unwrap() < 1e-3 && count == "3", "{found}");
     }
+    let ended = output(&["warp", "--field", &path("field.nii.gz"), &path("hole.nii.gz"), "-o", &path("filled.nii.gz")]);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.success() && said.contains("hole.nii.gz: 1 voxels are NaN"), "{said}");
     let refused = output(&["warp", "--field", &path("field.nii.gz"), &path("a.trk"), "-o", &path("b.tck")]);
     assert_eq!(refused.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("end the name in .trk"));

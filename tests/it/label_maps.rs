@@ -266,3 +266,25 @@ fn numbers_of_no_tool_are_meshed_as_they_are_and_a_table_of_ones_own_names_them(
     let (code, said) = meshed(&map(lump), &["--labels", "slicer"]);
     assert!(code == Some(3) && said.contains("freesurfer") && said.contains("FILE.tsv"), "{said}");
 }
+
+#[test]
+fn what_lies_apart_is_left_out_of_a_mesh_and_said_so() {
+    let apart = |size: usize| {
+        let mut map = map(own);
+        // In the corner, far from the head: cells of 27 mm3.
+        let grid = map.grid;
+        for (n, number) in map.data.iter_mut().enumerate() {
+            if grid.voxel(n).iter().all(|v| (1..=size).contains(v)) {
+                *number = 3;
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        std::fs::write(path("map.nii.gz"), encode_i16(&map)).unwrap();
+        let made = output(&["mesh", &path("map.nii.gz"), "-o", &path("mesh.vtu"), "--cells", "1500"]);
+        String::from_utf8_lossy(&made.stdout).into_owned()
+    };
+    let told = apart(3);
+    assert!(told.contains("left out: 0.73 cc of white_matter"), "{told}");
+    assert!(!apart(2).contains("left out"), "a speck");
+}

@@ -134,7 +134,8 @@ fn extent<'a>(mesh: &TetMesh, nodes: impl Iterator<Item = &'a u32>) -> String {
 /// A mesh from the bytes of an MSH 4.1 file, text or binary; `name` is what messages call the file.
 ///
 /// Labels are the tags of the physical volumes. Physical points become node sets, physical surfaces facet sets (turned
-/// outwards where they are part of the outer surface), and, where no physical point group has the same name, node sets too. Nodes and tetrahedra come in order of their tags.
+/// outwards where they are part of the outer surface), and, where no physical point group has the same name, node sets too.
+/// Nodes and tetrahedra come in order of their tags.
 ///
 /// # Errors
 /// [`ReadError`] for another version, a damaged file, tetrahedra without a physical volume, elements of volume that

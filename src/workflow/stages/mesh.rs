@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 const VERSION: u32 = 9;
 const NAME: StageName = StageName::Mesh;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
-const LARGE_ISLAND_MM3: f64 = 500.0;
+pub(crate) const LARGE_ISLAND_MM3: f64 = 500.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {

@@ -32,7 +32,7 @@ pub(crate) use earlier::Earlier;
 pub(crate) use estimate::{EstimateInput, HeldBody, estimate, present_estimate};
 pub(crate) use fields::{FieldsInput, fields};
 pub(crate) use labels::labels;
-pub(crate) use mesh::{coarser_mesh, mesh, mesh_before_resection, mesh_stage, mesh_stage_of};
+pub(crate) use mesh::{LARGE_ISLAND_MM3, coarser_mesh, mesh, mesh_before_resection, mesh_stage, mesh_stage_of};
 pub(crate) use plan::{PlanFacts, PlannedHead, plan, plan_stage};
 pub(crate) use pose::{PoseFacts, pose, pose_stage};
 pub(crate) use predict::{PredictInput, fluid_of_head, predict};
