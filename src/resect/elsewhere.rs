@@ -3,13 +3,14 @@
 //!
 //! A cavity is looked for before the brain's sag is known, so only thickly ([`CavitySettings::opening_mm`]): sulci that
 //! have opened or moved would be taken for one. Once the sag is known, what it explains is no loss, and what remains may
-//! be thin.
+//! be thin. What the template has no tissue at is no loss either: the falx with contrast agent looks like tissue on one scan and,
+//! without, like fluid on the other.
 
 use super::belief::{Evidence, LAYER_MM, median};
 use super::cavity::{CavityFinding, CavitySettings, ResectError, grow, settled, side_of, with_fluid_of};
 use super::cavity_pair::CavityPair;
 use super::sets::{both, either, without};
-use crate::geometry::Mni;
+use crate::geometry::{Mni, Position};
 use crate::image::components::{Connectivity, components};
 use crate::image::distance::distance_mm;
 use crate::image::morphology::{dilate, erode, open};
@@ -23,6 +24,8 @@ const THREAD_MM: f64 = 1.0;
 const BESIDE_MM: f64 = 1.0;
 /// Smaller parts are not looked at, cc: a cut that noise or a vessel has parted is larger.
 const LEAST_PART_CC: f64 = 0.25;
+/// Of a part, the least share of places that hold tissue by the template: a cut goes through tissue, whatever it touches.
+const LEAST_TISSUE: f64 = 0.5;
 /// How often the sag is fitted again without what was found: a cut that takes part in a fit is partly explained away.
 const MOST_FITS: usize = 3;
 
@@ -54,9 +57,26 @@ struct Loss {
     evidence: Evidence,
 }
 
+/// How much of a part lies where the template has tissue; the template is laid onto the head before the operation.
+fn tissue_share(part: &Mask<Mni>, sag: &AtlasFit<Mni>, has_tissue: &impl Fn(Position<Mni>) -> bool) -> f64 {
+    let inside = (0..part.data.len()).filter(|&n| part.data[n]);
+    let (held, all) = inside.fold((0usize, 0usize), |(held, all), n| {
+        let before = sag.atlas_from_subject.apply(part.grid.centre(part.grid.voxel(n)));
+        (held + usize::from(has_tissue(before)), all + 1)
+    });
+    held as f64 / all.max(1) as f64
+}
+
 /// Tissue that is dark now where the sag says that it should be, away from the cavity and from the brain's rim; `None` where
 /// there is less of it than of a cavity, or where it makes no sense as something that was taken out.
-fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: &CavitySettings) -> Option<Loss> {
+fn loss(
+    pair: &CavityPair<'_>,
+    sag: &AtlasFit<Mni>,
+    carried: &Carried,
+    cavity: &Mask<Mni>,
+    has_tissue: &impl Fn(Position<Mni>) -> bool,
+    settings: &CavitySettings,
+) -> Option<Loss> {
     let bright = f64::midpoint(pair.csf_grey_border, pair.grey_mean) as f32;
     let near = either(&dilate(cavity, BESIDE_MM), &erode(&carried.brain, settings.rim_mm).map(|deep| !deep));
     let lost = dark(pair, |n| carried.tissue.data[n] && carried.t1.data[n] > bright && !near.data[n]);
@@ -68,12 +88,13 @@ fn loss(pair: &CavityPair<'_>, carried: &Carried, cavity: &Mask<Mni>, settings: 
     let sagged = CavityPair { pre: &carried.t1, pre_labels: &labels, pre_brain: &carried.brain, ..*pair };
     let mut believed: Vec<(u32, Evidence)> = Vec::new();
     for (part, _) in (1..).zip(&parts.voxels).filter(|(_, voxels)| **voxels as f64 * voxel_cc >= LEAST_PART_CC) {
-        let evidence = Evidence::of(&parts.mask(part), &sagged);
+        let whole = parts.mask(part);
+        let evidence = Evidence::of(&whole, &sagged);
         // A layer right under the rim: brain that has sunk, or fluid that stands, further from the skull than the sag says.
         let own = parts.labels.data.iter().zip(&depth_mm.data).filter(|(of, _)| **of == part);
         let depth = median(own.map(|(_, depth)| f64::from(*depth)).collect()).unwrap_or(0.0);
         let at_skull = evidence.radius_mm < LAYER_MM && depth < settings.rim_mm + LAYER_MM;
-        if evidence.doubt().is_none() && !at_skull {
+        if evidence.doubt().is_none() && !at_skull && tissue_share(&whole, sag, has_tissue) >= LEAST_TISSUE {
             believed.push((part, evidence));
         }
     }
@@ -105,7 +126,8 @@ fn dark(pair: &CavityPair<'_>, and: impl Fn(usize) -> bool + Sync + Send) -> Mas
 }
 
 /// The cavity with what is gone elsewhere, the sag around all of it, and how much is gone elsewhere still, cc. Where no cavity was
-/// seen at all (not where one was doubted), a thin cut alone is one.
+/// seen at all (not where one was doubted), a thin cut alone is one. `has_tissue` says whether the template has tissue where a point of
+/// the head before the operation lies in it.
 ///
 /// # Errors
 /// That of `found`, or of `fit`, which fits the sag around a cavity.
@@ -113,6 +135,7 @@ pub(super) fn with_losses_elsewhere<E: From<ResectError>>(
     found: Result<CavityFinding, ResectError>,
     pair: &CavityPair<'_>,
     fit: impl Fn(&Mask<Mni>) -> Result<AtlasFit<Mni>, E>,
+    has_tissue: impl Fn(Position<Mni>) -> bool,
     settings: &CavitySettings,
 ) -> Result<(CavityFinding, AtlasFit<Mni>, Option<f64>), E> {
     let (mut cavity, mut evidence, unseen) = match found {
@@ -124,7 +147,7 @@ pub(super) fn with_losses_elsewhere<E: From<ResectError>>(
     let mut fits = 0;
     let left = loop {
         let carried = Carried::of(pair, &sag);
-        let Some(more) = loss(pair, &carried, &cavity, settings) else { break None };
+        let Some(more) = loss(pair, &sag, &carried, &cavity, &has_tissue, settings) else { break None };
         if fits == MOST_FITS {
             break Some(more.evidence.seed_cc);
         }
@@ -133,7 +156,7 @@ pub(super) fn with_losses_elsewhere<E: From<ResectError>>(
         let grown = grow(&more.seed, &way, settings.growth_mm);
         let whole = settled(&either(&cavity, &grown), &carried.brain, settings.closing_mm);
         let whole = with_fluid_of(&whole, &carried.tissue, settings.surroundings_mm);
-        cavity = either(&cavity, &without(&whole, &carried.ventricle));
+        cavity = either(&cavity, &without(&both(&whole, &carried.brain), &carried.ventricle));
         evidence = evidence.or(Some(more.evidence));
         sag = fit(&cavity)?;
     };
@@ -151,9 +174,10 @@ pub(super) fn lost_elsewhere_cc(
     pair: &CavityPair<'_>,
     sag: &AtlasFit<Mni>,
     cavity: &Mask<Mni>,
+    has_tissue: impl Fn(Position<Mni>) -> bool,
     settings: &CavitySettings,
 ) -> Option<f64> {
-    loss(pair, &Carried::of(pair, sag), cavity, settings).map(|lost| lost.evidence.seed_cc)
+    loss(pair, sag, &Carried::of(pair, sag), cavity, &has_tissue, settings).map(|lost| lost.evidence.seed_cc)
 }
 
 #[cfg(test)]
@@ -206,6 +230,15 @@ mod tests {
     }
 
     fn found(h: &MadePair, sag_mm: f64) -> Result<CavityFinding, ResectError> {
+        found_by(h, sag_mm, |_| true)
+    }
+
+    /// What is found where the template has tissue at these places.
+    fn found_by(
+        h: &MadePair,
+        sag_mm: f64,
+        has_tissue: impl Fn(Position<Mni>) -> bool,
+    ) -> Result<CavityFinding, ResectError> {
         let known = h.brain.map(|_| true);
         let pair = h.pair(&known);
         let by = |x: f64| {
@@ -224,7 +257,8 @@ mod tests {
             Ok(AtlasFit { atlas_from_subject: by(-sag_mm), subject_from_atlas: by(sag_mm), quality })
         };
         let settings = CavitySettings::default();
-        with_losses_elsewhere(find_cavity(&pair, &settings), &pair, fit, &settings).map(|(found, ..)| found)
+        let seen = find_cavity(&pair, &settings);
+        with_losses_elsewhere(seen, &pair, fit, has_tissue, &settings).map(|(found, ..)| found)
     }
 
     fn cut(p: Point3<f64>) -> bool {
@@ -237,6 +271,22 @@ mod tests {
         let found = found(&h, 0.0).unwrap();
         assert!(found.cavity.dice(&h.gone) > 0.9, "{}", found.cavity.dice(&h.gone));
         assert!(found.resected.dice(&h.gone) > 0.9 && found.evidence.is_some_and(|e| e.doubt().is_none()));
+    }
+
+    #[test]
+    fn a_sheet_that_is_dark_now_where_the_template_has_a_fissure_is_no_cut() {
+        let h = head(cut, 0.0);
+        let found = found_by(&h, 0.0, |p| (p.mm.x + 18.0).abs() > 3.0);
+        assert!(matches!(found, Err(ResectError::NoOperation { .. })));
+    }
+
+    #[test]
+    fn a_cavity_at_the_skull_ends_with_the_brain_with_a_cut_elsewhere_too() {
+        let at_skull = |p: Point3<f64>| (p - Point3::new(30.0, -20.0, 0.0)).norm() < 12.0;
+        let h = head(|p| at_skull(p) || cut(p), 0.0);
+        let cavity = found(&h, 0.0).unwrap().cavity;
+        assert!(cavity.dice(&h.gone) > 0.9, "{}", cavity.dice(&h.gone));
+        assert_eq!(without(&cavity, &h.brain).count(), 0);
     }
 
     #[test]

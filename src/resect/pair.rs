@@ -12,6 +12,7 @@ use super::{
 use crate::geometry::{Mni, Post, Pre};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
 use crate::register::deformable::{AtlasFit, DeformableSettings, DisplacementField};
+use crate::segment::atlas;
 use crate::segment::native::labels_on;
 use crate::segment::{
     BrainSource, HeadError, LeftOut, PosedScan, Scale, SegmentOverrides, SegmentSettings, SegmentWarning, Segmentation,
@@ -247,12 +248,14 @@ pub fn take_pair_apart(
         let fit = fit_sag(&scans, &settings.sag);
         fit.map_err(|source| PairError::Head { scan: "the post-operative scan", source: source.into() })
     };
+    let template = &atlas::template().labels;
+    let has_tissue = |p| template.nearest(template_from_patient.apply(p)).is_some_and(label::is_tissue);
     let (mut finding, sag, lost_elsewhere_cc) = if computed {
-        with_losses_elsewhere(found, &pair, fit_around, &settings.cavity)?
+        with_losses_elsewhere(found, &pair, fit_around, has_tissue, &settings.cavity)?
     } else {
         let finding = found?;
         let sag = fit_around(&finding.cavity)?;
-        let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, &settings.cavity);
+        let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, has_tissue, &settings.cavity);
         (finding, sag, cc)
     };
     if computed {
@@ -451,7 +454,7 @@ mod tests {
 
     #[test]
     fn a_t1_and_a_flair_have_their_tissues_exchanged_and_two_t1_have_not() {
-        let labels: LabelMap<Pre> = crate::segment::atlas::template().labels.clone().relabelled();
+        let labels: LabelMap<Pre> = atlas::template().labels.clone().relabelled();
         let drawn = |grey: f32, white: f32| {
             labels.map(|l| match l {
                 label::BACKGROUND => 0.0,

@@ -214,7 +214,14 @@ mod tests {
 
     /// Error of the rigid fit in mm, and Dice of brain, ventricles and cavity.
     fn figures(contrast: Scans) -> (f64, [f64; 3]) {
-        let patient = synthesize(&SynthSettings { seed: 31, contrast, ..SynthSettings::default() }).unwrap();
+        let patient = synthesize(&SynthSettings {
+            seed: 31,
+            spacing_mm: 2.0,
+            post_slice_mm: 2.0,
+            contrast,
+            ..SynthSettings::default()
+        })
+        .unwrap();
         let (pre, post) = (patient.pre.map(f32::from), patient.post.map(f32::from));
         let settings = RigidSettings::default();
         let pre_from_post = register_rigid(&post, &pre, RigidMasks::default(), &settings).unwrap().fixed_from_moving;

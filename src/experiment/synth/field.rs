@@ -36,11 +36,12 @@ impl Field {
             base[a] = (x as usize).min(grid.dims[a] - 2);
             w[a] = x - base[a] as f64;
         }
+        let sides = w.map(|w| [1.0 - w, w]);
         let mut sum = Vector3::zeros();
         for corner in 0..8 {
-            let up = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
-            let weight: f64 = (0..3).map(|a| if up[a] == 1 { w[a] } else { 1.0 - w[a] }).product();
-            sum += weight * Vector3::from(self.mm.at(base[0] + up[0], base[1] + up[1], base[2] + up[2]));
+            let [i, j, k] = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
+            let weight = sides[0][i] * sides[1][j] * sides[2][k];
+            sum += weight * Vector3::from(self.mm.at(base[0] + i, base[1] + j, base[2] + k));
         }
         sum
     }

@@ -87,6 +87,10 @@ impl Noises {
     /// Intensity of everything that is neither brain nor inside the skull. `out` is the distance from the skull's inner
     /// surface in mm, `below` how deep the point lies under the skin of face and neck (negative outside of them).
     fn outside_brain(&self, p: [f64; 3], out: f64, below: f64) -> f64 {
+        // Farther out than bone, muscle and scalp at their thickest.
+        if out > 22.0 && below <= 0.0 {
+            return AIR;
+        }
         let vary = self.thickness.at(p);
         // Low on the head the layers are thin and muscle lies over them.
         let low = ((-20.0 - p[2]) / 30.0).clamp(0.0, 1.0);
@@ -98,10 +102,10 @@ impl Noises {
         let temporalis = if p[0].abs() > 45.0 { 6.0 * bump(p[1], 15.0, 45.0) * bump(p[2], -15.0, 45.0) } else { 0.0 };
         let head_depth = skull + temporalis + scalp - out;
         let depth = head_depth.max(below);
-        let fine = self.fine.at(p);
         if depth <= 0.0 {
             return AIR;
         }
+        let fine = self.fine.at(p);
         if depth < 1.9 {
             return SKIN + 14.0 * fine;
         }

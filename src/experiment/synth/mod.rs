@@ -139,9 +139,20 @@ struct Content {
     wall_blood: Option<SmoothNoise>,
 }
 
+/// A point of the patient, and the point of the head that looks like it.
+#[derive(Clone, Copy)]
+struct Place {
+    p: Point3<f64>,
+    q: Position<Mni>,
+}
+
 impl Anatomy {
-    fn label(&self, p: Point3<f64>) -> u8 {
-        let own = self.head.labels.nearest(in_template(&self.warp, p)).unwrap_or(label::BACKGROUND);
+    fn place(&self, p: Point3<f64>) -> Place {
+        Place { p, q: in_template(&self.warp, p) }
+    }
+
+    fn label(&self, Place { p, q }: Place) -> u8 {
+        let own = self.head.labels.nearest(q).unwrap_or(label::BACKGROUND);
         if own != label::BACKGROUND && own != label::VENTRICLE && self.in_old_lesion(p) { label::CSF } else { own }
     }
 
@@ -150,44 +161,43 @@ impl Anatomy {
     }
 
     /// What the head shows, without an operation and what else is the matter.
-    fn healthy(&self, p: Point3<f64>) -> f64 {
-        self.head.t1.trilinear(in_template(&self.warp, p)).map_or(0.0, f64::from)
+    fn healthy(&self, place: Place) -> f64 {
+        self.head.t1.trilinear(place.q).map_or(0.0, f64::from)
     }
 
-    /// The intensity of tissue, `wall_mm` from the resection's wall, with old lesion and, in a scan that shows it, oedema.
-    fn intensity(&self, p: Point3<f64>, wall_mm: f64, shows: fn(Scans) -> bool) -> f64 {
-        let healthy = self.healthy(p);
+    /// The intensity of tissue with old lesion and, in a scan that shows it, oedema.
+    fn intensity(&self, place: Place, shows: fn(Scans) -> bool) -> f64 {
+        let healthy = self.healthy(place);
         let tissue = match &self.oedema {
-            Some(oedema) if shows(oedema.scans) && self.label(p) == label::WHITE_MATTER => {
-                oedema.of_white_matter(healthy, p, wall_mm)
+            Some(oedema) if shows(oedema.scans) && self.label(place) == label::WHITE_MATTER => {
+                oedema.of_white_matter(healthy, place.p, self.resection.distance_mm(place.p))
             }
             _ => healthy,
         };
-        match self.old_lesion.as_ref().map_or(0.0, |lesion| (0.5 - lesion.distance_mm(p)).clamp(0.0, 1.0)) {
+        match self.old_lesion.as_ref().map_or(0.0, |lesion| (0.5 - lesion.distance_mm(place.p)).clamp(0.0, 1.0)) {
             0.0 => tissue,
             part => part * f64::from(FLUID) + (1.0 - part) * tissue,
         }
     }
 
     fn intensity_before(&self, p: Point3<f64>) -> f64 {
-        let wall_mm = self.resection.distance_mm(p);
-        let native = self.intensity(p, wall_mm, Scans::in_pre);
+        let place = self.place(p);
+        let native = self.intensity(place, Scans::in_pre);
         let Some(enhancement) = self.enhancement.as_ref().filter(|_| self.contrast.in_pre()) else { return native };
-        let q = in_template(&self.warp, p);
-        let tissue = match self.label(p) {
-            label::GREY_MATTER | label::WHITE_MATTER => enhancement.rim(native, p, wall_mm),
+        let tissue = match self.label(place) {
+            label::GREY_MATTER | label::WHITE_MATTER => enhancement.rim(native, p, self.resection.distance_mm(p)),
             _ => native,
         };
-        enhancement.at_skull(enhancement.in_brain(tissue, q), q)
+        enhancement.at_skull(enhancement.in_brain(tissue, place.q), place.q)
     }
 
-    fn in_skull(&self, p: Point3<f64>) -> bool {
-        self.head.skull_mm.trilinear(in_template(&self.warp, p)).is_some_and(|d| d < 0.0)
+    fn in_skull(&self, place: Place) -> bool {
+        self.head.skull_mm.trilinear(place.q).is_some_and(|d| d < 0.0)
     }
 
     /// Whether defacing takes what is here; the skull does not sag.
     fn is_face(&self, x: Point3<f64>) -> bool {
-        let q = in_template(&self.warp, x);
+        let q = self.place(x).q;
         let skull_mm = self.head.skull_mm.trilinear(q).map_or(100.0, f64::from);
         fault::is_face(self.head.in_template(q).mm.into(), skull_mm)
     }
@@ -198,9 +208,10 @@ impl Anatomy {
     }
 
     fn intensity_after(&self, x: Point3<f64>) -> f64 {
+        let place = self.place(x);
         let enhancement = self.enhancement.as_ref().filter(|_| self.contrast.in_post());
-        let native = if self.in_skull(x) { self.inside_skull_after(x, enhancement) } else { self.healthy(x) };
-        enhancement.map_or(native, |e| e.at_skull(native, in_template(&self.warp, x)))
+        let native = if self.in_skull(place) { self.inside_skull_after(x, enhancement) } else { self.healthy(place) };
+        enhancement.map_or(native, |e| e.at_skull(native, place.q))
     }
 
     fn inside_skull_after(&self, x: Point3<f64>, enhancement: Option<&Enhancement>) -> f64 {
@@ -209,13 +220,14 @@ impl Anatomy {
         let cavity = (0.5 - wall_mm).clamp(0.0, 1.0);
         // Where brain has left the skull's wall, fluid takes its place.
         let tissue = |()| {
-            let native = if self.in_skull(p) { self.intensity(p, wall_mm, Scans::in_post) } else { f64::from(FLUID) };
+            let place = self.place(p);
+            let native = if self.in_skull(place) { self.intensity(place, Scans::in_post) } else { f64::from(FLUID) };
             let Some(enhancement) = enhancement else { return native };
-            let tissue = match self.label(p) {
+            let tissue = match self.label(place) {
                 label::GREY_MATTER | label::WHITE_MATTER => enhancement.bed(native, p, wall_mm),
                 _ => native,
             };
-            enhancement.in_brain(tissue, in_template(&self.warp, p))
+            enhancement.in_brain(tissue, place.q)
         };
         match cavity {
             0.0 => tissue(()),
@@ -284,7 +296,7 @@ pub fn synthesize_on(
 
     // Label and displacement of what was at a voxel before the operation.
     let at_pre = |n: usize| patient_from_pre.apply(Position::from_point(centre(&pre_grid, n))).mm;
-    let tissue_pre: LabelMap<Pre> = per_voxel(pre_grid, |n| anatomy.label(at_pre(n)));
+    let tissue_pre: LabelMap<Pre> = per_voxel(pre_grid, |n| anatomy.label(anatomy.place(at_pre(n))));
     let resected_pre: Mask<Pre> =
         per_voxel(pre_grid, |n| tissue_pre.data[n] > 0 && anatomy.resection.distance_mm(at_pre(n)) < 0.0);
     let stays = |n: usize| tissue_pre.data[n] > 0 && !resected_pre.data[n];
@@ -299,11 +311,11 @@ pub fn synthesize_on(
     let at_post = |n: usize| patient_from_post.apply(Position::from_point(centre(&post_grid, n))).mm;
     let after: LabelMap<Post> = per_voxel(post_grid, |n| {
         let x = at_post(n);
-        if !anatomy.in_skull(x) {
+        if !anatomy.in_skull(anatomy.place(x)) {
             return label::BACKGROUND;
         }
         let p = anatomy.before(x);
-        if anatomy.resection.distance_mm(p) < 0.0 { CAVITY } else { anatomy.label(p) }
+        if anatomy.resection.distance_mm(p) < 0.0 { CAVITY } else { anatomy.label(anatomy.place(p)) }
     });
 
     let post_from_pre = patient_from_pre.then(&post_from_patient);
