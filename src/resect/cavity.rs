@@ -28,7 +28,7 @@ pub struct CavitySettings {
     pub growth_mm: f64,
     /// How far blood, as bright as tissue but without its folds, is followed from the dark part, mm.
     pub blood_mm: f64,
-    /// Correlation of the two scans within a window below which the folds of grey and white matter are lost.
+    /// Correlation of the two scans within a window above which the folds of grey and white matter are still there.
     pub folds_kept: f64,
     /// Fluid that was there before belongs to the cavity where most tissue within about this distance was lost, mm.
     pub surroundings_mm: f64,

@@ -258,6 +258,7 @@ pub fn take_pair_apart(
         let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, has_tissue, &settings.cavity);
         (finding, sag, cc)
     };
+    let mut changed_beside_cc = None;
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -270,9 +271,12 @@ pub fn take_pair_apart(
             post: &post_t1.cropped(&near),
             post_known: &post_known.cropped(&near),
             csf_grey_border: before.csf_grey_border,
+            grey_mean: before.tissue_means[1],
             grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
         };
-        finding.cavity.paste(&with_blood(&cavity, &pair, &settings.cavity), &near);
+        let with_blood = with_blood(&cavity, &pair, &settings.cavity);
+        finding.cavity.paste(&with_blood.cavity, &near);
+        changed_beside_cc = Some(with_blood.in_doubt_cc).filter(|cc| *cc >= settings.cavity.smallest_cc);
     }
     let filled_before = undone(&finding.cavity, &sag);
     if given.resected.is_none() {
@@ -299,6 +303,7 @@ pub fn take_pair_apart(
     let unlike = likeness.filter(|found| !found.is_one_head());
     after.warnings.extend(unlike.map(|found| SegmentWarning::UnlikeScans { folds: found.folds }));
     after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
+    after.warnings.extend(changed_beside_cc.map(|cc| SegmentWarning::ChangedBeside { cc }));
     if computed {
         let percent = outside_percent(&filled_before, &before.brain_mni);
         after.warnings.extend((percent > NOTED_ABOVE_BRAIN).then_some(SegmentWarning::AboveSunkBrain { percent }));

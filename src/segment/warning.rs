@@ -149,6 +149,15 @@ pub enum SegmentWarning {
         /// Volume, cc.
         cc: f64,
     },
+    /// What has changed beside the cavity may be blood, oedema or contrast agent.
+    #[error(
+        "beside the dark part of the cavity {cc:.1} cc have changed as oedema or contrast agent changes tissue: they are left out; \
+         where they are blood, the cavity is found too small: give a cavity mask"
+    )]
+    ChangedBeside {
+        /// Volume, cc.
+        cc: f64,
+    },
     /// A mask of the ventricles lies on tissue, or where none are.
     #[error(
         "of the ventricle mask {tissue_percent:.0} % is as bright as tissue and {far_percent:.0} % lies far from where the fitted \
