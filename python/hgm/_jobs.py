@@ -42,6 +42,7 @@ def run(
     settings: Settings = None,
     estimate: bool = False,
     tissues: Optional[int] = None,
+    head: Optional[str] = None,
     dseg: Any = None,
     labels: Optional[str] = None,
     pose: Any = None,
@@ -70,6 +71,9 @@ def run(
         The moduli with their intervals instead of the prior's samples.
     tissues : int, optional
         1: the whole brain one material; 2: grey and white matter apart.
+    head : str, optional
+        How the patient lay for the second scan: ``supine``, ``prone``, ``left``, ``right``, ``sitting``, or the way down as
+        ``x,y,z`` of that scanner; upright otherwise.
     dseg : path or nibabel image, optional
         Another tool's labels of the pre-operative scan (FreeSurfer, SynthSeg ...); `labels` says whose numbers they are.
     pose : path, optional
@@ -112,7 +116,7 @@ def run(
         )
         words = ["run", temporary.path("pre", pre), temporary.path("post", post)]
         words += options(
-            temporary, settings, estimate=estimate, tissues=tissues, labels=labels, force=force, **own
+            temporary, settings, estimate=estimate, tissues=tissues, head=head, labels=labels, force=force, **own
         )
         return _job(temporary, words, output, progress)
 

@@ -24,11 +24,6 @@ pub struct Caller {
 }
 
 impl Caller {
-    /// One that listens; nothing has come back yet.
-    pub fn new(progress: Arc<Mutex<dyn Progress + Send>>) -> Self {
-        Self { progress, result: Arc::default() }
-    }
-
     /// What has come back, and how the command ended.
     pub fn called(&self, ended: Result<(), Failure>) -> Called {
         Called { result: self.result.lock().unwrap_or_else(PoisonError::into_inner).take(), ended }

@@ -2,6 +2,8 @@
 
 use super::Failure;
 use crate::experiment::population::PopulationPrior;
+use crate::experiment::predict::Head;
+use crate::experiment::resection::GravityFrame;
 use crate::manual::help::laws;
 use crate::material::StudyKind;
 use crate::material::generative::GenerativeModel;
@@ -100,15 +102,10 @@ pub struct PopulationOption {
     /// The priors of the moduli from a cohort (population.toml of `hgm bids ... group`) instead of the literature; `none`: the
     /// literature's again
     #[arg(long, help_heading = MATERIAL, value_name = "FILE")]
-    population: Option<PathBuf>,
+    pub population: Option<PathBuf>,
 }
 
 impl PopulationOption {
-    /// Whether it was given.
-    pub fn given(&self) -> bool {
-        self.population.is_some()
-    }
-
     /// What it sets; a cohort that is one study's worth changes nothing, and that is said.
     pub fn over(&self, flags: &mut Layer) -> Result<(), Failure> {
         let Some(path) = &self.population else { return Ok(()) };
@@ -146,6 +143,10 @@ pub struct AnalysisOptions {
     /// 1: the whole brain one material; 2: grey and white matter apart (81 samples)
     #[arg(long, help_heading = MATERIAL, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub tissues: Option<u8>,
+    /// How the patient lay for the second scan: supine, prone, left, right, sitting, or the way down as x,y,z of that scanner (RAS+)
+    /// [default: as `[resection]` has it: upright]
+    #[arg(long, value_name = "WAY", allow_hyphen_values = true)]
+    pub head: Option<Head>,
     #[command(flatten)]
     pub prior: PriorOptions,
     /// Estimate the moduli with their intervals instead of trying the prior's samples; on 160,000 tetrahedra unless
@@ -162,6 +163,8 @@ impl AnalysisOptions {
     /// What they set.
     pub fn over(&self, flags: &mut Layer) {
         flags.set("resection.tissues", self.tissues);
+        flags.set("resection.gravity_frame", self.head.map(|_| GravityFrame::Post));
+        flags.set("resection.gravity_m_per_s2", self.head.map(|head| head.gravity_in_scanner_m_per_s2()));
         self.tasks.over(&self.prior, self.tissues, flags);
         self.prior.over(flags);
     }

@@ -161,7 +161,7 @@ pub fn main_with(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// One command for another program in this process: `words` without the program's name; other programs are looked for beside
 /// the file `beside`, then on the `PATH`. A `progress` that unwinds breaks the command off between two files.
 pub fn call(words: &[OsString], beside: Option<&Path>, progress: Arc<Mutex<dyn Progress + Send>>) -> Called {
-    let caller = call::Caller::new(progress);
+    let caller = call::Caller { progress, result: Arc::default() };
     let ended = parsed(std::iter::once("hgm".into()).chain(words.iter().cloned()))
         .map_err(|error| Failure::Rejected(anyhow!(help::in_one_line(&error))))
         .and_then(|hgm| dispatch(hgm.command, &Session::within(hgm.global, beside, caller.clone())?));

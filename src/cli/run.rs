@@ -48,7 +48,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 pub fn settings(analysis: &AnalysisOptions, mesh: &MeshOptions, session: &Session) -> Result<Settings, Failure> {
     let mut flags = Layer::default();
     analysis.over(&mut flags);
-    if analysis.population.given() && !analysis.estimate {
+    if analysis.population.population.is_some() && !analysis.estimate {
         return Err(Failure::Rejected(anyhow!(
             "--population is a prior of estimates, and a sweep tries the literature's samples: add --estimate, or leave it out"
         )));

@@ -5,6 +5,7 @@
 //! e^3 = 20 to 1 for taking one explanation instead of another.
 
 use super::parameter_name::in_words;
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -130,6 +131,13 @@ pub enum Reason {
         /// Size of the measurement's noise, mm.
         noise_mm: f64,
     },
+    /// What has moved has moved another way than gravity as assumed would take it.
+    OtherWayDown {
+        /// Mean of the displacement seen, mm (MNI frame).
+        seen_mm: [f64; 3],
+        /// Gravity as assumed, m/s2 (MNI frame).
+        gravity_m_per_s2: [f64; 3],
+    },
     /// A smooth movement without any mechanics is as good an explanation.
     NoBetterThanAnyMovement {
         /// Logarithm of the odds of the model against it.
@@ -252,6 +260,16 @@ impl Reason {
                 "the model leaves {discrepancy_mm:.2} mm in each direction unexplained, the measurement is good to \
                  {noise_mm:.2} mm"
             ),
+            Self::OtherWayDown { seen_mm, gravity_m_per_s2 } => {
+                let (seen, down) = (Vector3::from(*seen_mm), Vector3::from(*gravity_m_per_s2));
+                format!(
+                    "what is seen has moved {:.1} mm on average towards {}, {:.0} degrees from gravity as assumed (towards {})",
+                    seen.norm(),
+                    side_of_head(&seen),
+                    seen.angle(&down).to_degrees(),
+                    side_of_head(&down)
+                )
+            }
             Self::NoBetterThanAnyMovement { log_odds } => {
                 format!("any smooth movement explains what is seen as well as this load does (log odds {log_odds:.1})")
             }
@@ -353,6 +371,26 @@ impl Verdict {
     }
 }
 
+/// Where a direction of the MNI frame points to, by its largest component.
+fn side_of_head(direction: &Vector3<f64>) -> &'static str {
+    const SIDES: [[&str; 2]; 3] =
+        [["the left side", "the right side"], ["the back of the head", "the face"], ["the feet", "the crown"]];
+    let axis = direction.iamax();
+    SIDES[axis][usize::from(direction[axis] > 0.0)]
+}
+
+/// What is suspected where no stiffness is claimed.
+fn suspects(are: &str, reasons: &[Reason]) -> String {
+    match reasons.iter().find(|reason| matches!(reason, Reason::OtherWayDown { .. })) {
+        Some(other_way) => format!(
+            "{}. How the patient lay for the second scan is told by `gravity_m_per_s2` and `gravity_frame` of the table \
+             [resection]; no stiffness is claimed.",
+            capitalised(&other_way.sentence())
+        ),
+        None => format!("The load or the supports {are} as assumed; no stiffness is claimed."),
+    }
+}
+
 /// `grey_matter` as a text has it.
 fn words(tissue: &str) -> String {
     tissue.replace('_', " ")
@@ -380,14 +418,12 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
     match finding {
         Finding::NoShift if bounds.is_empty() => format!("No shift seen: {first}. No stiffness is claimed."),
         Finding::NoShift => format!("No shift seen: {first}. With the load and the supports as assumed, {bounds}."),
-        Finding::Unexplained => format!(
-            "The model does not explain the shift: {first}. The load or the supports may not be as assumed; no stiffness is \
-             claimed."
-        ),
-        Finding::Conflict => format!(
-            "Conflict: the shift contradicts what is known: {first}. The load or the supports are not as assumed; no \
-             stiffness is claimed."
-        ),
+        Finding::Unexplained => {
+            format!("The model does not explain the shift: {first}. {}", suspects("may not be", reasons))
+        }
+        Finding::Conflict => {
+            format!("Conflict: the shift contradicts what is known: {first}. {}", suspects("are not", reasons))
+        }
         Finding::CannotTell => format!("Cannot tell: {first}. Averaged over them: {intervals}."),
         Finding::PriorDominated => format!(
             "The model explains the shift{percent}, which says little of the stiffness: the interval is the prior's. \
@@ -452,6 +488,16 @@ mod tests {
             let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());
             assert!(finding.has_stiffness() && verdict.sentence.contains("rey matter 1,170 Pa (936 to 1,460)"));
         }
+    }
+
+    #[test]
+    fn a_load_that_pulls_another_way_is_named_as_the_suspect_in_the_sentence() {
+        let left = Reason::Discrepancy { discrepancy_mm: 1.3, noise_mm: 0.1 };
+        let other_way = Reason::OtherWayDown { seen_mm: [1.0, 0.1, 0.0], gravity_m_per_s2: [0.0, 0.0, -9.81] };
+        let said = |reasons| Verdict::new(Finding::Unexplained, Some(0.02), Vec::new(), reasons).sentence;
+        let named = said(vec![left.clone(), other_way]);
+        assert!(named.contains("towards the right side, 90 degrees") && named.contains("gravity_m_per_s2"), "{named}");
+        assert!(said(vec![left]).contains("The load or the supports may not be as assumed;"));
     }
 
     #[test]

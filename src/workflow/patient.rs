@@ -6,7 +6,7 @@ use super::estimate_options::Fluid;
 use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans};
 use super::outcome::{finish, keep_settings, with_estimate};
-use super::plan;
+use super::plan::{self, Goal};
 use super::refusal;
 use super::stage_name::StageName;
 use super::stages::{
@@ -209,6 +209,23 @@ pub(crate) struct Patient<'w, 'a> {
     at_rest_mm: Option<f64>,
 }
 
+/// Samples and estimate that are there.
+struct Found {
+    outcome: ExperimentOutcome,
+    /// Of the samples.
+    samples: Vec<Manifest>,
+    /// The stages before the fields.
+    made: Made,
+}
+
+/// The fields are made of the estimate, or of the best sample that has a state.
+fn fields_of<'s>(outcome: &ExperimentOutcome, samples: &'s [Manifest]) -> FieldsInput<'s> {
+    let there = |best: &&String| outcome.samples.iter().any(|s| s.id == **best && s.file.is_some());
+    let best = outcome.best_sample.as_ref().filter(there);
+    let model = if outcome.estimate.is_some() { Some("estimate".to_owned()) } else { best.cloned() };
+    FieldsInput { model, samples }
+}
+
 impl<'w, 'a> Patient<'w, 'a> {
     /// Reads mesh and masks.
     pub fn new(work: &'w Work<'a>, prepared: Prepared) -> Result<Self, WorkflowError> {
@@ -344,8 +361,8 @@ impl<'w, 'a> Patient<'w, 'a> {
         }
     }
 
-    /// Outcome and page of what is there for the settings of this job: samples, an estimate, or both.
-    pub fn gather(&self) -> Result<(), WorkflowError> {
+    /// What is there for the settings of this job: samples, an estimate, or both.
+    fn found(&self) -> Result<Found, WorkflowError> {
         let Self { work, prepared, .. } = self;
         let tissues = plan::tissues(work.settings, work.subject);
         let solved = match plan::samples(work.settings, work.subject, &self.lesions()) {
@@ -354,29 +371,46 @@ impl<'w, 'a> Patient<'w, 'a> {
             list => stages::present_samples(work, &prepared.made, &self.posed(&tissues), &list?)?,
         };
         let mut outcome = self.posed_outcome();
-        let mut manifests: Vec<Manifest> = Vec::new();
+        let mut samples: Vec<Manifest> = Vec::new();
         if let Some(solved) = solved {
-            let (samples, of_samples): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
-            manifests = of_samples;
-            outcome.warnings.extend(manifests.iter().flat_map(|m| m.warnings.iter().cloned()));
+            let (outcomes, manifests): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
+            samples = manifests;
+            outcome.warnings.extend(samples.iter().flat_map(|m| m.warnings.iter().cloned()));
             outcome.tissues = tissues.iter().map(|t| t.name.clone()).collect();
-            outcome.best_sample = best_sample(&samples, "margin").map(|s| s.id.clone());
-            outcome.samples = samples;
+            outcome.best_sample = best_sample(&outcomes, "margin").map(|s| s.id.clone());
+            outcome.samples = outcomes;
         }
         let mut made = prepared.made.clone();
         if let Some(facts) = stages::present_estimate(work, &mut made, &self.asked(&tissues))? {
             with_estimate(&mut outcome, &facts);
         }
-        let best = outcome
-            .best_sample
-            .as_ref()
-            .filter(|best| outcome.samples.iter().any(|s| s.id == **best && s.file.is_some()));
-        let model = if outcome.estimate.is_some() { Some("estimate".to_owned()) } else { best.cloned() };
-        stages::fields(work, &mut made, &FieldsInput { model, samples: &manifests })?;
+        Ok(Found { outcome, samples, made })
+    }
+
+    /// Outcome and page of what is there.
+    pub fn gather(&self) -> Result<(), WorkflowError> {
+        let Self { work, prepared, .. } = self;
+        let Found { outcome, samples, mut made } = self.found()?;
+        stages::fields(work, &mut made, &fields_of(&outcome, &samples))?;
         let own = [StageName::Estimate, StageName::Fields];
         let own = own.iter().filter_map(|stage| made.get(stage));
-        let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&manifests).chain(own).collect();
+        let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&samples).chain(own).collect();
         finish(work, &outcome, &all)
+    }
+
+    /// The stages after mesh, target and samples as this job would pose them: the estimate where it is the goal, and, where that
+    /// would not run again, the fields of what is there.
+    pub fn later_stages(&self, goal: Goal) -> Result<Vec<Stage>, WorkflowError> {
+        let tissues = plan::tissues(self.work.settings, self.work.subject);
+        let mut later = Vec::new();
+        if goal == Goal::Estimate {
+            later.push(stages::estimate_stage(self.work, &self.prepared.made, &self.asked(&tissues))?);
+        }
+        if later.iter().all(|stage| stage.why().is_empty()) {
+            let Found { outcome, samples, made } = self.found()?;
+            later.push(stages::fields_stage(self.work, &made, &fields_of(&outcome, &samples)));
+        }
+        Ok(later)
     }
 
     /// What is known before any material is tried.

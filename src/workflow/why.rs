@@ -4,6 +4,7 @@ use super::case::Case;
 use super::error::{CaseError, WorkflowError};
 use super::facts::MeshFacts;
 use super::inputs::ScanSums;
+use super::patient::{Patient, Prepared};
 use super::plan::{self, Goal, plan_with};
 use super::progress::Silent;
 use super::stage_name::{StageName, Subject};
@@ -131,7 +132,12 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
             | StageName::Predict => None,
         }
     };
-    Ok(steps.iter().filter_map(pose).collect())
+    let mut posed: Vec<Stage> = steps.iter().filter_map(pose).collect();
+    let whole = matches!(asked.goal, Goal::Sweep | Goal::Estimate);
+    if whole && posed.iter().all(|stage| stage.why().is_empty()) {
+        posed.extend(Patient::new(work, Prepared::read(work)?)?.later_stages(asked.goal)?);
+    }
+    Ok(posed)
 }
 
 fn explain(manifest: &Manifest, posed: &[Stage], folder: &Path) -> Explained {

@@ -2,7 +2,7 @@
 
 use crate::job::{output, sample};
 use hgm::image::Volume;
-use hgm::image::nifti::{ReadOptions, decode, encode_i16};
+use hgm::image::nifti::{ReadOptions, decode, encode_f32, encode_i16};
 use hgm::material::random::CounterRng;
 use std::io::Read;
 use std::path::Path;
@@ -55,4 +55,25 @@ fn the_same_file_twice_a_mirrored_header_doubtful_forms_and_a_stranger_are_told(
     std::fs::write(at("noise.nii.gz"), encode_i16(&noise)).unwrap();
     let (code, said) = warnings(&at("noise.nii.gz"));
     assert!(code == Some(4) && said.contains("hardly resemble each other"), "{said}");
+}
+
+#[test]
+fn a_scan_in_another_unit_is_registered_as_it_would_be_in_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let post = decode(&std::fs::read(sample("post.nii.gz")).unwrap(), "post.nii.gz", &ReadOptions::default()).unwrap();
+    let registered = |unit: f32| {
+        std::fs::write(at("post.nii.gz"), encode_f32(&post.volume.map(|x| unit * x))).unwrap();
+        let fixed = sample("pre.nii.gz");
+        let words = ["register", "-q", "--json", &at("post.nii.gz"), fixed.to_str().unwrap(), "-o", &at("t.txt")];
+        let result = output(&words);
+        assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+        (std::fs::read(at("t.txt")).unwrap(), String::from_utf8_lossy(&result.stdout).into_owned())
+    };
+    let (own, said) = registered(1.0);
+    assert!(!said.contains("scanner's"), "{said}");
+    for power in [-40.0, 30.0] {
+        let (other, said) = registered(f32::exp2(power));
+        assert!(other == own && said.contains("than a scanner's"), "{said}");
+    }
 }

@@ -105,6 +105,8 @@ fn asks_why(case: &Path) {
     let finer = why(&["--cells", "4000"]);
     assert_eq!(finer["mesh"], ["setting `mesh.size.cells` changed from 3000 to 4000"]);
     assert!(finer["sim-sample-04"][0].contains("follows mesh") && !finer.contains_key("anat"));
+    let turned = why(&["--head", "left"]);
+    assert!(turned["sim-sample-04"][0].contains("gravity_m_per_s2") && !turned.contains_key("mesh"), "{turned:?}");
     let (pre, post) = (sample("pre.nii.gz"), sample("post.nii.gz"));
     let scans = |pre: &Path| why(&["--pre", pre.to_str().unwrap(), "--post", post.to_str().unwrap()]);
     assert!(scans(&pre).is_empty());

@@ -37,6 +37,29 @@ fn slow_an_estimate_means_the_settings_its_case_was_made_with() {
     assert_eq!(kept["anat"]["sag"]["iterations"].as_array().unwrap()[0].as_integer(), Some(20));
     assert_eq!(kept["prior"]["study"].as_str(), Some("mre"));
     assert_eq!(kept["mesh"]["size"]["cells"].as_integer(), Some(3000));
+    what_would_be_estimated_again_is_told(&one, &config);
+}
+
+/// Of a run with the same settings nothing; of a patient who lay another way the estimate, and with it the fields.
+fn what_would_be_estimated_again_is_told(case: &str, config: &str) {
+    let why = |more: &[&str]| -> Vec<String> {
+        let config = if more.contains(&"--config") { &[][..] } else { &["--config", config] };
+        let said = json(&[&["why", case, "--estimate"], config, more].concat());
+        let stages = said["stages"].as_array().unwrap().iter().filter(|stage| stage["would_run"] == true);
+        stages.map(|stage| format!("{}: {}", stage["stage"].as_str().unwrap(), stage["reasons"][0])).collect()
+    };
+    assert_eq!(why(&[]), [""; 0]);
+    let again = why(&["--head", "left"]);
+    let named = |n: usize, stage: &str, reason: &str| again[n].starts_with(stage) && again[n].contains(reason);
+    assert!(
+        again.len() == 2 && named(0, "estimate", "gravity_m_per_s2") && named(1, "fields", "estimate"),
+        "{again:?}"
+    );
+    let fields = format!("{config}.fields.toml");
+    let text = std::fs::read_to_string(config).unwrap() + "\n[fields]\nstates = [\"observed\"]\n";
+    std::fs::write(&fields, text).unwrap();
+    let again = why(&["--config", &fields]);
+    assert!(again.len() == 1 && again[0].contains("fields.states"), "{again:?}");
 }
 
 #[test]

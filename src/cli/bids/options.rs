@@ -24,7 +24,7 @@ pub struct Args {
     pub entity: Vec<String>,
     /// Before the operation: each subject's scan of ses-preop and the mask of what is to be taken, as `hgm predict` (table [predict] of the
     /// settings), into sub-*/hgm-plan. A pair that is run later takes the prediction's work up and holds it against what was seen
-    #[arg(long, conflicts_with_all = ["estimate", "every_task", "tissues"])]
+    #[arg(long, conflicts_with_all = ["estimate", "every_task", "tissues", "head"])]
     pub predict: bool,
     /// The data set of the plans: sub-*/ses-preop/anat/*_label-resection_mask.nii.gz, with the entities of the scan
     /// [default: BIDS_DIR/derivatives/plans]

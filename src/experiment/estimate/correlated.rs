@@ -366,6 +366,9 @@ impl Fit<'_, '_> {
             odds,
             rigid_remainder_mm: rms(&remainder),
             shape: self.shape.as_ref().map_or_else(ShapeFound::default, |shape| shape.found(of_shape)),
+            seen_mean_mm: std::array::from_fn(|axis| {
+                seen_mm.iter().skip(axis).step_by(3).sum::<f64>() / seen.len().max(1) as f64
+            }),
             shift: Shift {
                 seen: seen_at_all,
                 seen_rms_mm: rms(&shifted),

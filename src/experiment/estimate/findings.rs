@@ -103,6 +103,8 @@ pub struct Findings {
     pub shape: ShapeFound,
     /// The shift.
     pub shift: Shift,
+    /// Mean of the displacement seen, mm.
+    pub seen_mean_mm: [f64; 3],
     /// The places that were looked at, mm, and their nodes.
     pub places_mm: Vec<[f64; 3]>,
     /// Their nodes.

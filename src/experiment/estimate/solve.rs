@@ -111,6 +111,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         } else {
             Reason::LoadAssumed
         }),
+        gravity_m_per_s2: problem.template.loads.gravity_m_per_s2,
         body_known: problem.body_known,
     };
     let verdict = verdict_of_fit(&fitted, settings, &posterior, &posed);

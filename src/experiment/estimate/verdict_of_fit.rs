@@ -4,6 +4,7 @@ use super::evidence::Unexplained;
 use super::findings::Fitted;
 use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, STRONG, Verdict};
+use nalgebra::Vector3;
 
 /// How far from the average of the studies, in its standard deviations, a figure may lie that was not drawn towards it
 /// (docs/evidence/estimate.md, "A person instead of the average").
@@ -17,6 +18,8 @@ pub(super) struct Posed<'a> {
     pub tissues: &'a [Option<String>],
     /// What is told of the load where nothing but a weight that is given pulls at the body.
     pub assumed: Option<Reason>,
+    /// Gravity as assumed, m/s2.
+    pub gravity_m_per_s2: [f64; 3],
     /// Whether load and supports are known, as a phantom's are: then nothing contradicts them.
     pub body_known: bool,
 }
@@ -28,7 +31,7 @@ pub(super) fn verdict_of_fit(
     posterior: &Posterior,
     posed: &Posed<'_>,
 ) -> Verdict {
-    let Posed { prior, tissues, ref assumed, body_known } = *posed;
+    let Posed { prior, tissues, ref assumed, gravity_m_per_s2, body_known } = *posed;
     let mut unexplained = Vec::new();
     let mut still = None;
     let mut share = None;
@@ -112,6 +115,10 @@ pub(super) fn verdict_of_fit(
         Some(still) => vec![still],
         None => conflict.into_iter().chain(unexplained).chain(wider).collect(),
     };
+    if matches!(finding, Finding::Conflict | Finding::Unexplained) {
+        let seen = fitted.correlated.as_ref().map(|found| (found.seen_mean_mm, found.shift.seen_rms_mm));
+        reasons.extend(seen.and_then(|(mean_mm, rms_mm)| other_way_down(mean_mm, rms_mm, gravity_m_per_s2)));
+    }
     if finding.has_stiffness() {
         let little = named().filter(|(n, _)| posterior.identifiability.verdicts[*n] != Knowledge::Identified);
         reasons.extend(little.map(|(n, _)| Reason::LittleSaid { name: prior[n].name.clone() }));
@@ -120,6 +127,19 @@ pub(super) fn verdict_of_fit(
         reasons.extend(assumed.clone());
     }
     Verdict::new(finding, share, moduli, reasons)
+}
+
+/// Whether what is seen has moved together, and another way than gravity as assumed would take it. A brain sinks: most of it goes
+/// where gravity pulls, whatever its stiffness.
+fn other_way_down(seen_mean_mm: [f64; 3], seen_rms_mm: f64, gravity_m_per_s2: [f64; 3]) -> Option<Reason> {
+    /// Half of a right angle: nearer to gravity than to any way across it.
+    const ASTRAY_DEG: f64 = 45.0;
+    /// Less of the shift in common is no direction.
+    const TOGETHER: f64 = 0.5;
+    let (seen, down) = (Vector3::from(seen_mean_mm), Vector3::from(gravity_m_per_s2));
+    let moves_together = seen.norm() > 0.0 && seen.norm() >= TOGETHER * seen_rms_mm;
+    let astray = down.norm() > 0.0 && seen.angle(&down) > ASTRAY_DEG.to_radians();
+    (moves_together && astray).then_some(Reason::OtherWayDown { seen_mm: seen_mean_mm, gravity_m_per_s2 })
 }
 
 /// What the model leaves of one component beyond the measured noise, mm: by the processes that were found, and never less
@@ -135,6 +155,20 @@ mod tests {
     use super::*;
     use crate::experiment::estimate::process::Process;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_shift_across_gravity_as_assumed_names_the_way_it_went() {
+        let (upright, supine) = ([0.0, 0.0, -9.81], [0.0, -9.81, 0.0]);
+        let backwards = [0.2, -2.0, -0.6];
+        let reason = other_way_down(backwards, 2.4, upright).unwrap();
+        let text = reason.sentence();
+        assert!(text.contains("2.1 mm on average towards the back of the head, 73 degrees"), "{text}");
+        assert!(text.ends_with("(towards the feet)"), "{text}");
+        assert_eq!(other_way_down(backwards, 2.4, supine), None, "down");
+        assert_eq!(other_way_down(backwards, 5.0, upright), None, "each part its own way");
+        assert_eq!(other_way_down(backwards, 2.4, [0.0; 3]), None, "no gravity is assumed");
+        assert_eq!(other_way_down([0.0; 3], 0.0, upright), None, "nothing moves");
+    }
 
     proptest! {
         #[test]

@@ -109,6 +109,11 @@ impl Head {
         (G * down).map(|x| x + 0.0).into()
     }
 
+    /// Gravity in the frame of the scanner that the patient lies in, m/s2: words are of that scanner's axes, as its table is level.
+    pub fn gravity_in_scanner_m_per_s2(&self) -> [f64; 3] {
+        self.gravity_m_per_s2(&RigidTransform::identity())
+    }
+
     /// Whether both say one way down. A word is of the head's axes and a direction of the scanner's: of those two only the pose
     /// tells ([`same_way`]).
     pub fn is_same_as(&self, other: &Self) -> bool {

@@ -10,6 +10,7 @@ mod error;
 mod floor;
 mod gzip;
 mod header;
+mod magnitude;
 mod mgh;
 mod orientation;
 mod warning;
@@ -71,7 +72,8 @@ pub fn decode(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<NiftiIm
     Ok(image)
 }
 
-/// [`decode`] for what a scanner shows: where intensities begin well below zero they are counted from there.
+/// [`decode`] for what a scanner shows: where intensities begin well below zero they are counted from there, and where all are
+/// tiny or huge they are read in another unit.
 ///
 /// # Errors
 /// As [`decode`].
@@ -84,6 +86,8 @@ pub fn decode_scan(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Ni
     }
     let floor = floor::counted_from_their_floor(&mut image.volume.data);
     image.warnings.extend(floor.map(|floor| NiftiWarning::BelowZero { floor: f64::from(floor) }));
+    let factor = magnitude::brought_to_a_usual_size(&mut image.volume.data);
+    image.warnings.extend(factor.map(|factor| NiftiWarning::UnusualUnit { factor: f64::from(factor) }));
     Ok(image)
 }
 

@@ -16,6 +16,11 @@ pub enum NiftiWarning {
     NotFinite { voxels: usize },
     #[error("intensities begin at {floor:.4}, below zero: they are counted from there")]
     BelowZero { floor: f64 },
+    #[error(
+        "the intensities are much {} than a scanner's: they are read {factor:.3e} times as large, in the files of T1 images as well",
+        if *factor > 1.0 { "smaller" } else { "larger" }
+    )]
+    UnusualUnit { factor: f64 },
     #[error("pixdim[{field}] is negative; its absolute value is taken")]
     NegativeSpacing { field: usize },
     #[error("xyzt_units says {unit}; the numbers are taken as millimetres")]

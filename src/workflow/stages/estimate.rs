@@ -30,7 +30,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 32;
+const VERSION: u32 = 33;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;

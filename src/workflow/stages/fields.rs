@@ -1,7 +1,7 @@
 //! Stage `fields`: the brain shift as displacement fields of the scans, and the pre-operative images carried by it.
 
 use super::shift::{Believed, CaseShift, FUSED, OBSERVED};
-use crate::artefact::{Manifest, Produced};
+use crate::artefact::{Manifest, Produced, Stage};
 use crate::experiment::field::{Between, BrainShift, ShiftField, Source, StateShift, at, seen_through};
 use crate::geometry::{Frame, Post, Pre, RigidTransform};
 use crate::image::nifti::{
@@ -31,8 +31,8 @@ pub(crate) struct FieldsInput<'a> {
     pub samples: &'a [Manifest],
 }
 
-/// Writes (or skips) the fields of every state that is asked for.
-pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) -> Result<BrainShift, WorkflowError> {
+/// The stage with its settings and inputs.
+pub(crate) fn fields_stage(work: &Work<'_>, made: &Made, input: &FieldsInput<'_>) -> Stage {
     let settings = &work.settings.fields;
     let believed = Believed::of(work.settings);
     let of_images = serde_json::json!({ "displacement": work.settings.estimate.displacement, "rigid_mm": believed.errors.rigid_mm });
@@ -41,14 +41,25 @@ pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) 
     if let Some(estimate) = made.get(&StageName::Estimate) {
         stage = stage.after(estimate);
     }
-    let stage = input.samples.iter().fold(stage, crate::artefact::Stage::after);
+    input.samples.iter().fold(stage, Stage::after)
+}
+
+/// Writes (or skips) the fields of every state that is asked for.
+pub(crate) fn fields(work: &Work<'_>, made: &mut Made, input: &FieldsInput<'_>) -> Result<BrainShift, WorkflowError> {
+    let settings = &work.settings.fields;
+    let stage = fields_stage(work, made, input);
     work.run(made, &NAME, &stage, || {
         work.tell(|p| p.begin("fields", 1 + settings.states.len()));
         let ids = input.samples.iter().filter_map(|m| match StageName::parse(&m.stage) {
             Some(StageName::Sample(id)) if !m.outputs.is_empty() => Some(id),
             _ => None,
         });
-        let case = CaseShift::read(&work.case, input.model.as_deref(), ids.collect(), (settings, believed.clone()))?;
+        let case = CaseShift::read(
+            &work.case,
+            input.model.as_deref(),
+            ids.collect(),
+            (settings, Believed::of(work.settings)),
+        )?;
         let mut produced = Produced::default();
         let mut shift = BrainShift {
             model: input.model.clone(),

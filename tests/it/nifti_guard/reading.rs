@@ -89,6 +89,20 @@ fn a_scan_with_a_hole_is_refused_and_one_without_numbers_around_is_read() {
 }
 
 #[test]
+fn a_scan_in_units_of_another_size_is_read_in_larger_ones_and_that_is_told() {
+    let grid = Grid::axis_aligned([20; 3], [1.0; 3], [0.0; 3]);
+    let scan = |unit: f32| encode_f32(&Volume::<f32, Native>::from_fn(grid, |n| unit * (n % 211) as f32));
+    let read = |unit: f32| decode_scan(&scan(unit), NAME, &ReadOptions::default()).unwrap();
+    let usual = read(1.0);
+    assert!(usual.warnings.is_empty() && usual.volume.data[210] == 210.0);
+    let tiny = read(f32::exp2(-30.0));
+    assert_eq!(tiny.warnings, [NiftiWarning::UnusualUnit { factor: f64::exp2(32.0) }]);
+    assert!(tiny.volume.data.iter().zip(&usual.volume.data).all(|(tiny, usual)| *tiny == 4.0 * usual));
+    let said = read(f32::exp2(40.0)).warnings[0].to_string();
+    assert!(said.contains("much larger than a scanner's") && said.contains("3.638e-12 times"), "{said}");
+}
+
+#[test]
 fn singleton_dimensions_are_dropped_and_a_volume_can_be_chosen() {
     for dim in [[4, 4, 3, 2, 1, 1, 1, 1], [5, 4, 3, 2, 1, 1, 1, 1], [3, 4, 3, 2, 9, 9, 9, 9]] {
         assert_eq!(read(&File::with(|f| f.dim = dim)).volume.grid.dims, [4, 3, 2]);
