@@ -152,6 +152,7 @@ def test_what_cannot_be_used_is_refused_in_the_commands_words(
         (lambda: hgm.run(pre, post, out, settings={"resection": {"poisson_ratio": 0.6}}), "below 0.5"),
         (lambda: hgm.run(pre, post, out, settings={"resection": {"poisson_ratio": float("nan")}}), "settings:"),
         (lambda: hgm.run(pre, post, out, tissues=7), "tissues"),
+        (lambda: hgm.run(pre, post, out, head="sideways"), "no way to lie"),
         (lambda: hgm.run(pre, 7, out), "give a path"),
         (lambda: hgm.run(pre, post, out, progress=7), "progress: not a function"),
         (lambda: case.warp_points([[0, 0, 0]], to="up"), "say post, deformed, pre or mni"),
