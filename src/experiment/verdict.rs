@@ -260,16 +260,10 @@ impl Reason {
                 "the model leaves {discrepancy_mm:.2} mm in each direction unexplained, the measurement is good to \
                  {noise_mm:.2} mm"
             ),
-            Self::OtherWayDown { seen_mm, gravity_m_per_s2 } => {
-                let (seen, down) = (Vector3::from(*seen_mm), Vector3::from(*gravity_m_per_s2));
-                format!(
-                    "what is seen has moved {:.1} mm on average towards {}, {:.0} degrees from gravity as assumed (towards {})",
-                    seen.norm(),
-                    side_of_head(&seen),
-                    seen.angle(&down).to_degrees(),
-                    side_of_head(&down)
-                )
-            }
+            Self::OtherWayDown { seen_mm, gravity_m_per_s2 } => format!(
+                "{}; which way was down for the second scan is `gravity_m_per_s2` of the table [resection]",
+                other_way(seen_mm, gravity_m_per_s2)
+            ),
             Self::NoBetterThanAnyMovement { log_odds } => {
                 format!("any smooth movement explains what is seen as well as this load does (log odds {log_odds:.1})")
             }
@@ -379,14 +373,28 @@ fn side_of_head(direction: &Vector3<f64>) -> &'static str {
     SIDES[axis][usize::from(direction[axis] > 0.0)]
 }
 
+/// Which way was moved, and which way gravity pulls as assumed.
+fn other_way(seen_mm: &[f64; 3], gravity_m_per_s2: &[f64; 3]) -> String {
+    let (seen, down) = (Vector3::from(*seen_mm), Vector3::from(*gravity_m_per_s2));
+    format!(
+        "what is seen has moved {:.1} mm on average towards {}, {:.0} degrees from gravity as assumed (towards {})",
+        seen.norm(),
+        side_of_head(&seen),
+        seen.angle(&down).to_degrees(),
+        side_of_head(&down)
+    )
+}
+
 /// What is suspected where no stiffness is claimed.
 fn suspects(are: &str, reasons: &[Reason]) -> String {
-    match reasons.iter().find(|reason| matches!(reason, Reason::OtherWayDown { .. })) {
-        Some(other_way) => format!(
-            "{}. How the patient lay for the second scan is told by `gravity_m_per_s2` and `gravity_frame` of the table \
-             [resection]; no stiffness is claimed.",
-            capitalised(&other_way.sentence())
-        ),
+    let astray = reasons.iter().find_map(|reason| match reason {
+        Reason::OtherWayDown { seen_mm, gravity_m_per_s2 } => Some(other_way(seen_mm, gravity_m_per_s2)),
+        _ => None,
+    });
+    match astray {
+        Some(way) => {
+            format!("{}: the patient may have lain another way. No stiffness is claimed.", capitalised(&way))
+        }
         None => format!("The load or the supports {are} as assumed; no stiffness is claimed."),
     }
 }
@@ -496,7 +504,7 @@ mod tests {
         let other_way = Reason::OtherWayDown { seen_mm: [1.0, 0.1, 0.0], gravity_m_per_s2: [0.0, 0.0, -9.81] };
         let said = |reasons| Verdict::new(Finding::Unexplained, Some(0.02), Vec::new(), reasons).sentence;
         let named = said(vec![left.clone(), other_way]);
-        assert!(named.contains("towards the right side, 90 degrees") && named.contains("gravity_m_per_s2"), "{named}");
+        assert!(named.contains("towards the right side, 90 degrees") && named.contains("lain another way"), "{named}");
         assert!(said(vec![left]).contains("The load or the supports may not be as assumed;"));
     }
 
