@@ -187,8 +187,8 @@ mod tests {
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
-    use crate::experiment::verdict::Claim;
-    use crate::fem::{Scenario, simulate};
+    use crate::experiment::verdict::{Claim, Verdict};
+    use crate::fem::{Loads, Scenario, simulate};
     use crate::material::law::{gent, mooney_rivlin, ogden};
     use crate::material::meta_model::MetaModel;
     use crate::mesh::{TetMesh, TriMesh};
@@ -266,15 +266,16 @@ mod tests {
         assert_eq!((fine.displacement_sd_mm[held], fine.displacement_95_mm[held]), (0.0, 0.0));
     }
 
+    /// Gravity and nothing else.
+    fn pulled(gravity_m_per_s2: [f64; 3]) -> Scenario {
+        let loads = Loads { gravity_m_per_s2, density_kg_per_m3: 300.0, ..Loads::default() };
+        Scenario { loads, ..settings().scenario() }
+    }
+
     #[test]
     fn a_turn_of_gravity_comes_back_with_the_modulus() {
         let mesh = block(3);
-        let mut scenario = settings().scenario();
-        scenario.loads = crate::fem::Loads {
-            gravity_m_per_s2: [0.0, 0.0, -9.81],
-            density_kg_per_m3: 300.0,
-            ..crate::fem::Loads::default()
-        };
+        let scenario = pulled([0.0, 0.0, -9.81]);
         let brain = Unknown::ShearModulus(Tissue::whole_brain().remove(0));
         let list = vec![brain, Unknown::GravityTurn(Turn::Nodding), Unknown::GravityTurn(Turn::Rolling)];
         let priors = [(7.0, 2.0), (0.0, 0.5), (0.0, 0.5)];
@@ -506,6 +507,21 @@ mod tests {
         let found = seen_by_a_model_of_a_push_from_above(Some([0.1, 0.0, 0.0]), |_| [0.0; 3]).outcome;
         assert!(!found.verdict.finding.has_stiffness(), "{:?}", found.verdict);
         assert!(found.shift.unwrap().seen, "{:?}", found.odds);
+    }
+
+    #[test]
+    fn a_body_that_lay_another_way_is_not_explained_and_the_way_it_went_is_named() {
+        let mesh = block(5);
+        let (upright, lying) = ([0.0, 0.0, -9.81], [-9.81, 0.0, 0.0]);
+        let truth = scenario_of(&pulled(lying), &settings().tissue_list(), &settings().reference_sample()).unwrap();
+        let observed = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
+        let found = |assumed| estimated(&mesh, &pulled(assumed), &observed, None).outcome.verdict;
+        let names_a_way = |verdict: &Verdict| verdict.reasons.iter().any(|r| matches!(r, Reason::OtherWayDown { .. }));
+        let wrong = found(upright);
+        assert!(!wrong.finding.has_stiffness() && names_a_way(&wrong), "{wrong:?}");
+        assert!(wrong.sentence.contains("towards the left side"), "{}", wrong.sentence);
+        let right = found(lying);
+        assert!(right.finding.has_stiffness() && !names_a_way(&right), "{right:?}");
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Head {
         (G * down).map(|x| x + 0.0).into()
     }
 
-    /// Gravity in the frame of the scanner that the patient lies in, m/s2: words are of that scanner's axes, as its table is level.
+    /// Gravity in the frame of the scanner that the patient lies in, m/s2: words are of its axes, which follow the patient.
     pub fn gravity_in_scanner_m_per_s2(&self) -> [f64; 3] {
         self.gravity_m_per_s2(&RigidTransform::identity())
     }

@@ -21,7 +21,8 @@ pub(super) fn brought_to_a_usual_size(data: &mut [f32]) -> Option<f32> {
     // Of a number below the smallest normal one the power would not be finite.
     let factor = (TARGET / top.max(f32::MIN_POSITIVE)).log2().floor().clamp(-126.0, 126.0).exp2();
     for x in data {
-        *x *= factor;
+        // A voxel out of all proportion stays a number.
+        *x = (*x * factor).clamp(f32::MIN, f32::MAX);
     }
     Some(factor)
 }
@@ -64,5 +65,8 @@ mod tests {
         let mut with_a_spike = scan();
         with_a_spike[7] = 1e30;
         assert_eq!(brought_to_a_usual_size(&mut with_a_spike), None);
+        let mut tiny: Vec<f32> = with_a_spike.iter().map(|x| x * 1e-30).collect();
+        tiny[7] = 1e30;
+        assert!(brought_to_a_usual_size(&mut tiny).is_some() && tiny.iter().all(|x| x.is_finite()));
     }
 }
