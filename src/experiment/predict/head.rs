@@ -152,6 +152,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_patient_on_the_back_is_pulled_towards_the_back_of_the_head_in_the_scanners_frame() {
+        let pull = |text: &str| text.parse::<Head>().unwrap().gravity_in_scanner_m_per_s2();
+        assert_eq!(pull("supine"), [0.0, -9.81, 0.0]);
+        assert_eq!([pull("left"), pull("sitting")], [[-9.81, 0.0, 0.0], [0.0, 0.0, -9.81]]);
+        assert_eq!(pull("0,-3,0"), pull("supine"));
+    }
+
+    #[test]
     fn one_way_to_lie_is_found_whatever_its_length_and_whatever_it_is_called() {
         let down = |y: f64| Head::Down([0.0, y, 0.0]);
         assert!(down(-1.0).is_same_as(&down(-2.0)) && !down(-1.0).is_same_as(&down(1.0)));

@@ -1,20 +1,18 @@
 //! Scans whose intensities do not begin at zero.
 
+use super::magnitude::some_above;
+
 /// Counts intensities that begin well below zero (standardised, or stored with an offset) from where they begin, and says
 /// where that was. Air is dark in magnitude images, and everything that reads a T1 takes zero for nothing.
 pub(super) fn counted_from_their_floor(data: &mut [f32]) -> Option<f32> {
     /// Interpolation undershoots edges by a few percent of the range: that is no floor.
     const UNDERSHOOT: f32 = 0.05;
-    /// So many values tell quantiles.
-    const ENOUGH: usize = 200_000;
     let lowest = data.iter().copied().fold(f32::INFINITY, f32::min);
     if lowest >= 0.0 {
         return None;
     }
     // Padding has the lowest value of all, however low, and says nothing of the rest.
-    let stride = data.len().div_ceil(ENOUGH).max(1);
-    let mut rest: Vec<f32> = data.iter().copied().step_by(stride).filter(|&x| x > lowest).collect();
-    rest.sort_unstable_by(f32::total_cmp);
+    let rest = some_above(data, lowest);
     let [floor, top] = [*rest.get(rest.len() / 100)?, *rest.get(rest.len() - 1 - rest.len() / 100)?];
     if floor >= -UNDERSHOOT * (top - floor) {
         return None;

@@ -9,11 +9,7 @@ const TARGET: f32 = 1024.0;
 /// large as a scanner's, and says which factor that was. A power of two changes no digit: the scan is the same in another unit,
 /// and what is compared with a small number anywhere means the same for all scans.
 pub(super) fn brought_to_a_usual_size(data: &mut [f32]) -> Option<f32> {
-    /// So many values tell a quantile.
-    const ENOUGH: usize = 200_000;
-    let stride = data.len().div_ceil(ENOUGH).max(1);
-    let mut positive: Vec<f32> = data.iter().copied().step_by(stride).filter(|&x| x > 0.0).collect();
-    positive.sort_unstable_by(f32::total_cmp);
+    let positive = some_above(data, 0.0);
     let top = *positive.get((positive.len() - positive.len() / 100).checked_sub(1)?)?;
     if USUAL.contains(&top) {
         return None;
@@ -25,6 +21,15 @@ pub(super) fn brought_to_a_usual_size(data: &mut [f32]) -> Option<f32> {
         *x = (*x * factor).clamp(f32::MIN, f32::MAX);
     }
     Some(factor)
+}
+
+/// Enough of the values above `least` to tell quantiles by, in order.
+pub(super) fn some_above(data: &[f32], least: f32) -> Vec<f32> {
+    const ENOUGH: usize = 200_000;
+    let stride = data.len().div_ceil(ENOUGH).max(1);
+    let mut some: Vec<f32> = data.iter().copied().step_by(stride).filter(|&x| x > least).collect();
+    some.sort_unstable_by(f32::total_cmp);
+    some
 }
 
 #[cfg(test)]
