@@ -47,6 +47,9 @@ const AROUND_MM: f64 = 2.0;
 /// before to as little as .09: there a part of it is found.
 const LEAST_BEYOND_BRIGHTER: f64 = 0.25;
 
+/// The tissue within this distance of the dark part is its wall, mm.
+const WALL_MM: f64 = 6.0;
+
 /// Both scans where the post-operative one was taken, the pre-operative one moved with the sag.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SaggedPair<'a> {
@@ -74,6 +77,9 @@ pub(super) struct WithBlood {
     pub cavity: Mask<Mni>,
     /// What has changed beside it and is left out, as oedema or contrast agent would explain it, cc.
     pub in_doubt_cc: f64,
+    /// Share of the wall of the dark part that has no folds to lose, or none that these scans show: blood there would have been
+    /// taken for tissue.
+    pub blind_share: f64,
 }
 
 /// The cavity with the blood that lies in it, found beside the dark part.
@@ -90,6 +96,11 @@ pub(super) fn with_blood(cavity: &Mask<Mni>, pair: &SaggedPair<'_>, settings: &C
     let floor = FLOOR * pair.grey_white_contrast.powi(2);
     let floor_of_change = floor + USUAL * usual.unwrap_or(0.0);
     let changed = both(&comparable, &left.less_by_blood(&left.tissue, LESS, floor_of_change));
+    let beside = |n: usize| to_cavity_mm.data[n] > 0.0 && f64::from(to_cavity_mm.data[n]) < WALL_MM;
+    let wall = Mask::from_fn(dark.grid, |n| comparable.data[n] && beside(n));
+    // Blood of one brightness leaves nothing, the tissue that was there at least its own folds.
+    let blind = left.folds.map(|square| LESS * (f64::from(square) + floor_of_change) <= floor_of_change);
+    let blind_share = both(&wall, &blind).count() as f64 / wall.count().max(1) as f64;
 
     // Between the dark part and the blood lies a rim of mixed voxels.
     let start = dilate(cavity, 1.0);
@@ -103,18 +114,19 @@ pub(super) fn with_blood(cavity: &Mask<Mni>, pair: &SaggedPair<'_>, settings: &C
     let found = both(&believed, &grown);
     let blood = both(&grown, &dilate(&found, 1.5));
     if blood.volume_cc() < settings.smallest_cc {
-        return WithBlood { cavity: cavity.clone(), in_doubt_cc: reached.volume_cc() };
+        return WithBlood { cavity: cavity.clone(), in_doubt_cc: reached.volume_cc(), blind_share };
     }
     let in_doubt_cc = reached.volume_cc() - found.volume_cc();
     // The carried brain can end short of the dark part where the sag is known least.
     let within = either(pair.brain, cavity);
     let settled = settled(&either(&blood, cavity), &within, settings.closing_mm);
     let cavity = both(&with_fluid_of(&settled, pair.tissue, settings.surroundings_mm), &within);
-    WithBlood { cavity, in_doubt_cc }
+    WithBlood { cavity, in_doubt_cc, blind_share }
 }
 
-/// What each account leaves of the second scan: mean squares over windows.
+/// What each account leaves of the second scan, and the folds that were there: mean squares over windows.
 struct Unexplained {
+    folds: Volume<f32, Mni>,
     tissue: Volume<f32, Mni>,
     oedema: Volume<f32, Mni>,
     brighter: Volume<f32, Mni>,
@@ -144,8 +156,9 @@ impl Unexplained {
             let by = mean_change.data[n].max(0.0);
             (tissue.data[n] - by * by).max(0.0)
         });
-        let blood = Volume::from_fn(before.grid, |n| (square.data[n] - mean.data[n] * mean.data[n]).max(0.0));
-        Self { tissue, oedema, brighter, blood }
+        let blood = variance(&square, &mean);
+        let folds = variance(&window.mean(&product(&before, &before)), &window.mean(&before));
+        Self { folds, tissue, oedema, brighter, blood }
     }
 
     /// Where blood leaves less than this share of what an account leaves.
@@ -199,6 +212,10 @@ fn gain_left(
     Window::new(&same, GAIN_MM).mean(&Volume::from_fn(before.grid, ratio)).map(f32::exp)
 }
 
+fn variance(square: &Volume<f32, Mni>, mean: &Volume<f32, Mni>) -> Volume<f32, Mni> {
+    Volume::from_fn(mean.grid, |n| (square.data[n] - mean.data[n] * mean.data[n]).max(0.0))
+}
+
 fn product(x: &Volume<f32, Mni>, y: &Volume<f32, Mni>) -> Volume<f32, Mni> {
     Volume::from_fn(x.grid, |n| x.data[n] * y.data[n])
 }
@@ -224,8 +241,17 @@ mod tests {
     /// Folds of grey and white matter with a ball of fluid of 12 mm at the origin, of which `shown` says what the second scan shows
     /// by the place and what was there; the cavity that is found beyond the ball and what is left in doubt, in cc.
     fn found_and_in_doubt_cc(shown: impl Fn(Point3<f64>, f32) -> f32 + Sync + Send) -> (f64, f64) {
+        let (found, ball_cc) = in_tissue(folds, shown);
+        (found.cavity.volume_cc() - ball_cc, found.in_doubt_cc)
+    }
+
+    /// The same in tissue that `was` so; with the volume of the ball, cc.
+    fn in_tissue(
+        was: impl Fn(Point3<f64>) -> f32 + Sync + Send,
+        shown: impl Fn(Point3<f64>, f32) -> f32 + Sync + Send,
+    ) -> (WithBlood, f64) {
         let grid = Grid::<Mni>::axis_aligned([64; 3], [1.0; 3], [-31.5; 3]);
-        let pre = Volume::from_fn(grid, |n| folds(at(&grid, n)));
+        let pre = Volume::from_fn(grid, |n| was(at(&grid, n)));
         let cavity = Mask::from_fn(grid, |n| at(&grid, n).coords.norm() < 12.0);
         let post = Volume::from_fn(grid, |n| if cavity.data[n] { FLUID } else { shown(at(&grid, n), pre.data[n]) });
         let all = cavity.map(|_| true);
@@ -239,8 +265,21 @@ mod tests {
             grey_mean: f64::from(GREY),
             grey_white_contrast: f64::from(WHITE - GREY),
         };
-        let found = with_blood(&cavity, &pair, &CavitySettings::default());
-        (found.cavity.volume_cc() - cavity.volume_cc(), found.in_doubt_cc)
+        (with_blood(&cavity, &pair, &CavitySettings::default()), cavity.volume_cc())
+    }
+
+    #[test]
+    fn where_no_folds_were_or_none_are_seen_blood_could_not_be_told() {
+        let blind =
+            |was: fn(Point3<f64>) -> f32, shown: fn(Point3<f64>, f32) -> f32| in_tissue(was, shown).0.blind_share;
+        assert!(blind(folds, |_, was| was) < 0.1);
+        assert_eq!(blind(|_| GREY, |_, was| was), 1.0);
+        // Oedema before the operation, on one side.
+        let half = blind(|p| if p.x > 0.0 { GREY } else { folds(p) }, |_, was| was);
+        assert!((0.4..0.6).contains(&half), "{half}");
+        // A second scan whose folds are elsewhere shows none of these.
+        let elsewhere = blind(folds, |p, _| folds(Point3::new(p.x + 4.0, p.y, p.z)));
+        assert_eq!(elsewhere, 1.0);
     }
 
     /// A pool below the ball, 22 mm wide.

@@ -258,7 +258,7 @@ pub fn take_pair_apart(
         let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, has_tissue, &settings.cavity);
         (finding, sag, cc)
     };
-    let mut changed_beside_cc = None;
+    let mut beside: Vec<SegmentWarning> = Vec::new();
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -276,7 +276,10 @@ pub fn take_pair_apart(
         };
         let with_blood = with_blood(&cavity, &pair, &settings.cavity);
         finding.cavity.paste(&with_blood.cavity, &near);
-        changed_beside_cc = Some(with_blood.in_doubt_cc).filter(|cc| *cc >= settings.cavity.smallest_cc);
+        let cc = with_blood.in_doubt_cc;
+        let percent = 100.0 * with_blood.blind_share;
+        beside.extend((cc >= settings.cavity.smallest_cc).then_some(SegmentWarning::ChangedBeside { cc }));
+        beside.extend((percent > NOTED_BLIND_WALL).then_some(SegmentWarning::BloodUntold { percent }));
     }
     let filled_before = undone(&finding.cavity, &sag);
     if given.resected.is_none() {
@@ -303,7 +306,7 @@ pub fn take_pair_apart(
     let unlike = likeness.filter(|found| !found.is_one_head());
     after.warnings.extend(unlike.map(|found| SegmentWarning::UnlikeScans { folds: found.folds }));
     after.warnings.extend(lost_elsewhere_cc.map(|cc| SegmentWarning::LostElsewhere { cc }));
-    after.warnings.extend(changed_beside_cc.map(|cc| SegmentWarning::ChangedBeside { cc }));
+    after.warnings.extend(beside);
     if computed {
         let percent = outside_percent(&filled_before, &before.brain_mni);
         after.warnings.extend((percent > NOTED_ABOVE_BRAIN).then_some(SegmentWarning::AboveSunkBrain { percent }));
@@ -423,6 +426,8 @@ const NEAR_MM: f64 = 25.0;
 const NOTED_AT_EDGE: f64 = 2.0;
 /// More of a cavity where, by the sag, no brain was is told, percent (docs/evidence/choices.md).
 const NOTED_ABOVE_BRAIN: f64 = 12.0;
+/// A cavity's wall along more of which blood could not be told is told of, percent (docs/evidence/synthetic-faults.md).
+const NOTED_BLIND_WALL: f64 = 90.0;
 
 /// The box around a mask with a margin; the whole grid for an empty mask.
 fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {

@@ -158,6 +158,16 @@ pub enum SegmentWarning {
         /// Volume, cc.
         cc: f64,
     },
+    /// Blood in the cavity could not be told from tissue.
+    #[error(
+        "along {percent:.0} % of the cavity's wall blood as bright as tissue would be taken for tissue: no folds were there before \
+         the operation, or the slices are too thick or too noisy to show them; where there is such blood, the cavity is found too \
+         small: look at it, and give a cavity mask"
+    )]
+    BloodUntold {
+        /// Share of the wall, percent.
+        percent: f64,
+    },
     /// A mask of the ventricles lies on tissue, or where none are.
     #[error(
         "of the ventricle mask {tissue_percent:.0} % is as bright as tissue and {far_percent:.0} % lies far from where the fitted \
