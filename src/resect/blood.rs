@@ -13,6 +13,7 @@ use crate::geometry::Mni;
 use crate::image::distance::distance_mm;
 use crate::image::morphology::dilate;
 use crate::image::{Mask, Volume};
+use crate::segment::SegmentWarning;
 
 /// Noise is smoothed with this first, mm; folds are wider.
 const NOISE_MM: f64 = 1.0;
@@ -49,6 +50,8 @@ const LEAST_BEYOND_BRIGHTER: f64 = 0.25;
 
 /// The tissue within this distance of the dark part is its wall, mm.
 const WALL_MM: f64 = 6.0;
+/// A wall along more of which blood could not be told is told of, percent (docs/evidence/synthetic-faults.md).
+const NOTED_BLIND_WALL: f64 = 90.0;
 
 /// Both scans where the post-operative one was taken, the pre-operative one moved with the sag.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +83,16 @@ pub(super) struct WithBlood {
     /// Share of the wall of the dark part that has no folds to lose, or none that these scans show: blood there would have been
     /// taken for tissue.
     pub blind_share: f64,
+}
+
+impl WithBlood {
+    /// What a reader should know: of a doubt from the size that a cavity must have.
+    pub fn told(&self, smallest_cc: f64) -> impl Iterator<Item = SegmentWarning> {
+        let (cc, percent) = (self.in_doubt_cc, 100.0 * self.blind_share);
+        let changed = (cc >= smallest_cc).then_some(SegmentWarning::ChangedBeside { cc });
+        let untold = (percent > NOTED_BLIND_WALL).then_some(SegmentWarning::BloodUntold { percent });
+        changed.into_iter().chain(untold)
+    }
 }
 
 /// The cavity with the blood that lies in it, found beside the dark part.
@@ -266,6 +279,17 @@ mod tests {
             grey_white_contrast: f64::from(WHITE - GREY),
         };
         (with_blood(&cavity, &pair, &CavitySettings::default()), cavity.volume_cc())
+    }
+
+    #[test]
+    fn doubt_is_told_from_the_least_size_of_a_cavity_and_a_blind_wall_from_nine_tenths() {
+        let told = |in_doubt_cc, blind_share| {
+            let cavity = Mask::from_fn(Grid::<Mni>::axis_aligned([2; 3], [1.0; 3], [0.0; 3]), |_| true);
+            WithBlood { cavity, in_doubt_cc, blind_share }.told(1.0).collect::<Vec<_>>()
+        };
+        assert_eq!(told(0.9, 0.89), []);
+        let both = [SegmentWarning::ChangedBeside { cc: 1.1 }, SegmentWarning::BloodUntold { percent: 95.0 }];
+        assert_eq!(told(1.1, 0.95), both);
     }
 
     #[test]

@@ -276,10 +276,7 @@ pub fn take_pair_apart(
         };
         let with_blood = with_blood(&cavity, &pair, &settings.cavity);
         finding.cavity.paste(&with_blood.cavity, &near);
-        let cc = with_blood.in_doubt_cc;
-        let percent = 100.0 * with_blood.blind_share;
-        beside.extend((cc >= settings.cavity.smallest_cc).then_some(SegmentWarning::ChangedBeside { cc }));
-        beside.extend((percent > NOTED_BLIND_WALL).then_some(SegmentWarning::BloodUntold { percent }));
+        beside.extend(with_blood.told(settings.cavity.smallest_cc));
     }
     let filled_before = undone(&finding.cavity, &sag);
     if given.resected.is_none() {
@@ -426,8 +423,6 @@ const NEAR_MM: f64 = 25.0;
 const NOTED_AT_EDGE: f64 = 2.0;
 /// More of a cavity where, by the sag, no brain was is told, percent (docs/evidence/choices.md).
 const NOTED_ABOVE_BRAIN: f64 = 12.0;
-/// A cavity's wall along more of which blood could not be told is told of, percent (docs/evidence/synthetic-faults.md).
-const NOTED_BLIND_WALL: f64 = 90.0;
 
 /// The box around a mask with a margin; the whole grid for an empty mask.
 fn around(mask: &Mask<Mni>, margin_mm: f64) -> VoxelBox {
