@@ -44,9 +44,7 @@ fn of_image(problem: &NiftiProblem) -> Option<&'static str> {
     match problem {
         NiftiProblem::SeveralVolumes { .. } | NiftiProblem::NoSuchVolume { .. } => Some("--volume N chooses"),
         NiftiProblem::NotMask { .. } => Some("see --dseg"),
-        NiftiProblem::NoSuchOrientation { .. } | NiftiProblem::OrientationsDisagree { .. } => {
-            Some("--prefer sform or --prefer qform chooses")
-        }
+        NiftiProblem::OrientationsDisagree { .. } => Some("--prefer sform or --prefer qform chooses"),
         _ => None,
     }
 }

@@ -1,6 +1,5 @@
 //! Why a NIfTI file is refused: always the file, the field and the remedy.
 
-use super::which::Orientation;
 use thiserror::Error;
 
 /// A refused file.
@@ -150,15 +149,6 @@ pub enum NiftiProblem {
          original DICOM again (dcm2niix) or set the orientation you are sure of"
     )]
     NoOrientation,
-    /// The preferred one of two affines is not there.
-    #[error(
-        "{wanted}_code is 0: {wanted} was asked for and the file has \
-         none; leave the choice out"
-    )]
-    NoSuchOrientation {
-        /// The orientation asked for.
-        wanted: Orientation,
-    },
     /// sform and qform put the voxels at different places.
     #[error(
         "sform and qform disagree by up to {difference_mm:.3} mm (allowed: {allowed_mm:.3} mm): choose the one you trust"

@@ -224,12 +224,15 @@ impl Header {
 
     /// Slope and intercept, (1, 0) where the header asks for none (slope 0 means that).
     pub fn scaling(&self) -> Result<(f64, f64), NiftiProblem> {
+        if self.scl_slope == 0.0 {
+            return Ok((1.0, 0.0));
+        }
         for (field, value) in [("scl_slope", self.scl_slope), ("scl_inter", self.scl_inter)] {
             if !value.is_finite() {
                 return Err(NiftiProblem::Scaling { field, value });
             }
         }
-        Ok(if self.scl_slope == 0.0 { (1.0, 0.0) } else { (self.scl_slope, self.scl_inter) })
+        Ok((self.scl_slope, self.scl_inter))
     }
 }
 

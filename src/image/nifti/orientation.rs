@@ -22,11 +22,8 @@ pub(super) fn grid(
     if !has_sform && !has_qform {
         return Err(NiftiProblem::NoOrientation);
     }
-    match prefer {
-        Some(wanted @ Orientation::Sform) if !has_sform => return Err(NiftiProblem::NoSuchOrientation { wanted }),
-        Some(wanted @ Orientation::Qform) if !has_qform => return Err(NiftiProblem::NoSuchOrientation { wanted }),
-        _ => {}
-    }
+    // The choice is asked for all files at once: one that has a single form leaves nothing to choose.
+    let prefer = prefer.filter(|_| has_sform && has_qform);
     for (n, axis) in ['i', 'j', 'k'].into_iter().enumerate() {
         check_spacing("pixdim", axis, header.pixdim[n + 1].abs())?;
         if header.pixdim[n + 1] < 0.0 {

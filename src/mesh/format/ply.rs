@@ -11,7 +11,7 @@ use crate::mesh::TriMesh;
 pub fn encode(surface: &TriMesh, fields: &[Field]) -> Result<Vec<u8>, WriteError> {
     check_fields(fields, surface.nodes_mm.len(), &["x", "y", "z"])?;
     let mut header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment mm, RAS+\nelement vertex {}\n\
+        "ply\nformat binary_little_endian 1.0\ncomment mm, SPACE=RAS\nelement vertex {}\n\
          property double x\nproperty double y\nproperty double z\n",
         surface.nodes_mm.len()
     );

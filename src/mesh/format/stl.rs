@@ -11,7 +11,7 @@ use crate::mesh::TriMesh;
 /// ```
 pub fn encode(surface: &TriMesh) -> Vec<u8> {
     // The header must not start with `solid`, which marks the text flavour.
-    let mut bytes = b"binary STL, mm, RAS+".to_vec();
+    let mut bytes = b"binary STL, mm, SPACE=RAS".to_vec();
     bytes.resize(80, b' ');
     bytes.extend((surface.triangles.len() as u32).to_le_bytes());
     for (t, triangle) in surface.triangles.iter().enumerate() {

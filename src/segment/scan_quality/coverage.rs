@@ -30,9 +30,10 @@ pub(super) fn coverage<F: Frame>(scan: &PosedScan<'_, F>, template_from_patient:
         template.nearest(there).is_some_and(|value| value > 0).then(|| Region::at(there))
     };
     let is_seen = |p: Position<Mni>| {
-        let at = scan.t1.grid.voxel_at(t1_from_mni.apply(p)).coords.map(f64::round);
+        let there = t1_from_mni.apply(p);
+        let at = scan.t1.grid.voxel_at(there).coords.map(f64::round);
         let inside = (0..3).all(|a| at[a] >= 0.0 && at[a] < scan.t1.grid.dims[a] as f64);
-        inside && !lost.iter().any(|gap| gap.slices.contains(&(at[gap.axis] as usize)))
+        inside && scan.is_taken(there) && !lost.iter().any(|gap| gap.slices.contains(&(at[gap.axis] as usize)))
     };
     let of_slice = |k: usize| {
         let mut counts: Counts = Default::default();

@@ -7,7 +7,7 @@ use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
 use crate::geometry::{Frame, Mni};
 use crate::image::nifti::{self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
-use crate::image::{LabelMap, Mask, Volume};
+use crate::image::{LabelMap, Mask, Padding, Volume};
 use crate::layout::{
     CAVITY, NATIVE_CAVITY, NATIVE_RESECTED, POST_BRAIN, POST_NATIVE_BRAIN, POST_T1, POST_VENTRICLE, PRE_BRAIN,
     PRE_EVEN_T1, PRE_LABELS, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PRE_NATIVE_T1, PRE_T1, RESECTED, SAG,
@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 30;
+const VERSION: u32 = 31;
 const NAME: StageName = StageName::Anat;
 
 /// What the report says of the masks.
@@ -36,6 +36,9 @@ pub struct AnatFacts {
     pub volumes: ResectionVolumes,
     /// Hemisphere of the resection.
     pub side: Side,
+    /// What the scan after the operation was filled up with where it was not taken, on its own grid.
+    #[serde(default)]
+    pub post_filled_up: Vec<Padding>,
     /// Largest voxel edge of either scan, mm.
     pub coarsest_voxel_mm: f64,
     /// How good the scans are.
@@ -214,6 +217,7 @@ pub(crate) fn anat(
                 midline_shift_mm: midline_shift_mm(&sag.subject_from_atlas, &template_from_patient),
             },
             side: found.side,
+            post_filled_up: post.filled_up().to_vec(),
             coarsest_voxel_mm: spacing.fold(0.0, f64::max),
             scans: quality,
             implausible: before
@@ -230,13 +234,51 @@ pub(crate) fn anat(
 
 /// Intensities as 16-bit whole numbers, the brightest as 32,000: rounding is far below the noise of the scan that is registered again.
 fn sixteen_bits(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
-    let highest = volume.data.iter().copied().fold(1e-6f32, f32::max);
+    let highest = brightest(volume).max(1e-6);
     volume.map(|x| (x * (32000.0 / highest)).round().clamp(0.0, 32000.0) as i16)
+}
+
+/// The largest intensity, but for voxels out of all proportion: beside one a brain would have no grey levels left.
+fn brightest(volume: &Volume<f32, Mni>) -> f32 {
+    /// What nearly all of a head is no brighter than, and how many times as bright a vessel, fat or skin under a coil may be.
+    const NEARLY_ALL: f64 = 0.999;
+    const IN_PROPORTION: f32 = 8.0;
+    let mut shown: Vec<f32> = volume.data.iter().copied().filter(|x| *x > 0.0).collect();
+    let highest = shown.iter().copied().fold(0.0f32, f32::max);
+    let rank = (NEARLY_ALL * shown.len() as f64) as usize;
+    if rank >= shown.len() {
+        return highest;
+    }
+    let (_, usual, _) = shown.select_nth_unstable_by(rank, f32::total_cmp);
+    highest.min(IN_PROPORTION * *usual)
 }
 
 /// Intensities as 16-bit whole numbers, scaled so that the brightest keeps three digits.
 pub(super) fn whole_numbers(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
-    let highest = volume.data.iter().copied().fold(0.0f32, f32::max);
+    let highest = brightest(volume);
     let scale = if (500.0..32000.0).contains(&highest) { 1.0 } else { 4000.0 / highest.max(1e-6) };
     volume.map(|x| (x * scale).round().clamp(0.0, 32000.0) as i16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    #[test]
+    fn one_voxel_out_of_proportion_leaves_the_others_their_grey_levels() {
+        let grid = Grid::<Mni>::axis_aligned([20; 3], [1.0; 3], [0.0; 3]);
+        let plain = Volume::from_fn(grid, |n| 20.0 + (n % 150) as f32);
+        for brightest in [600.0, 1e6] {
+            let mut spiked = plain.clone();
+            spiked.data[77] = brightest;
+            for written in [whole_numbers(&spiked), sixteen_bits(&spiked)] {
+                let mut levels = written.data.clone();
+                levels.sort_unstable();
+                levels.dedup();
+                assert!(levels.len() >= 150, "{brightest}: {}", levels.len());
+            }
+        }
+        assert_eq!(sixteen_bits(&plain).data.iter().max(), Some(&32000));
+    }
 }

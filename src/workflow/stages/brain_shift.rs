@@ -1,6 +1,6 @@
 //! The registration behind the displacement of a patient's brain, with the images it looked at, as a case's files hold them.
 
-use super::anat::Anatomy;
+use super::anat::{AnatFacts, Anatomy};
 use super::registration::transforms;
 use crate::experiment::estimate::ReRegistration;
 use crate::geometry::{Mni, Post};
@@ -16,6 +16,7 @@ use crate::segment::label;
 use crate::workflow::Settings;
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::stage_name::StageName;
 
 /// How far the wall of a ventricle reaches into an image's fluid, mm (docs/evidence/choices.md).
 const WALL_MM: f64 = 2.0;
@@ -51,8 +52,15 @@ impl SeenShift {
         let on_post: Volume<f32, Post> = on_post.map(f32::from).relabelled();
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         let post_from_mni = pre_from_post.then(&mni_from_pre).inverse().to_affine();
-        let post_known = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
+        let covered = resample(&on_post, &pre.grid, &post_from_mni, Interpolation::Nearest, 0.0).inside;
         let post: Volume<f32, Mni> = nifti::decode(&case.read(POST_T1)?, POST_T1, &options)?.volume.relabelled();
+        // What the scan was filled up with is as little of it as what lies beyond its grid.
+        let (_, AnatFacts { post_filled_up, .. }) = case.stage(&StageName::Anat)?;
+        let taken = |n: usize| {
+            let there = on_post.grid.voxel_at(post_from_mni.apply(pre.grid.centre(pre.grid.voxel(n))));
+            !post_filled_up.iter().any(|padding| padding.contains(there.into()))
+        };
+        let post_known = Mask::from_fn(pre.grid, |n| covered.data[n] && (post_filled_up.is_empty() || taken(n)));
         let (pre_brain, cavity) = (pre_brain.relabelled(), anatomy.cavity);
         let scans =
             SagScans { pre: &pre, pre_brain: &pre_brain, post: &post, post_known: &post_known, cavity: &cavity };

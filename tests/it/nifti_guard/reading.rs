@@ -60,6 +60,11 @@ fn every_real_data_type_is_read_with_its_scaling() {
         }
     }
     // Slope 0 means: not scaled, whatever the intercept.
+    // A slope of 0 asks for no scaling, whatever stands beside it.
+    assert_eq!(
+        read(&File::with(|f| (f.slope, f.inter) = (0.0, f64::NAN))).volume,
+        read(&File::with(|f| f.slope = 0.0)).volume
+    );
     let plain = read(&File::with(|f| (f.slope, f.inter) = (0.0, 55.0)));
     assert_eq!(plain.volume.data[5], 5.0);
 }
