@@ -209,6 +209,16 @@ pub enum Reason {
     LevelAssumed,
     /// The descent was not finished.
     NotConverged,
+    /// How the body answers to a shape a little other than it was taken to be could not be found.
+    ShapeTakenAsExact {
+        /// How many of the amounts by which it may be off.
+        amounts: usize,
+    },
+    /// Another model could not be solved: it is neither refuted nor borne out.
+    NotCompared {
+        /// The model.
+        model: String,
+    },
 }
 
 /// A modulus for readers: three digits, thousands apart.
@@ -298,7 +308,13 @@ impl Reason {
             Self::LevelAssumed => {
                 "gravity alone fixes only modulus / weight: the moduli are as good as the fluid's level assumed".to_owned()
             }
-            Self::NotConverged => "the iterations ran out before the minimum was reached".to_owned(),
+            Self::NotConverged => "the search ended before the minimum was reached".to_owned(),
+            Self::ShapeTakenAsExact { amounts } => format!(
+                "{amounts} of the amounts by which outline and supports may be off could not be solved: the intervals take them as exact"
+            ),
+            Self::NotCompared { model } => {
+                format!("{model} could not be solved: whether it explains the shift as well is not known")
+            }
         }
     }
 }
@@ -357,6 +373,14 @@ impl Verdict {
     ) -> Self {
         let sentence = sentence(finding, explained_share, &moduli, &reasons);
         Self { finding, sentence, explained_share, moduli, reasons }
+    }
+
+    /// Beside models that could not be solved: a stiffness that is claimed has not been compared with theirs.
+    #[must_use]
+    pub fn beside_unsolved(mut self, models: impl Iterator<Item = String>) -> Self {
+        let claims = self.finding.has_stiffness();
+        self.reasons.extend(models.filter(|_| claims).map(|model| Reason::NotCompared { model }));
+        Self::new(self.finding, self.explained_share, self.moduli, self.reasons)
     }
 
     /// The reasons in sentences.
@@ -496,6 +520,17 @@ mod tests {
             let verdict = Verdict::new(finding, Some(0.97), vec![interval("grey_matter", 1170.0)], reasons.clone());
             assert!(finding.has_stiffness() && verdict.sentence.contains("rey matter 1,170 Pa (936 to 1,460)"));
         }
+    }
+
+    #[test]
+    fn a_model_that_could_not_be_solved_is_named_where_a_stiffness_is_claimed() {
+        let of = |finding| {
+            let interval = Claim::Interval { mode_pa: 1000.0, interval_95_pa: [800.0, 1250.0] };
+            let alone = Verdict::new(finding, Some(0.99), vec![("grey_matter".to_owned(), interval)], Vec::new());
+            alone.beside_unsolved(std::iter::once("supports sliding".to_owned())).because()
+        };
+        assert!(of(Finding::Identified)[0].starts_with("supports sliding could not be solved"));
+        assert_eq!(of(Finding::NoShift), Vec::<String>::new());
     }
 
     #[test]

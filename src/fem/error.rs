@@ -87,6 +87,11 @@ pub enum FemError {
     )]
     UnstableState,
     #[error(
+        "how the body depends on its parameters could not be solved for at this state (a residual of {residual:.1e} is left): give a \
+         Poisson's ratio farther from 0.5 or walls that are less stiff"
+    )]
+    NoSensitivity { residual: f64 },
+    #[error(
         "the motion stops at {time_s:.4} s: {reason}; the worst element is cell {cell} (volume ratio {jacobian:.3}). \
          Shorten `dynamics.time_step_s` or lower the load"
     )]
@@ -101,7 +106,10 @@ pub enum FemError {
 impl FemError {
     /// Whether the input is at fault, not the physics.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::NoEquilibrium { .. } | Self::NoMotion { .. } | Self::UnstableState)
+        !matches!(
+            self,
+            Self::NoEquilibrium { .. } | Self::NoMotion { .. } | Self::UnstableState | Self::NoSensitivity { .. }
+        )
     }
 
     pub(super) fn unknown_set(mesh: &TetMesh, set: &str) -> Self {

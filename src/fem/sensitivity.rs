@@ -54,6 +54,10 @@ const STEP: f64 = 1.0 / 512.0;
 /// How good tangent solves are where nothing else is asked.
 const TOLERANCE: Within = Within::Residual(1e-10);
 
+/// Relative residual of a system that would not be solved any better, up to which its answer is taken all the same: a step of a
+/// descent, a Fisher matrix and an interval are no better themselves.
+const GOOD_ENOUGH: f64 = 1e-4;
+
 impl Model {
     /// du / dln(parameter) at an equilibrium, mm per unit of the logarithm: one vector per node for each entry of
     /// `by`. `materials` are those the state was solved with.
@@ -152,7 +156,20 @@ impl<'a> Linearised<'a> {
     fn solve(&mut self, rhs: &[[f64; 3]], within: Within) -> Result<Vec<[f64; 3]>, FemError> {
         let mut x = vec![[0.0; 3]; rhs.len()];
         let report = self.solver.solve(&self.tangent, rhs, &mut x, within);
-        if report.negative_curvature { Err(FemError::UnstableState) } else { Ok(x) }
+        if report.negative_curvature {
+            return Err(FemError::UnstableState);
+        }
+        if !report.reached {
+            // Nothing comes after this solve that would mend what it leaves.
+            let mut left = vec![[0.0; 3]; rhs.len()];
+            self.tangent.product(&x, &mut left);
+            left.iter_mut().zip(rhs).for_each(|(l, b)| (0..3).for_each(|i| l[i] -= b[i]));
+            let residual = reduce::norm(&left) / reduce::norm(rhs);
+            if residual.is_nan() || residual > GOOD_ENOUGH {
+                return Err(FemError::NoSensitivity { residual });
+            }
+        }
+        Ok(x)
     }
 
     /// -dR / dln(parameter) on all nodes, N.
@@ -278,4 +295,51 @@ fn derivative(
     }
     let far = slope(2.0 * step)?;
     Ok(near.iter().zip(&far).map(|(n, f)| [0, 1, 2].map(|i| (4.0 * n[i] - f[i]) / 3.0)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::linear::LinearReport;
+    use super::super::manufactured::cube;
+    use super::*;
+    use crate::fem::Scenario;
+
+    /// A solver that gives up with this part of the answer.
+    struct GivesUp {
+        with: f64,
+        solver: Box<dyn LinearSolver>,
+    }
+
+    impl LinearSolver for GivesUp {
+        fn prepare(&mut self, tangent: &Tangent) {
+            self.solver.prepare(tangent);
+        }
+
+        fn solve(&mut self, tangent: &Tangent, rhs: &[[f64; 3]], x: &mut [[f64; 3]], within: Within) -> LinearReport {
+            let report = self.solver.solve(tangent, rhs, x, within);
+            x.iter_mut().flatten().for_each(|v| *v *= self.with);
+            LinearReport { reached: false, ..report }
+        }
+    }
+
+    #[test]
+    fn what_a_solver_gives_up_on_is_no_sensitivity() {
+        let scenario = Scenario::from_toml(
+            "fixed = ['faces']\n[materials.grey_matter]\nlaw = 'neo-hookean'\nshear_modulus_pa = 1000.0\npoisson_ratio = 0.45\n\
+             [loads]\ngravity_m_per_s2 = [0.0, 0.0, -9.81]\ndensity_kg_per_m3 = 100.0\n",
+        )
+        .unwrap();
+        let mesh = cube(3);
+        let model = Model::new(&mesh, &scenario).unwrap();
+        let state = model.state(&vec![[0.0; 3]; mesh.nodes_mm().len()]).unwrap();
+        let solved = |with: f64| {
+            let mut at = Linearised::new(&model, &scenario.materials, &state).unwrap();
+            let rhs = model.free_part(&at.driving_force(&By::Load(Load::Weight)).unwrap());
+            let solver = std::mem::replace(&mut at.solver, solver::for_model(&model, 0.0));
+            at.solver = Box::new(GivesUp { with, solver });
+            at.solve(&rhs, TOLERANCE)
+        };
+        assert!(solved(1.0).is_ok(), "as good as it can be");
+        assert!(matches!(solved(0.9), Err(FemError::NoSensitivity { residual }) if (residual - 0.1).abs() < 1e-6));
+    }
 }

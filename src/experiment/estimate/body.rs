@@ -151,6 +151,11 @@ impl<'a> Body<'a> {
         self.mesh
     }
 
+    /// Which of the unknowns are shear moduli.
+    pub(super) fn are_moduli(&self) -> Vec<bool> {
+        self.unknowns.iter().map(|unknown| matches!(unknown, Unknown::ShearModulus(_))).collect()
+    }
+
     /// Compares with another observation from now on.
     pub(super) fn observe(&mut self, observation: Observation) {
         self.observation = observation;

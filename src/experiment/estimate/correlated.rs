@@ -1,20 +1,23 @@
 //! The fit to displacements whose errors are alike over a distance, with what no model of the body explains: a rigid
 //! remainder and a smooth discrepancy, so that the intervals are as wide as the model is wrong.
 
-use super::body::{Body, Observation};
+use super::body::{Body, Observation, Solved};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
 use super::nuisance::{Nuisance, Weighted};
+use super::posterior::Z_95_ONE_SIDED;
 use super::process::{Factor, Process, spread_out};
 use super::projection::Projection;
 use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes};
 use super::shape::{Shape, ShapeColumns, ShapeFound};
+use super::softest::softest;
 use super::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
 };
 use crate::experiment::rmse::root_mean_square;
 use crate::experiment::verdict::{CONTRADICTION_SD, STRONG};
+use crate::fem::Outcome;
 use nalgebra::{DMatrix, DVector};
 
 /// What is known of the errors of displacements beforehand.
@@ -39,9 +42,6 @@ const SETTLING: usize = 3;
 /// How many times more the instrument is shown the state where that has since moved by more than the noise: its own error
 /// is about a tenth of what it is shown.
 const AGAIN: usize = 2;
-
-/// One-sided 95 % of a Gaussian.
-const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
 
 /// A fit under way: the model, the places looked at, and the points where it was linearised.
 struct Fit<'b, 'a> {
@@ -166,7 +166,6 @@ pub(super) fn fit(
     let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
     let moved = above_noise(&seen_mm, errors.noise);
     let nuisance = Nuisance::rigid(&rigid);
-    // A body moved a little that has no equilibrium says nothing of what its shape does: then it is taken as it is.
     let shape = shape.filter(|_| moved).and_then(|shape| shape.columns(start, &places_mm));
     let nuisance = match &shape {
         Some(shape) => nuisance.with(&shape.columns_mm, shape.priors()),
@@ -330,8 +329,8 @@ impl Fit<'_, '_> {
         // prior's most probable one says what it would do.
         let seen_at_all = odds.moved_to_still > STRONG && above_noise(&seen_mm, errors.noise);
         let usual: Vec<f64> = self.prior[..self.own].iter().map(|p| p.mean).collect();
-        let body = if seen_at_all { &descent.log_parameters[..self.own] } else { &usual };
-        let pattern_mm = self.body.solve(body)?.outcome.displacement_mm;
+        let at = if seen_at_all { descent.log_parameters[..self.own].to_vec() } else { self.body.start(&usual) };
+        let Solved { outcome: Outcome { displacement_mm: pattern_mm, .. }, sensitivities } = self.body.solve(&at)?;
         let pattern = flat(&|n| pattern_mm[seen[n].0 as usize]);
         // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
         let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
@@ -348,6 +347,13 @@ impl Fit<'_, '_> {
         });
         // What may pass for noise is not ruled out, however little of it the seen displacement looks like.
         let passes_for_noise = least_share_above_noise(&pattern, errors.noise);
+        let largest_share =
+            size.filter(|_| !seen_at_all).map(|(share, sd)| passes_for_noise.max(share.max(0.0) + Z_95_ONE_SIDED * sd));
+        let changes = |s: &Vec<[f64; 3]>| pattern.dot(&flat(&|n| s[seen[n].0 as usize])) / pattern.norm_squared();
+        let softest = largest_share.map_or_else(Vec::new, |share| {
+            let slopes: Vec<f64> = sensitivities.iter().map(changes).collect();
+            softest(share, &at, &slopes, &self.prior[..self.own], &self.body.are_moduli())
+        });
         let (remainder, of_shape) = descent.log_parameters[self.own..].split_at(RIGID);
         let remainder = rigid * DVector::from_column_slice(remainder);
         let residuals = &descent.linearisation.residuals_mm;
@@ -366,6 +372,7 @@ impl Fit<'_, '_> {
             odds,
             rigid_remainder_mm: rms(&remainder),
             shape: self.shape.as_ref().map_or_else(ShapeFound::default, |shape| shape.found(of_shape)),
+            softest,
             seen_mean_mm: std::array::from_fn(|axis| {
                 seen_mm.iter().skip(axis).step_by(3).sum::<f64>() / seen.len().max(1) as f64
             }),
@@ -378,9 +385,7 @@ impl Fit<'_, '_> {
                     0.0
                 },
                 would_be_seen_mm: size.map_or(0.0, |(_, sd)| largest_mm * passes_for_noise.max(CONTRADICTION_SD * sd)),
-                largest_share: size
-                    .filter(|_| !seen_at_all)
-                    .map(|(share, sd)| passes_for_noise.max(share.max(0.0) + Z_95_ONE_SIDED * sd)),
+                largest_share,
             },
         })
     }

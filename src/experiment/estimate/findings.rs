@@ -103,6 +103,8 @@ pub struct Findings {
     pub shape: ShapeFound,
     /// The shift.
     pub shift: Shift,
+    /// Where nothing was seen to move: how soft each parameter's tissue may be (logarithm), where that is bounded.
+    pub softest: Vec<Option<f64>>,
     /// Mean of the displacement seen, mm.
     pub seen_mean_mm: [f64; 3],
     /// The places that were looked at, mm, and their nodes.

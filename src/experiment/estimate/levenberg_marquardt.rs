@@ -84,10 +84,20 @@ pub enum Convergence {
     StepBelowTolerance,
     /// No step, however short, lowered the cost: the residuals' own precision is reached.
     NoDescent,
+    /// The same far from the minimum: what the sensitivities promise is not what the model does, or it has no equilibrium there.
+    /// The figures are the best found, not a minimum.
+    Stalled,
     /// The iterations ran out: the figures are the best found, not a minimum.
     IterationsExhausted,
     /// Nothing was seen to move: there is no minimum to be looked for, and the figures are the prior's.
     NotSought,
+}
+
+impl Convergence {
+    /// Whether what was found is no minimum, though one was looked for.
+    pub fn is_unfinished(self) -> bool {
+        matches!(self, Self::Stalled | Self::IterationsExhausted)
+    }
 }
 
 /// The best point found and the way there.
@@ -170,10 +180,14 @@ pub fn estimate<M: Forward>(
     let (mut evaluations, mut damping) = (1, 1e-3);
     let mut convergence = Convergence::IterationsExhausted;
     'descent: for _ in 0..settings.iterations {
-        let (mut refused, mut undamped) = (0, None);
+        let mut refused = 0;
         let jt = here.jacobian_mm.transpose();
         let gradient = &jt * &here.residuals_mm * weight + &precision * (&theta - &mean);
         let hessian = &jt * &here.jacobian_mm * weight + &precision;
+        // From the minimum as the linearisation sees it, in standard deviations; unknown where that has none.
+        let away =
+            hessian.clone().cholesky().map_or(f64::INFINITY, |f| f.solve(&gradient).dot(&gradient).max(0.0).sqrt());
+        let no_further = if away < NEAR { Convergence::NoDescent } else { Convergence::Stalled };
         loop {
             let scale = hessian.diagonal().map(|d| d.max(1e-12)) * damping;
             let damped = &hessian + DMatrix::from_diagonal(&scale);
@@ -181,7 +195,7 @@ pub fn estimate<M: Forward>(
                 damping *= 10.0;
                 // Numbers that are none (a noise of 0) have no factor, however damped.
                 if damping > 1e8 {
-                    convergence = Convergence::NoDescent;
+                    convergence = no_further;
                     break 'descent;
                 }
                 continue;
@@ -193,14 +207,15 @@ pub fn estimate<M: Forward>(
                 step *= settings.longest_step / longest;
             }
             // A damped step is short without being at the minimum.
-            let arrived = damping <= 1e-3 && decrement < settings.decrement_tolerance;
+            let undamped = damping <= 1e-3;
+            let arrived = undamped && decrement < settings.decrement_tolerance;
             if arrived || step.amax() < settings.step_tolerance {
-                convergence = Convergence::StepBelowTolerance;
+                let found = undamped || away < NEAR;
+                convergence = if found { Convergence::StepBelowTolerance } else { Convergence::Stalled };
                 break 'descent;
             }
             // So near the minimum the linearisation holds, and steps that it promises to lower the cost and that do not are
             // lost in the residuals' own precision (walls come and go between two equilibria).
-            let away = *undamped.get_or_insert(decrement);
             if refused >= MOST_REFUSED && away < NEAR {
                 convergence = Convergence::NoDescent;
                 break 'descent;
@@ -224,7 +239,7 @@ pub fn estimate<M: Forward>(
             refused += 1;
             damping *= 10.0;
             if damping > 1e8 {
-                convergence = Convergence::NoDescent;
+                convergence = no_further;
                 break 'descent;
             }
         }
@@ -290,6 +305,42 @@ mod tests {
         let information = &jt * &fine.linearisation.jacobian_mm / 0.01;
         let away = DVector::from_fn(2, |p, _| rough.log_parameters[p] - fine.log_parameters[p]);
         assert!(away.dot(&(&information * &away)).sqrt() < NEAR);
+    }
+
+    /// A model with an end, beyond which it has no equilibrium.
+    struct Folding {
+        model: Compliance,
+        softest: f64,
+    }
+
+    impl Forward for Folding {
+        type Error = String;
+        fn linearise(&mut self, log: &[f64]) -> Result<Linearisation, String> {
+            if log[0] < self.softest { Err("folded".to_owned()) } else { self.model.linearise(log) }
+        }
+    }
+
+    #[test]
+    fn a_descent_that_ends_before_the_minimum_says_so() {
+        let settings = EstimateSettings { noise_mm: 0.1, ..EstimateSettings::default() };
+        let model = || Compliance { observed: simulate(&[1.3, 0.4]) };
+        let ended = |softest| {
+            let mut model = Folding { model: model(), softest };
+            estimate(&mut model, &no_prior(), &[3.0, 0.4], &settings).unwrap().convergence
+        };
+        assert_eq!(ended(2.0), Convergence::Stalled);
+        assert_eq!(ended(0.0), Convergence::StepBelowTolerance);
+        // Sensitivities of the wrong sign.
+        struct Backwards(Compliance);
+        impl Forward for Backwards {
+            type Error = String;
+            fn linearise(&mut self, log: &[f64]) -> Result<Linearisation, String> {
+                let found = self.0.linearise(log)?;
+                Ok(Linearisation { jacobian_mm: -found.jacobian_mm, ..found })
+            }
+        }
+        let wrong = estimate(&mut Backwards(model()), &no_prior(), &[3.0, 0.4], &settings).unwrap().convergence;
+        assert!(wrong.is_unfinished(), "{wrong:?}");
     }
 
     fn no_prior() -> Vec<LogPrior> {

@@ -25,6 +25,7 @@ mod projection;
 mod re_registration;
 mod rigid_remainder;
 mod shape;
+mod softest;
 mod solve;
 mod spread;
 mod support_edge;

@@ -135,6 +135,7 @@ impl Estimate {
         self.state.strain_energy_density_pa.fill(0.0);
         self.state.contact.clear();
         self.state.contact_pressure_pa.clear();
+        self.state.warnings.clear();
         // The reach is 1.96 standard deviations of one of three components.
         self.displacement_sd_mm.fill(reach_mm * 3f64.sqrt() / Z_95);
         self.displacement_95_mm.fill(reach_mm);

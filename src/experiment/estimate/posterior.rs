@@ -61,6 +61,9 @@ const LITTLE: f64 = 0.7;
 /// Two-sided 95 % of a Gaussian.
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
+/// One-sided 95 % of a Gaussian.
+pub(super) const Z_95_ONE_SIDED: f64 = 1.644_853_626_951_472_7;
+
 /// What the data alone say of the first `own` parameters: J^T J of independent residuals of standard deviation 1, the other
 /// parameters (of these precisions) integrated out.
 pub fn information(jacobian: &DMatrix<f64>, own: usize, others: &[f64]) -> DMatrix<f64> {
@@ -105,12 +108,36 @@ pub fn joint_precision(prior: &[LogPrior]) -> DMatrix<f64> {
     precision
 }
 
+/// What the data say of every parameter whose covariance with the priors is this, whatever it was widened by since.
+fn knowledge(covariance: &DMatrix<f64>, prior: &[LogPrior]) -> Vec<Knowledge> {
+    // Without the prior that is in it; a covariance as wide as the prior leaves nothing that the data would say.
+    let data = invert(covariance) - joint_precision(prior);
+    let data_only = invert(&data);
+    // A person may be anybody: whether the data say anything is asked of the average of the studies.
+    let average: Vec<LogPrior> = prior.iter().map(LogPrior::of_average).collect();
+    let from_average = invert(&(data + joint_precision(&average)));
+    let sd = |variances: &DMatrix<f64>, p: usize| variances[(p, p)].max(0.0).sqrt();
+    let of = |(p, prior): (usize, &LogPrior)| {
+        // A parameter that goes along with another is known better once that one is: what the data leave of its own
+        // prior is asked as well.
+        let as_before = prior.sd.is_some_and(|before| sd(covariance, p) > LITTLE * before);
+        match average[p].sd {
+            Some(_) if as_before => Knowledge::PriorDominated,
+            Some(before) if sd(&from_average, p) > LITTLE * before => Knowledge::PriorDominated,
+            Some(_) => Knowledge::Identified,
+            // Written so that an infinite or NaN variance is not identifiable.
+            None if Z_95 * sd(&data_only, p) <= 10f64.ln() => Knowledge::Identified,
+            None => Knowledge::NotIdentifiable,
+        }
+    };
+    prior.iter().enumerate().map(of).collect()
+}
+
 /// The Laplace posterior at a minimum; `fisher` is what the data alone say there ([`information`]).
 pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]) -> Posterior {
     let n = prior.len();
     let precision = joint_precision(prior);
     let covariance = invert(&(fisher + &precision));
-    let data_only = invert(fisher);
 
     let eigen = SymmetricEigen::new(fisher.clone());
     let least = eigen.eigenvalues.imin();
@@ -123,23 +150,6 @@ pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]
 
     let log_sd: Vec<f64> = (0..n).map(|p| covariance[(p, p)].max(0.0).sqrt()).collect();
     let at = |p: usize, z: f64| prior[p].scale.value(log_parameters[p] + z * log_sd[p]);
-    // A person may be anybody: whether the data say anything is asked of the average of the studies.
-    let average: Vec<LogPrior> = prior.iter().map(LogPrior::of_average).collect();
-    let from_average = invert(&(fisher + joint_precision(&average)));
-    let verdict = |p: usize| {
-        let sd = data_only[(p, p)].max(0.0).sqrt();
-        // A parameter that goes along with another is known better once that one is: what the data leave of its own
-        // prior is asked as well.
-        let as_before = prior[p].sd.is_some_and(|sd| log_sd[p] > LITTLE * sd);
-        match average[p].sd {
-            Some(_) if as_before => Knowledge::PriorDominated,
-            Some(sd) if from_average[(p, p)].max(0.0).sqrt() > LITTLE * sd => Knowledge::PriorDominated,
-            Some(_) => Knowledge::Identified,
-            // Written so that an infinite or NaN variance is not identifiable.
-            None if Z_95 * sd <= 10f64.ln() => Knowledge::Identified,
-            None => Knowledge::NotIdentifiable,
-        }
-    };
     let correlation = |r: usize, c: usize| {
         let scale = (fisher[(r, r)] * fisher[(c, c)]).sqrt();
         if scale > 0.0 { fisher[(r, c)] / scale } else { 0.0 }
@@ -151,7 +161,7 @@ pub fn laplace(log_parameters: &[f64], fisher: &DMatrix<f64>, prior: &[LogPrior]
         interval_95: (0..n).map(|p| [at(p, -Z_95), at(p, Z_95)]).collect(),
         log_covariance: rows(&|r, c| covariance[(r, c)]),
         identifiability: Identifiability {
-            verdicts: (0..n).map(verdict).collect(),
+            verdicts: knowledge(&covariance, prior),
             sensitivity_correlation: rows(&correlation),
             condition: if lowest > 0.0 { highest / lowest } else { f64::MAX },
             valley,
@@ -198,6 +208,13 @@ impl Posterior {
             self.log_sd[p] = self.log_covariance[p][p].sqrt();
             self.interval_95[p] = [-Z_95, Z_95].map(|z| prior[p].scale.value(values[p] + z * self.log_sd[p]));
         }
+        self.judged(prior)
+    }
+
+    /// With what its covariance, as wide as it is now, leaves the data to say.
+    fn judged(mut self, prior: &[LogPrior]) -> Self {
+        let covariance = DMatrix::from_fn(prior.len(), prior.len(), |r, c| self.log_covariance[r][c]);
+        self.identifiability.verdicts = knowledge(&covariance, prior);
         self
     }
 
@@ -210,7 +227,7 @@ impl Posterior {
             self.log_sd[p] = self.log_covariance[p][p].sqrt();
             self.interval_95[p] = [-Z_95, Z_95].map(|z| prior[p].scale.value(values[p] + z * self.log_sd[p]));
         }
-        self
+        self.judged(prior)
     }
 }
 
@@ -285,6 +302,16 @@ mod tests {
         let posterior = of(DMatrix::zeros(25, 1), &[prior(Some(0.4))]);
         assert!((posterior.log_sd[0] - 0.4).abs() < 1e-9);
         assert_eq!(posterior.identifiability.verdicts, [Knowledge::PriorDominated]);
+    }
+
+    #[test]
+    fn what_the_models_own_error_buries_the_data_no_longer_say() {
+        let prior = [prior(Some(0.35))];
+        let sharp = of(DMatrix::from_element(25, 1, 1.0), &prior);
+        assert_eq!(sharp.identifiability.verdicts, [Knowledge::Identified]);
+        let erring = |by: f64| sharp.clone().with_model_error(&[by], &[7.0], &prior).identifiability.verdicts;
+        assert_eq!(erring(0.05), [Knowledge::Identified]);
+        assert_eq!(erring(0.3), [Knowledge::PriorDominated]);
     }
 
     #[test]

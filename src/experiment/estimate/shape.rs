@@ -114,10 +114,14 @@ pub struct ShapeFound {
     pub falx_edge: Option<EdgeAmounts>,
     /// Of the base's edge, where it was looked for.
     pub base_edge: Option<EdgeAmounts>,
+    /// How many amounts of these nobody knows the effect of: the coarse body has no equilibrium with them.
+    pub unsolved: usize,
 }
 
 /// Displacement of places for each of the amounts that are looked for.
 pub struct ShapeColumns {
+    /// How many amounts are not among them: the body has no equilibrium, however little they move it.
+    unsolved: usize,
     amounts: Vec<Amount>,
     sd_mm: Vec<f64>,
     /// Three rows a place, a column an amount: per mm of it.
@@ -139,10 +143,14 @@ impl ShapeColumns {
 
     /// The amounts that came out, by what they are of.
     pub fn found(&self, amounts_mm: &[f64]) -> ShapeFound {
+        let at = |amount: Amount| self.amounts.iter().position(|a| *a == amount).map(|n| amounts_mm[n]);
         let of = |part: Part| -> Vec<f64> {
-            self.amounts.iter().zip(amounts_mm).filter(|(amount, _)| amount.0 == part).map(|(_, mm)| *mm).collect()
+            let found: Vec<Option<f64>> = part.axes().iter().map(|axis| at(Amount(part, *axis))).collect();
+            let looked_for = found.iter().any(Option::is_some);
+            found.into_iter().filter(|_| looked_for).map(Option::unwrap_or_default).collect()
         };
         ShapeFound {
+            unsolved: self.unsolved,
             outline: of(Part::Outline).try_into().ok(),
             falx: of(Part::Falx).try_into().ok(),
             falx_edge: of(Part::FalxEdge).try_into().ok(),
@@ -152,8 +160,8 @@ impl ShapeColumns {
 }
 
 impl Shape<'_> {
-    /// What the amounts do to the places at these parameters; `None` where nothing may be off, where the body has no equilibrium
-    /// there, or has none however little an amount moves it.
+    /// What the amounts do to the places at these parameters; `None` where nothing may be off. Amounts with which the body has no
+    /// equilibrium are left out, and counted.
     pub fn columns(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Option<ShapeColumns> {
         let at = |mesh: &TetMesh| -> Option<Vec<[f64; 3]>> {
             let nothing = Observation::Nodes(Vec::new());
@@ -200,20 +208,28 @@ impl Shape<'_> {
             Part::FalxEdge | Part::BaseEdge => support_edges_mm,
         };
         // By one standard deviation, to the other side or by less where the mesh or the equilibrium does not bear it.
-        let found_of = |amount: Option<&Amount>| match amount {
-            None => Some((at(self.mesh)?, 0.0)),
-            Some(amount) => (0..TRIES).find_map(|n| {
+        let moved_by = |amount: &Amount| {
+            (0..TRIES).find_map(|n| {
                 let step_mm = sd_of(amount) * 0.5f64.powi(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
                 Some((at(&moved(*amount, step_mm)?)?, step_mm))
-            }),
+            })
         };
-        let bodies: Vec<Option<&Amount>> = std::iter::once(None).chain(amounts.iter().map(Some)).collect();
-        let found: Vec<_> = bodies.into_par_iter().map(found_of).collect::<Option<_>>()?;
+        let (still, moved) = rayon::join(
+            || at(self.mesh),
+            || amounts.par_iter().map(|amount| Some((*amount, moved_by(amount)?))).collect::<Vec<_>>(),
+        );
+        let all = amounts.len();
+        let Some(still) = still else {
+            let columns_mm = DMatrix::zeros(3 * places_mm.len(), 0);
+            return Some(ShapeColumns { unsolved: all, amounts: Vec::new(), sd_mm: Vec::new(), columns_mm });
+        };
+        let (amounts, found): (Vec<Amount>, Vec<_>) = moved.into_iter().flatten().unzip();
         let columns_mm = DMatrix::from_fn(3 * places_mm.len(), amounts.len(), |row, k| {
-            let of = |n: usize| found[n].0[row / 3][row % 3];
-            (of(k + 1) - of(0)) / found[k + 1].1
+            let (there, step_mm) = &found[k];
+            (there[row / 3][row % 3] - still[row / 3][row % 3]) / step_mm
         });
-        Some(ShapeColumns { sd_mm: amounts.iter().map(sd_of).collect(), amounts, columns_mm })
+        let unsolved = all - amounts.len();
+        Some(ShapeColumns { unsolved, sd_mm: amounts.iter().map(sd_of).collect(), amounts, columns_mm })
     }
 }
 
@@ -237,8 +253,23 @@ mod tests {
         held(&[tag::FALX], 0.0, error)
     }
 
+    /// The same by a solver that stops before it has found an equilibrium.
+    fn unsolved(error: ShapeError) -> Option<ShapeColumns> {
+        of(&[tag::FALX], 0.0, error, 1).1
+    }
+
     /// The same held by these sets; the sheet ends so far above its base, which holds in front alone.
     fn held(by: &[&str], sheet_ends_mm: f64, error: ShapeError) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
+        of(by, sheet_ends_mm, error, 50)
+    }
+
+    /// The same with no more Newton iterations than these.
+    fn of(
+        by: &[&str],
+        sheet_ends_mm: f64,
+        error: ShapeError,
+        iterations: usize,
+    ) -> (Vec<[f64; 3]>, Option<ShapeColumns>) {
         let mut mesh = block(6);
         let at = |n: &u32| mesh.nodes_mm()[*n as usize];
         let in_sheet = |n: &u32| (at(n)[0] - 30.0).abs() < 1e-9 && at(n)[2] > sheet_ends_mm - 1e-9;
@@ -257,7 +288,8 @@ mod tests {
             ..PhantomSettings::default()
         };
         let unknowns: Vec<Unknown> = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect();
-        let template = settings.scenario();
+        let mut template = settings.scenario();
+        (template.solver.newton_iterations, template.solver.smallest_load_step) = (iterations, 1.0);
         let shape = Shape { mesh: &mesh, template: &template, unknowns: &unknowns, poisson_ratio: 0.45, error };
         let places = vec![[10.0, 30.0, 30.0], [50.0, 30.0, 30.0]];
         let found = shape.columns(&[1370f64.ln(), 990f64.ln()], &places);
@@ -287,6 +319,26 @@ mod tests {
         assert_eq!(sd, [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0]);
         let found = both.found(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         assert_eq!((found.outline, found.falx), (Some([1.0, 2.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
+    }
+
+    #[test]
+    fn amounts_without_an_equilibrium_are_counted_and_leave_the_others() {
+        let mut both = hung(ShapeError { outline_mm: 0.5, falx_mm: 1.0, support_edges_mm: 0.0 }).1.unwrap();
+        assert_eq!(both.found(&[1.0; 7]).unsolved, 0);
+        // The outline's second amount has none.
+        (both.unsolved, both.columns_mm) = (1, both.columns_mm.remove_column(1));
+        both.amounts.remove(1);
+        both.sd_mm.remove(1);
+        let found = both.found(&[1.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        assert_eq!((found.outline, found.falx), (Some([1.0, 0.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
+        assert_eq!(found.unsolved, 1);
+    }
+
+    #[test]
+    fn a_body_that_cannot_be_solved_leaves_every_amount_of_its_shape_unsolved() {
+        let found = unsolved(ShapeError { outline_mm: 0.5, ..ShapeError::default() }).unwrap();
+        assert_eq!((found.unsolved, found.columns_mm.ncols()), (4, 0));
+        assert_eq!(found.found(&[]), ShapeFound { unsolved: 4, ..ShapeFound::default() });
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::evidence::Unexplained;
 use super::findings::Fitted;
-use super::{Convergence, EstimateSettings, Knowledge, LogPrior, Posterior};
+use super::{EstimateSettings, Knowledge, LogPrior, Posterior};
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, STRONG, Verdict};
 use nalgebra::Vector3;
 
@@ -72,7 +72,7 @@ pub(super) fn verdict_of_fit(
         }
     }
     // What was not found explains nothing.
-    if fitted.descent.convergence == Convergence::IterationsExhausted {
+    if fitted.descent.convergence.is_unfinished() {
         unexplained.push(Reason::NotConverged);
     }
     let conflict = prior.iter().zip(&fitted.descent.log_parameters).filter_map(|(prior, number)| {
@@ -99,11 +99,10 @@ pub(super) fn verdict_of_fit(
         Finding::Identified
     };
     let answer = |n: usize| match (&fitted.correlated, finding) {
-        (Some(found), Finding::NoShift) => match found.shift.largest_share {
-            // A body of linear stiffness moves as 1 / modulus.
-            Some(share) if share > 0.0 => Claim::Above { bound_pa: (prior[n].mean - share.ln()).exp() },
-            _ => Claim::Withheld,
-        },
+        (Some(found), Finding::NoShift) => {
+            let bound = found.softest.get(n).copied().flatten();
+            bound.map_or(Claim::Withheld, |log_pa| Claim::Above { bound_pa: log_pa.exp() })
+        }
         _ if finding.has_stiffness() => {
             Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }
         }
@@ -125,6 +124,8 @@ pub(super) fn verdict_of_fit(
     }
     if finding.has_stiffness() {
         reasons.extend(assumed.clone());
+        let unsolved = fitted.correlated.as_ref().map_or(0, |found| found.shape.unsolved);
+        reasons.extend((unsolved > 0).then_some(Reason::ShapeTakenAsExact { amounts: unsolved }));
     }
     Verdict::new(finding, share, moduli, reasons)
 }

@@ -30,7 +30,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 33;
+const VERSION: u32 = 34;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -45,6 +45,12 @@ impl EstimateOptions {
             return Err(
                 "`density` and `gravity_direction` need gravity, and this body is loaded without it (a phantom is \
                         pushed by a force); take them away",
+            );
+        }
+        if self.density && (loads.csf.is_some() || !self.fluid.may_be_given()) {
+            return Err(
+                "`density` is the effective density of a brain without a fluid around it; in fluid it is the tissue's own, \
+                        which is known: take `density` away, or [resection.csf] (`fluid = \"unknown\"` estimates the part drained)",
             );
         }
         if self.fluid.may_be_unknown() && loads.gravity_m_per_s2 == [0.0; 3] {
@@ -62,14 +68,14 @@ impl EstimateOptions {
     }
 
     /// The loads that are estimated, with what is known of them beforehand.
-    fn unknown_loads(&self, loads: &Loads, in_fluid: bool) -> Vec<(Unknown, LogPrior)> {
+    fn unknown_loads(&self, loads: &Loads) -> Vec<(Unknown, LogPrior)> {
         let mut unknowns = Vec::new();
         let mut add = |unknown: Unknown, mean: f64, sd: f64| {
             let prior = unknown.prior(mean, sd);
             unknowns.push((unknown, prior));
         };
         // Beside a fluid the density is the tissue's own, which is known.
-        if self.density && !in_fluid {
+        if self.density && loads.csf.is_none() {
             add(Unknown::Density, loads.density_kg_per_m3.ln(), self.density_log_sd);
         }
         if self.gravity_direction {
@@ -226,14 +232,14 @@ pub(crate) fn estimate(
     work.run(made, &NAME, &stage, || {
         let bodies = Bodies::of(work, input)?;
         work.tell(|p| p.begin("estimate", bodies.list.len()));
-        let (mut models, mut warnings, mut refused) = (Vec::new(), Vec::new(), None);
+        let (mut models, mut left_out, mut refused) = (Vec::new(), Vec::new(), None);
         let prior = &work.settings.prior;
         for (n, body) in bodies.list.iter().enumerate() {
             match bodies.solved(work, input, n, input.tissues, prior) {
                 Ok(found) => models.push((body.name(), found)),
-                // Supports without an equilibrium explain nothing; the others are still tried.
+                // The others are still tried; what could not be solved is neither refuted nor borne out.
                 Err(error) => {
-                    warnings.push(Warning::ModelLeftOut { model: body.name(), reason: error.to_string() });
+                    left_out.push((body.name(), error.to_string()));
                     refused.get_or_insert(error);
                 }
             }
@@ -251,11 +257,12 @@ pub(crate) fn estimate(
         let body = bodies.list.iter().find(|body| body.name() == name).unwrap_or(&bodies.list[0]);
         let of = (input.tissues, prior);
         let verdict = bodies.bounded(work, input, of, &found.seen, found.outcome.verdict.clone())?;
+        let verdict = verdict.beside_unsolved(left_out.iter().map(|(model, _)| model.clone()));
         let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
-        let outcome = EstimateOutcome { taught_by, verdict, ..found.outcome };
+        let outcome = EstimateOutcome { taught_by, limits: verdict.because(), verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
         let mut produced = produced(body, input, found, comparison)?;
-        produced.warn(warnings);
+        produced.warn(left_out.into_iter().map(|(model, reason)| Warning::ModelLeftOut { model, reason }));
         Ok(produced)
     })
 }
@@ -316,7 +323,7 @@ impl Bodies {
     ) -> Result<(Vec<(Unknown, LogPrior)>, Scenario), WorkflowError> {
         let options = &work.settings.estimate;
         let mut unknowns = law_priors(tissues, prior)?;
-        let loads = options.unknown_loads(&body.scenario.loads, body.levels.is_some());
+        let loads = options.unknown_loads(&body.scenario.loads);
         unknowns.extend(loads.into_iter().map(|(unknown, known)| (unknown, prior.learnt(known))));
         unknowns.extend(body.unknown_room());
         unknowns.extend(body.unknown_fluid(options));
@@ -525,9 +532,11 @@ fn produced(
         Field::scalar("strain_energy_density_pa", state.strain_energy_density_pa),
     ];
     let json = serde_json::to_string_pretty(&outcome).expect("figures are plain data") + "\n";
+    let limits = outcome.limits.iter().cloned();
+    let of_state = state.warnings.iter().map(ToString::to_string);
     Ok(Produced {
         files: vec![(file, vtu::encode(mesh, &points, &cells)?), (ESTIMATE_JSON.to_owned(), json.into_bytes())],
-        warnings: outcome.limits.iter().map(|limit| format!("estimate: {limit}")).collect(),
+        warnings: limits.chain(of_state).map(|limit| format!("estimate: {limit}")).collect(),
         facts: facts(&EstimateFacts { estimate: outcome, record, comparison }),
     })
 }

@@ -1,0 +1,95 @@
+//! How soft each tissue of a body may be that was not seen to move.
+
+use super::LogPrior;
+use super::posterior::{Z_95_ONE_SIDED, prior_correlation};
+
+/// Least shear modulus (logarithm) of each parameter that is one, where it is bounded, by a body of parameters `at` of whose
+/// displacement no more than `share` can be there (95 %, one-sided).
+///
+/// A body of linear stiffness moves as 1 / modulus if all its tissues are stiffer alike. Of a single one less is known: the others
+/// may be stiffer than the prior has them beside it, and other unknowns (the load, the room at the skull) may be such that everything
+/// moves less. Each is taken at its one-sided 95 %. `slopes` is d ln(displacement) / d parameter.
+pub(super) fn softest(
+    share: f64,
+    at: &[f64],
+    slopes: &[f64],
+    prior: &[LogPrior],
+    are_moduli: &[bool],
+) -> Vec<Option<f64>> {
+    let sd = |n: usize| prior[n].sd.unwrap_or(f64::INFINITY);
+    // The part of the displacement that goes with each tissue's compliance.
+    let part: Vec<f64> = slopes.iter().zip(are_moduli).map(|(s, is)| if *is { (-s).max(0.0) } else { 0.0 }).collect();
+    let whole: f64 = part.iter().sum();
+    let others = slopes.iter().zip(are_moduli).enumerate().filter(|(_, (slope, is))| !**is && **slope != 0.0);
+    let spread = others.map(|(n, (slope, _))| (slope * sd(n)).powi(2)).sum::<f64>().sqrt();
+    let apart = |n: usize, other: usize| {
+        let together = prior_correlation(prior, n, other);
+        let both = if together == 0.0 { 0.0 } else { 2.0 * together * sd(n) * sd(other) };
+        (sd(n).powi(2) + sd(other).powi(2) - both).max(0.0).sqrt()
+    };
+    let of = |n: usize| {
+        let moves = |other: usize| {
+            let stiffer = if other == n { 0.0 } else { Z_95_ONE_SIDED * apart(n, other) };
+            part[other] / whole * (-stiffer).exp()
+        };
+        let left: f64 = (0..part.len()).filter(|other| part[*other] > 0.0).map(moves).sum();
+        let bound = at[n] + (left / share).ln() - Z_95_ONE_SIDED * spread;
+        (are_moduli[n] && bound.is_finite()).then_some(bound)
+    };
+    (0..prior.len()).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Scale;
+    use super::*;
+
+    fn prior(sd: f64, correlation: Vec<f64>) -> LogPrior {
+        LogPrior { name: String::new(), mean: 7.0, sd: Some(sd), scale: Scale::Logarithm, correlation, average: None }
+    }
+
+    #[test]
+    fn one_tissue_is_as_much_stiffer_as_it_moves_less() {
+        let found = softest(0.25, &[7.0], &[-1.0], &[prior(0.5, vec![])], &[true]);
+        assert!((found[0].unwrap() - 7.0 - 4f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_that_are_only_known_together_are_bounded_together_and_two_that_are_not_each_by_its_own_part() {
+        let [w, share] = [0.7, 0.5];
+        let bounds = |together: f64, sd: f64| {
+            let priors = [prior(sd, vec![]), prior(sd, vec![together])];
+            softest(share, &[7.0, 6.5], &[-w, w - 1.0], &priors, &[true, true])
+                .into_iter()
+                .flatten()
+                .collect::<Vec<_>>()
+        };
+        let same = bounds(1.0, 0.5);
+        assert!((same[0] - 7.0 + share.ln()).abs() < 1e-9 && (same[1] - 6.5 + share.ln()).abs() < 1e-9, "{same:?}");
+        let any = bounds(0.0, 50.0);
+        assert!((any[0] - 7.0 - (w / share).ln()).abs() < 1e-9, "{any:?}");
+        assert!((any[1] - 6.5 - ((1.0 - w) / share).ln()).abs() < 1e-9, "{any:?}");
+        // No pair of moduli that the prior has within its 95 % and that moves no more breaks them.
+        let some = bounds(0.5, 0.6);
+        let ratio = Z_95_ONE_SIDED * 0.6;
+        for step in -100..=100 {
+            let more = ratio * f64::from(step) / 100.0;
+            // White's excess over grey's at which both move just as much as may be there.
+            let grey = 7.0 + ((w + (1.0 - w) * (-more).exp()) / share).ln();
+            assert!(grey >= some[0] - 1e-9 && grey - 0.5 + more >= some[1] - 1e-9, "{more} {grey} {some:?}");
+        }
+    }
+
+    #[test]
+    fn a_load_that_may_be_less_bounds_less() {
+        let with =
+            |sd| softest(0.25, &[7.0, 4.6], &[-1.0, 1.0], &[prior(0.5, vec![]), prior(sd, vec![])], &[true, false]);
+        assert_eq!(with(0.5)[1], None);
+        assert!((with(0.5)[0].unwrap() - 7.0 - 4f64.ln() + Z_95_ONE_SIDED * 0.5).abs() < 1e-12);
+        let unknown = LogPrior { sd: None, ..prior(1.0, vec![]) };
+        assert_eq!(
+            softest(0.25, &[7.0, 4.6], &[-1.0, 1.0], &[prior(0.5, vec![]), unknown], &[true, false]),
+            [None, None]
+        );
+    }
+}
