@@ -1,6 +1,7 @@
 //! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
 
 use super::brain_shift::SeenShift;
+use super::held_by::held_by;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
@@ -24,7 +25,7 @@ use crate::mesh::format::{Field, vtu};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::estimate_options::{EstimateOptions, Observed};
 use crate::workflow::facts::EstimateFacts;
-use crate::workflow::stage_name::{StageName, Subject};
+use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
@@ -184,15 +185,6 @@ pub(crate) struct EstimateInput<'a> {
     pub rigid_error_mm: f64,
     /// The ventricles' volume on the scans, before and after, cm3.
     pub ventricles_cc: Option<[f64; 2]>,
-}
-
-/// The settings of what holds a patient: supports that are tried stand in no scenario.
-pub(super) fn held_by(work: &Work<'_>) -> serde_json::Value {
-    let ResectionSettings { supports, falx, skull, .. } = &work.settings.resection;
-    match work.subject {
-        Subject::Patient => serde_json::json!({ "supports": supports, "falx": falx, "skull": skull }),
-        Subject::Phantom { .. } | Subject::Plan => serde_json::Value::Null,
-    }
 }
 
 /// The stage with its settings and inputs.

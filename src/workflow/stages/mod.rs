@@ -9,6 +9,7 @@ mod compare;
 mod earlier;
 mod estimate;
 mod fields;
+mod held_by;
 mod labels;
 mod mesh;
 mod plan;

@@ -1,5 +1,6 @@
 //! Stage `sim-SAMPLE`: one simulation each, so that a sweep can stop anywhere, resume, and be split over machines.
 
+use super::held_by::sample_held_by;
 use crate::anatomy::label;
 use crate::artefact::{Manifest, Produced, Stage};
 use crate::experiment::outcome::{MeshOutcome, SampleOutcome};
@@ -18,7 +19,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// What every sample of a sweep shares.
 #[derive(Debug)]
@@ -72,7 +73,8 @@ pub(crate) fn sample_stage(
     tissues: &[Tissue],
     sample: &Sample,
 ) -> Stage {
-    let posed = serde_json::json!({ "scenario": template, "tissues": tissues, "sample": sample });
+    let held = sample_held_by(work);
+    let posed = serde_json::json!({ "scenario": template, "tissues": tissues, "sample": sample, "held": held });
     work.stage(made, &StageName::Sample(sample.id.clone()), VERSION, &posed).frame(Mni::NAME)
 }
 
