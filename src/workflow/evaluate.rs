@@ -5,12 +5,12 @@ use super::error::{LandmarkError, WorkflowError};
 use super::landmark_pairs::{Landmarks, Paired, check_frames};
 use super::lock::Lock;
 use super::maps::{Map, Part, WarpTo};
-use super::stages::{ESTIMATE, FUSED, OBSERVED, brain_shift, transforms};
+use super::stages::{FUSED, OBSERVED, transforms};
 use super::user_file::shown;
 use crate::artefact::write_whole;
 use crate::experiment::landmarks::{CarriedLandmarks, Evaluation, evaluate};
 use crate::geometry::Position;
-use crate::layout::{ESTIMATE_STATE, LANDMARKS_JSON};
+use crate::layout::LANDMARKS_JSON;
 use crate::overlay::Carried;
 use crate::report::case::results_sha256;
 use std::path::Path;
@@ -33,10 +33,7 @@ pub fn evaluate_landmarks(folder: &Path, landmarks: &Landmarks) -> Result<Evalua
         to_mm: pairs.iter().map(|(_, x, _)| rigid(x)).collect(),
         sd_mm: vec![None; pairs.len()],
     }];
-    // An estimate may lie there that a later sweep has not made.
-    let shift = brain_shift(&case)?;
-    let estimate = || case.path(ESTIMATE_STATE).exists().then(|| ESTIMATE.to_owned());
-    let model = shift.map_or_else(estimate, |shift| shift.model);
+    let model = case.model()?;
     let with_model = model.iter().map(String::as_str).chain([FUSED]).filter(|_| model.is_some());
     let mut places: Vec<(String, bool)> = vec![("tissue".to_owned(), true); pairs.len()];
     for state in [OBSERVED].into_iter().chain(with_model) {

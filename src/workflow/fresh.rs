@@ -3,6 +3,7 @@
 
 use super::case::Case;
 use super::error::{CaseError, WorkflowError};
+use super::facts::EstimateFacts;
 use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Reason, sha256_hex};
 use crate::layout;
@@ -79,6 +80,27 @@ impl Case {
         Ok(())
     }
 
+    /// The state of the model that the outcome was made with: the estimate's, else the best sample's. A state that another job has
+    /// left in the folder is none of it.
+    ///
+    /// # Errors
+    /// As [`Case::outcome`].
+    pub(crate) fn model(&self) -> Result<Option<String>, WorkflowError> {
+        let outcome = self.outcome()?;
+        Ok(outcome.judged().filter(|state| state.file.is_some()).map(|state| state.id.clone()))
+    }
+
+    /// The estimate that the outcome was made with; none where it was made without one, whatever lies in the folder.
+    ///
+    /// # Errors
+    /// As [`Case::outcome`] and [`Case::estimate`], where an estimate lies in the folder.
+    pub(crate) fn present_estimate(&self) -> Result<Option<EstimateFacts>, WorkflowError> {
+        if !self.path(layout::ESTIMATE_JSON).exists() {
+            return Ok(None);
+        }
+        self.outcome()?.estimate.map(|_| self.estimate()).transpose()
+    }
+
     /// The stages that have finished here, each after those it was made from.
     pub(crate) fn recorded(&self) -> Vec<Manifest> {
         let entries = std::fs::read_dir(self.path(".stages")).into_iter().flatten().flatten();
@@ -141,5 +163,64 @@ impl Case {
             }
             _ => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::artefact::write_whole;
+    use crate::experiment::outcome::ExperimentOutcome;
+    use crate::workflow::default_state;
+    use serde_json::json;
+
+    /// A patient's folder with an outcome of these samples and the settings of today; an estimate lies beside them.
+    fn answered(folder: &std::path::Path, samples: &[&str]) -> Case {
+        let case = Case::at(folder);
+        let sample = |id: &&str| {
+            json!({
+                "id": id, "sd_levels": {}, "shear_modulus_pa": {}, "rmse_mm": {}, "converged": true, "newton_iterations": 1,
+                "relative_residuals": [], "file": layout::SAMPLE_STATE.of(id),
+            })
+        };
+        let outcome = ExperimentOutcome {
+            samples: samples.iter().map(|id| serde_json::from_value(sample(id)).unwrap()).collect(),
+            best_sample: samples.first().map(|id| (*id).to_owned()),
+            ..ExperimentOutcome::default()
+        };
+        let write = |file: &str, text: &str| write_whole(&case.path(file), text.as_bytes()).unwrap();
+        write(layout::OUTCOME, &outcome.to_json(layout::OUTCOME).unwrap());
+        write(layout::SETTINGS, "");
+        for file in [".stages/registration.manifest.json", layout::ESTIMATE_JSON, layout::ESTIMATE_STATE] {
+            write(file, "{}");
+        }
+        let sum = |file: &str| (file.to_owned(), sha256_hex(&case.read(file).unwrap()));
+        let provenance = Provenance { program: String::new(), gathered: GATHERED.map(sum).into(), stages: Vec::new() };
+        write(layout::PROVENANCE, &serde_json::to_string(&provenance).unwrap());
+        case
+    }
+
+    #[test]
+    fn an_estimate_that_the_outcome_was_made_without_is_nobodys_state() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = answered(folder.path(), &["sample-03"]);
+        assert_eq!(case.model().unwrap().as_deref(), Some("sample-03"));
+        assert!(case.present_estimate().unwrap().is_none());
+        // Nor where there is no other: that file is there, and not of the outcome.
+        let refused = default_state(&answered(&folder.path().join("prepared"), &[])).unwrap_err();
+        assert!(matches!(refused, WorkflowError::Case(CaseError::Stale { .. })), "{refused}");
+    }
+
+    #[test]
+    fn a_state_is_refused_where_the_outcome_is_of_other_settings() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = answered(folder.path(), &["sample-03"]);
+        write_whole(&case.path(layout::SETTINGS), b"seed = 1").unwrap();
+        for refused in [case.model().unwrap_err(), case.present_estimate().unwrap_err()] {
+            assert!(matches!(refused, WorkflowError::Case(CaseError::Stale { .. })), "{refused}");
+        }
+        // Nothing was estimated here, and so nothing is of other settings.
+        std::fs::remove_file(case.path(layout::ESTIMATE_JSON)).unwrap();
+        assert!(case.present_estimate().unwrap().is_none());
     }
 }

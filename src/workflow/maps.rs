@@ -6,14 +6,15 @@ use super::facts::MeshFacts;
 use super::made_files::MadeFiles;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
-use super::stages::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, lesions, transforms};
+use super::stages::{Believed, CaseShift, FUSED, OBSERVED, brain_shift, grid_of, lesions, transforms};
+use crate::artefact::Reason;
 use crate::experiment::field::{ShiftField, carried, inverse};
 use crate::geometry::{AffineTransform, Frame, Native, Position, Post, Pre};
 use crate::image::nifti::{self, ReadOptions, decode_displacement};
 use crate::image::{Grid, Mask, Volume};
 use crate::layout::{
-    ESTIMATE_STATE, MNI_FROM_PRE_TEXT, NATIVE_RESECTED, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN, PRE_FROM_POST_FIELD,
-    PRE_FROM_POST_TEXT, PRE_NATIVE_BRAIN, SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
+    ESTIMATE_STATE, MNI_FROM_PRE_TEXT, NATIVE_RESECTED, OUTCOME, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN,
+    PRE_FROM_POST_FIELD, PRE_FROM_POST_TEXT, PRE_NATIVE_BRAIN, SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
 };
 use crate::overlay::{Carried, PointState};
 use crate::segment::atlas;
@@ -198,18 +199,21 @@ pub fn default_state(case: &Case) -> Result<String, WorkflowError> {
     named(case, None)
 }
 
-/// The state that is meant: the one named, else the estimate, else the model that the fields were made with.
+/// The state that is meant: the one named, else that of the model that the outcome was made with.
 fn named(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
-    let missing =
-        |file: String| CaseError::Missing { folder: case.folder().to_path_buf(), file, subject: case.subject() };
     if let Some(state) = state {
         return Ok(state.to_owned());
     }
-    if case.path(ESTIMATE_STATE).exists() {
-        return Ok(ESTIMATE.to_owned());
-    }
-    let model = brain_shift(case)?.and_then(|shift| shift.model);
-    Ok(model.ok_or_else(|| missing(ESTIMATE_STATE.to_owned()))?)
+    let (folder, file) = (case.folder().to_path_buf(), ESTIMATE_STATE.to_owned());
+    let left_behind = case.path(ESTIMATE_STATE).exists();
+    let none = || match case.subject() {
+        Some(Subject::Patient) if left_behind => {
+            let reasons = vec![Reason::Input { role: OUTCOME.to_owned() }];
+            CaseError::Stale { folder, what: file, reasons }
+        }
+        subject => CaseError::Missing { folder, file, subject },
+    };
+    Ok(case.model()?.ok_or_else(none)?)
 }
 
 /// Displacement, standard deviation and mask.

@@ -15,7 +15,6 @@ use crate::anatomy::label;
 use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::fem::Scenario;
-use crate::layout;
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
 use nalgebra::UnitQuaternion;
@@ -104,8 +103,8 @@ pub fn posed_case(
     if resection == Resection::Undone && !mesh.labels().contains(&label::RESECTED) {
         return Err(CaseError::NothingResected { folder: folder.to_path_buf() }.into());
     }
-    // Only where the estimate has been made: without it the prior's means stand.
-    let estimate = if case.path(layout::ESTIMATE_JSON).exists() { Some(case.estimate()?) } else { None };
+    // Only where the case has one: without it the prior's means stand.
+    let estimate = case.present_estimate()?;
     let subject = case.subject();
     let none = || CaseError::NotACase { folder: folder.to_path_buf() };
     let (mut scenario, ratio) = match subject.ok_or_else(none)? {
@@ -141,7 +140,11 @@ pub fn posed_case(
             }
         }
     }
-    let sights = Sights::of(&case, &mesh)?;
+    let mut sights = Sights::of(&case, &mesh)?;
+    if estimate.is_none() {
+        // Of an estimate that another job has left.
+        sights.estimate_sd_mm = None;
+    }
     Ok(Posed { name: shown(folder), mesh, scenario, estimate, sights })
 }
 

@@ -47,4 +47,4 @@ pub(crate) use registration::{
     OF_POSE, mni_from_gravity_frame, pose as mni_from_pre, registration, registration_stage, transforms,
 };
 pub(crate) use samples::{SampleMode, Sweep, lesions, present_samples, sample_stage, samples, with_held_tissues};
-pub(crate) use shift::{Believed, CaseShift, ESTIMATE, FUSED, OBSERVED, brain_shift, grid_of, mask_of};
+pub(crate) use shift::{Believed, CaseShift, FUSED, OBSERVED, brain_shift, grid_of, mask_of};
