@@ -102,14 +102,11 @@ impl Stage {
         self.input_sha256(&format!("stage {}", earlier.stage), &sum)
     }
 
-    /// The same files of the user's own that this stage was made with before: masks, a label map, a pose.
+    /// The same inputs of these roles that this stage was made with before.
     #[must_use]
-    pub fn own_masks_of(self, earlier: &Manifest) -> Self {
-        let masks = earlier
-            .inputs
-            .iter()
-            .filter(|(role, _)| role.ends_with(" mask") || *role == "label map" || *role == "pose");
-        masks.fold(self, |stage, (role, sum)| stage.input_sha256(role, sum))
+    pub fn inputs_of(self, earlier: &Manifest, is_one: impl Fn(&str) -> bool) -> Self {
+        let same = earlier.inputs.iter().filter(|(role, _)| is_one(role));
+        same.fold(self, |stage, (role, sum)| stage.input_sha256(role, sum))
     }
 
     /// The stage's name.

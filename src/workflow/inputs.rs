@@ -5,7 +5,7 @@ use super::labels::labels_of_tool;
 use super::user_file::{read_input, read_text, shown};
 use super::warning::{Warning, all_of};
 use super::work::Work;
-use crate::artefact::sha256_hex;
+use crate::artefact::{Manifest, Stage, sha256_hex};
 use crate::geometry::{Mni, Native, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions, encode_u8};
 use crate::image::{Grid, LabelMap, Mask, Volume};
@@ -196,6 +196,11 @@ impl OwnMasks {
     }
 }
 
+/// The stage with the files of the user's own that it was made with before: masks, a label map, a pose or where to look for it.
+pub(crate) fn with_own_masks_of(stage: Stage, earlier: &Manifest) -> Stage {
+    stage.inputs_of(earlier, |input| MaskRole::ALL.iter().any(|role| role.to_string() == input))
+}
+
 /// Refuses masks of brain and ventricles beside a label map that says both.
 pub(super) fn labels_alone(dseg: Option<&Path>, [brain, ventricle]: [&Option<PathBuf>; 2]) -> Result<(), InputError> {
     let mut beside = [(MaskRole::Brain, brain), (MaskRole::Ventricle, ventricle)].into_iter();
@@ -294,5 +299,22 @@ impl GivenMask {
             Self::Pre(mask) => mask_on(mask, grid, &mni_from_pre.inverse()),
             Self::Post(mask) => mask_on(mask, grid, &mni_from_post.inverse()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::artefact::{Produced, Reason};
+    use std::convert::Infallible;
+
+    #[test]
+    fn a_stage_takes_up_every_file_of_the_users_own_and_no_other_scan() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |scan: &[u8]| Stage::new("registration", 1, folder.path(), &()).input("pre", scan);
+        let given = MaskRole::ALL.iter().fold(of(b"scan"), |stage, role| stage.input(&role.to_string(), b"own"));
+        let earlier = given.run(false, || Ok::<_, Infallible>(Produced::default())).unwrap().manifest;
+        assert_eq!(with_own_masks_of(of(b"scan"), &earlier).why(), []);
+        assert_eq!(with_own_masks_of(of(b"another"), &earlier).why(), [Reason::Input { role: "pre".to_owned() }]);
     }
 }

@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::error::{CaseError, WorkflowError};
 use super::facts::MeshFacts;
-use super::inputs::ScanSums;
+use super::inputs::{ScanSums, with_own_masks_of};
 use super::patient::{Patient, Prepared};
 use super::plan::{self, Goal, plan_with};
 use super::progress::Silent;
@@ -109,11 +109,13 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
             StageName::Registration => {
                 let stage = stages::registration_stage(work, &sums);
                 Some(match made.get(&StageName::Registration) {
-                    Some(earlier) => stage.own_masks_of(earlier),
+                    Some(earlier) => with_own_masks_of(stage, earlier),
                     None => stage,
                 })
             }
-            StageName::Anat => Some(stages::anat_stage(work, &made, &sums).own_masks_of(made.get(&StageName::Anat)?)),
+            StageName::Anat => {
+                Some(with_own_masks_of(stages::anat_stage(work, &made, &sums), made.get(&StageName::Anat)?))
+            }
             StageName::Mesh => Some(stages::mesh_stage(work, &made).0),
             StageName::Reference => Some(stages::reference_stage(work, &made)),
             StageName::Sample(id) => {

@@ -24,6 +24,10 @@ pub enum MaskRole {
 }
 
 impl MaskRole {
+    /// Every one; a stage's manifest names its inputs by them.
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Brain, Self::Ventricle, Self::Cavity, Self::Resected, Self::Labels, Self::Pose, Self::PoseStart];
+
     /// Whether a mask lies on the post-operative scan, by whose grid it has (before, after); `None` where it has neither. Where both
     /// scans have it: the cavity is there after the operation alone, all else is drawn on the scan before.
     pub(crate) fn scan_of(self, on: [bool; 2]) -> Option<bool> {
@@ -95,6 +99,21 @@ fn size([x, y, z]: [usize; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_list_of_roles_leaves_none_out() {
+        let after = |role: MaskRole| match role {
+            MaskRole::Brain => Some(MaskRole::Ventricle),
+            MaskRole::Ventricle => Some(MaskRole::Cavity),
+            MaskRole::Cavity => Some(MaskRole::Resected),
+            MaskRole::Resected => Some(MaskRole::Labels),
+            MaskRole::Labels => Some(MaskRole::Pose),
+            MaskRole::Pose => Some(MaskRole::PoseStart),
+            MaskRole::PoseStart => None,
+        };
+        let all: Vec<MaskRole> = std::iter::successors(Some(MaskRole::Brain), |role| after(*role)).collect();
+        assert_eq!(all, MaskRole::ALL);
+    }
 
     #[test]
     fn a_mask_on_the_grid_of_both_scans_lies_where_its_role_says() {
