@@ -18,6 +18,8 @@ pub enum Status {
     NotOnePerson,
     /// It ended with an error.
     Failed,
+    /// It was begun, and what lies there is not of one state: an answer of other settings, or of a run that was broken off.
+    Unfinished,
     /// It has not been run.
     Missing,
 }
@@ -31,7 +33,7 @@ pub struct Member {
     pub status: Status,
     /// Why it did not end well.
     pub message: Option<String>,
-    /// Its numbers, where there are any.
+    /// Its numbers, where its last run gave any.
     pub outcome: Option<ExperimentOutcome>,
     /// Checksum of its settings: subjects with different ones are not to be compared.
     pub settings_sha256: Option<String>,
@@ -55,12 +57,13 @@ impl Status {
             Self::NoOperation => Answer::NoOperation.name(),
             Self::NotOnePerson => Answer::NotOnePerson.name(),
             Self::Failed => "failed",
+            Self::Unfinished => "unfinished",
             Self::Missing => "missing",
         }
     }
 
     /// Whether the subject has a page.
     pub fn has_page(&self) -> bool {
-        !matches!(self, Self::Failed | Self::Missing)
+        !matches!(self, Self::Failed | Self::Unfinished | Self::Missing)
     }
 }

@@ -167,7 +167,7 @@ impl Case {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::artefact::write_whole;
     use crate::experiment::outcome::ExperimentOutcome;
@@ -175,7 +175,7 @@ mod tests {
     use serde_json::json;
 
     /// A patient's folder with an outcome of these samples and the settings of today; an estimate lies beside them.
-    fn answered(folder: &std::path::Path, samples: &[&str]) -> Case {
+    pub fn answered(folder: &std::path::Path, samples: &[&str]) -> Case {
         let case = Case::at(folder);
         let sample = |id: &&str| {
             json!({

@@ -90,33 +90,89 @@ pub fn subject(
     Ok(case)
 }
 
-/// What is known of a subject for the table of all; `cases` is below which the case folders lie.
+/// What is known of a subject for the table of all; `cases` is below which the case folders lie. Numbers are those of its last run
+/// alone: where that failed, or what lies there is not of one state, an earlier answer is nobody's.
 ///
 /// # Errors
 /// An outcome or a log that is damaged.
 pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, CohortError> {
-    let case = case_folder(cases, subject);
-    let read = |file: &str| std::fs::read_to_string(case.join(file)).ok();
-    let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
-    let outcome = read(layout::OUTCOME).map(|text| ExperimentOutcome::from_json(&text, &shown));
+    let case = Case::at(&case_folder(cases, subject));
+    let read = |file: &str| std::fs::read_to_string(case.path(file)).ok();
     let file = log_file(out, subject);
     let log: Option<Log> = match std::fs::read(&file) {
         Err(_) => None,
         Ok(bytes) => Some(serde_json::from_slice(&bytes).map_err(|_| CohortError::Log { file })?),
     };
-    let answer = outcome.as_ref().and_then(|read| read.as_ref().ok()).and_then(|outcome| outcome.answer);
-    let status = match (&log, &outcome) {
-        (Some(log), _) if log.exit_code == 4 && answer.is_some() => Status::of(answer),
-        (Some(log), _) if log.exit_code == 4 => Status::QualityGate,
-        (Some(_), _) => Status::Failed,
-        (None, Some(_)) => Status::Done,
-        (None, None) => Status::Missing,
+    let gated = log.as_ref().map(|log| log.exit_code == 4);
+    let (mut outcome, mut stale) = (None, None);
+    if let Some(text) = read(layout::OUTCOME).filter(|_| gated != Some(false)) {
+        let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
+        match case.check_outcome() {
+            Ok(()) => outcome = Some(ExperimentOutcome::from_json(&text, &shown)?),
+            // Without the folders of this machine.
+            Err(error) => stale = Some(error.to_string().replace(&format!("{}/", cases.display()), "")),
+        }
+    }
+    // A gate that what lies there passes has stopped a later run than the one that made it.
+    if gated == Some(true) && case.quality_gate().is_ok() {
+        outcome = outcome.filter(|outcome| outcome.answer.is_some());
+    }
+    let answer = outcome.as_ref().and_then(|outcome| outcome.answer);
+    let status = match (gated, &outcome, &stale) {
+        (Some(true), ..) => Status::of(answer),
+        (Some(false), ..) => Status::Failed,
+        (None, Some(_), _) => Status::Done,
+        (None, None, Some(_)) => Status::Unfinished,
+        (None, None, None) => Status::Missing,
     };
     Ok(Member {
         participant_id: subject.to_owned(),
         status,
-        message: log.map(|log| format!("{}: {}", log.kind, log.message)),
-        outcome: outcome.transpose()?,
-        settings_sha256: read(layout::SETTINGS).map(|text| sha256_hex(text.as_bytes())),
+        message: log.map(|log| format!("{}: {}", log.kind, log.message)).or(stale),
+        settings_sha256: read(layout::SETTINGS).filter(|_| outcome.is_some()).map(|text| sha256_hex(text.as_bytes())),
+        outcome,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workflow::fresh::tests::answered;
+
+    /// A data set's derivatives in which one subject has an answer.
+    fn derivatives() -> (tempfile::TempDir, Case) {
+        let out = tempfile::tempdir().unwrap();
+        let case = answered(&case_folder(out.path(), "sub-01"), &["sample-03"]);
+        (out, case)
+    }
+
+    fn read(out: &Path) -> Member {
+        member(out, out, "sub-01").unwrap()
+    }
+
+    #[test]
+    fn an_answer_of_other_settings_is_unfinished_and_lends_nothing_to_the_table() {
+        let (out, case) = derivatives();
+        let before = read(out.path());
+        assert!(before.status == Status::Done && before.outcome.is_some() && before.settings_sha256.is_some());
+        write_whole(&case.path(layout::SETTINGS), b"seed = 1").unwrap();
+        let after = read(out.path());
+        assert!(after.outcome.is_none() && after.settings_sha256.is_none());
+        let said = after.message.unwrap();
+        assert!(after.status == Status::Unfinished && said.starts_with("sub-01/hgm: sim/outcome.json"), "{said}");
+    }
+
+    #[test]
+    fn a_subject_whose_last_run_failed_lends_no_earlier_figures() {
+        let (out, _) = derivatives();
+        for (exit_code, status) in [(1, Status::Failed), (3, Status::Failed), (4, Status::QualityGate)] {
+            let log = Log { kind: "input rejected".to_owned(), message: "no brain".to_owned(), exit_code };
+            write_whole(&log_file(out.path(), "sub-01"), &serde_json::to_vec(&log).unwrap()).unwrap();
+            let member = read(out.path());
+            // Where a gate stopped it, what lies there has to be what the gate refused: here nothing says so.
+            let told = member.outcome.is_some();
+            assert_eq!((member.status, told), (status, exit_code == 4), "exit code {exit_code}");
+            assert_eq!(member.message.unwrap(), "input rejected: no brain");
+        }
+    }
 }

@@ -15,7 +15,7 @@ pub enum CohortError {
     Lost { folder: PathBuf, source: std::io::Error },
     #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
     Log { file: PathBuf },
-    #[error("{}: no subject has been run here", out.display())]
+    #[error("{}: no subject has been run to its end here", out.display())]
     NobodyRun { out: PathBuf },
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
