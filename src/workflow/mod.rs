@@ -154,26 +154,28 @@ pub fn run_to(
 ) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
     can_be_done(&work, goal)?;
+    work.ended(every_stage(goal, inputs, &work))?;
+    Ok(work.case)
+}
+
+fn every_stage(goal: Goal, inputs: &Inputs, work: &Work<'_>) -> Result<(), WorkflowError> {
     if goal == Goal::Images {
-        let images = Images::make(&work, inputs)?;
+        let images = Images::make(work, inputs)?;
         work.case.drop_stale();
-        outcome::finish(&work, &images.outcome(), &images.manifests())?;
-        return Ok(work.case);
+        return outcome::finish(work, &images.outcome(), &images.manifests());
     }
-    let prepared = Prepared::make(&work, inputs)?;
+    let prepared = Prepared::make(work, inputs)?;
     work.case.drop_stale();
     if goal == Goal::Mesh {
-        outcome::finish(&work, &prepared.outcome(), &prepared.manifests())?;
-        return Ok(work.case);
+        return outcome::finish(work, &prepared.outcome(), &prepared.manifests());
     }
-    let patient = Patient::new(&work, prepared)?;
+    let patient = Patient::new(work, prepared)?;
     if goal == Goal::Sweep {
         patient.samples(None, SampleMode::Run)?;
     } else {
         patient.estimate()?;
     }
-    patient.gather()?;
-    Ok(work.case.clone())
+    patient.gather()
 }
 
 /// What would be refused after minutes is refused now.
@@ -224,9 +226,12 @@ pub fn sweep(
     samples(settings, work.subject, &[])?;
     let patient = Patient::new(&work, Prepared::read(&work)?)?;
     outcome::keep_settings(&work)?;
-    patient.samples(part, SampleMode::Run)?;
-    if part.is_none() {
-        patient.gather()?;
+    let swept = patient.samples(part, SampleMode::Run);
+    if part.is_some() {
+        // Parts work side by side: the settings are those of all of them.
+        swept?;
+    } else {
+        work.ended(swept.and_then(|()| patient.gather()))?;
     }
     Ok(work.case.clone())
 }
@@ -265,13 +270,11 @@ pub fn estimate(place: &Place, settings: &Settings, progress: &mut dyn Progress)
     if subject == Subject::Patient {
         let patient = Patient::new(&work, Prepared::read(&work)?)?;
         outcome::keep_settings(&work)?;
-        patient.estimate()?;
-        patient.gather()?;
+        work.ended(patient.estimate().and_then(|()| patient.gather()))?;
     } else {
         let phantom = Phantom::read(&work)?;
         outcome::keep_settings(&work)?;
-        phantom.estimate()?;
-        phantom.gather()?;
+        work.ended(phantom.estimate().and_then(|()| phantom.gather()))?;
     }
     Ok(work.case.clone())
 }
@@ -305,11 +308,13 @@ pub fn phantom(
     let work = Work::new(place, Subject::Phantom { every_task }, settings, progress);
     can_be_done(&work, Goal::Sweep)?;
     work.hold(true)?;
-    let phantom = Phantom::make(&work)?;
-    work.case.drop_stale();
-    phantom.samples()?;
-    phantom.gather()?;
-    Ok(work.case.clone())
+    let made = Phantom::make(&work).and_then(|phantom| {
+        work.case.drop_stale();
+        phantom.samples()?;
+        phantom.gather()
+    });
+    work.ended(made)?;
+    Ok(work.case)
 }
 
 /// The page again from what is there.

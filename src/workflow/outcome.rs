@@ -50,6 +50,7 @@ pub(crate) fn write_page(case: &Case) -> Result<(), WorkflowError> {
 
 /// `settings.toml`: every setting, whole.
 pub(crate) fn keep_settings(work: &Work<'_>) -> Result<(), WorkflowError> {
+    work.remember();
     Ok(write_whole(&work.case.path(layout::SETTINGS), work.settings.to_toml().as_bytes())?)
 }
 

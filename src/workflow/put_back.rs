@@ -1,8 +1,9 @@
-//! What a refused job leaves: the settings that the folder had, and nothing of its own where the folder was no case.
+//! What a refused job leaves: the settings that the folder had, as long as nothing in it is of others, and nothing of its own where the
+//! folder was no case.
 
 use super::case::Case;
 use super::error::{ErrorKind, WorkflowError};
-use crate::artefact::write_whole;
+use crate::artefact::{Manifest, write_whole};
 use crate::layout;
 
 /// How a folder was before a job.
@@ -11,15 +12,35 @@ pub(crate) struct Before {
     case: Case,
     /// The bytes of its settings.
     settings: Option<Vec<u8>>,
-    /// Nothing of any command's had been finished in it: a patient made by `synth` is no case, and nobody's to clear away.
-    empty: bool,
+    /// What had been finished in it.
+    stages: Vec<Manifest>,
+    /// What had been gathered from that.
+    gathered: [Option<Vec<u8>>; 2],
+}
+
+fn gathered(case: &Case) -> [Option<Vec<u8>>; 2] {
+    [layout::OUTCOME, layout::PROVENANCE].map(|file| std::fs::read(case.path(file)).ok())
 }
 
 impl Before {
     /// Remembers a folder.
     pub fn of(case: &Case) -> Self {
         let settings = std::fs::read(case.path(layout::SETTINGS)).ok();
-        Self { case: case.clone(), settings, empty: case.recorded().is_empty() }
+        Self { case: case.clone(), settings, stages: case.recorded(), gathered: gathered(case) }
+    }
+
+    /// After an error: the settings as they were, where nothing was finished and nothing gathered since. What has been is of the
+    /// job's own settings, and those stay with it.
+    pub fn put_back_where_nothing_is_new(&self) {
+        if self.case.recorded() != self.stages || gathered(&self.case) != self.gathered {
+            return;
+        }
+        let settings = self.case.path(layout::SETTINGS);
+        // The job's own error is told, not the disk's.
+        match &self.settings {
+            Some(bytes) => write_whole(&settings, bytes).unwrap_or_default(),
+            None => std::fs::remove_file(settings).unwrap_or_default(),
+        }
     }
 
     /// After an error: the settings as they were, so that what is there is still of its settings; and where an input was refused
@@ -31,7 +52,8 @@ impl Before {
             Some(bytes) => write_whole(&settings, bytes).unwrap_or_default(),
             None if error.kind() == ErrorKind::Rejected => {
                 std::fs::remove_file(settings).unwrap_or_default();
-                if self.empty {
+                // A patient made by `synth` is no case, and nobody's to clear away.
+                if self.stages.is_empty() {
                     self.clear();
                 }
             }
@@ -70,6 +92,33 @@ mod tests {
         let made = Produced { files: vec![(layout::MNI_FROM_PRE_TEXT.to_owned(), vec![1])], ..Produced::default() };
         Stage::new("pose", 1, folder, &"new").run(false, || Ok::<_, PredictError>(made)).unwrap();
         before.put_back(&PredictError::NoPlan.into());
+    }
+
+    #[test]
+    fn a_refused_job_leaves_the_settings_of_a_case_until_a_stage_is_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = Case::at(folder.path());
+        let read = |case: &Case| std::fs::read_to_string(case.path(layout::SETTINGS)).ok();
+        let stage = |settings: &'static str| {
+            let made = || Ok::<_, PredictError>(Produced::default());
+            Stage::new("mesh", 1, folder.path(), &settings).run(false, made).unwrap();
+        };
+        let refused = |job: &dyn Fn()| {
+            let before = Before::of(&case);
+            std::fs::write(case.path(layout::SETTINGS), "new").unwrap();
+            job();
+            before.put_back_where_nothing_is_new();
+            read(&case)
+        };
+        assert_eq!(refused(&|| ()), None, "there were none");
+        stage("old");
+        std::fs::write(case.path(layout::SETTINGS), "old").unwrap();
+        // A stage that is skipped is of the old settings, too.
+        assert_eq!(refused(&|| stage("old")).unwrap(), "old");
+        assert_eq!(refused(&|| stage("new")).unwrap(), "new");
+        std::fs::write(case.path(layout::SETTINGS), "old").unwrap();
+        let answer = || write_whole(&case.path(layout::OUTCOME), b"{}").unwrap();
+        assert_eq!(refused(&answer).unwrap(), "new", "an answer is of the settings that it was given with");
     }
 
     #[test]

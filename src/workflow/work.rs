@@ -5,6 +5,7 @@ use super::error::{CaseError, WorkflowError};
 use super::lock::Lock;
 use super::programs::Programs;
 use super::progress::{Progress, StageEnded};
+use super::put_back::Before;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Produced, Stage, StageError};
@@ -39,6 +40,7 @@ pub(crate) struct Work<'a> {
     pub place: &'a Place,
     progress: RefCell<&'a mut dyn Progress>,
     held: OnceCell<Lock>,
+    before: OnceCell<Before>,
 }
 
 /// What a stage does where it is not skipped.
@@ -82,6 +84,7 @@ impl<'a> Work<'a> {
             place,
             progress: RefCell::new(progress),
             held: OnceCell::new(),
+            before: OnceCell::new(),
         }
     }
 
@@ -97,6 +100,19 @@ impl<'a> Work<'a> {
         // A job takes its folder once.
         self.held.set(lock).ok();
         self.case.check_subject(self.subject)
+    }
+
+    /// Remembers how the folder is, before the job writes its settings there.
+    pub fn remember(&self) {
+        self.before.get_or_init(|| Before::of(&self.case));
+    }
+
+    /// How the job ended: a folder that it has refused without having made anything keeps the settings that it had.
+    pub fn ended<T>(&self, job: Result<T, WorkflowError>) -> Result<T, WorkflowError> {
+        if let (Err(_), Some(before)) = (&job, self.before.get()) {
+            before.put_back_where_nothing_is_new();
+        }
+        job
     }
 
     /// Tells whoever listens.
