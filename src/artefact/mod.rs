@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all, checksums, manifests, resume.
 //!
-//! A stage's outputs are each written to `NAME.part` and renamed; the manifest comes last, so a stage whose manifest
-//! is there is complete. A stage is skipped when its key (inputs + settings + stage version) is the manifest's and
+//! A stage's outputs are each written to a file of its own, `NAME.PROCESS-CALL.part`, and renamed; the manifest comes last, so a stage
+//! whose manifest is there is complete. A stage is skipped when its key (inputs + settings + stage version) is the manifest's and
 //! every output still has the bytes the manifest names.
 
 mod manifest;

@@ -1,8 +1,10 @@
 //! Whole-file writes and checksums.
 
 use sha2::{Digest, Sha256};
-use std::io::Write;
+use std::fs::File;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{PoisonError, RwLock, RwLockWriteGuard};
 use thiserror::Error;
 
@@ -33,7 +35,7 @@ pub fn no_more_writes() -> RwLockWriteGuard<'static, ()> {
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     let refuse = |source| WriteError { path: path.to_path_buf(), source };
     if path.is_dir() {
-        return Err(refuse(std::io::ErrorKind::IsADirectory.into()));
+        return Err(refuse(ErrorKind::IsADirectory.into()));
     }
     let folder = |path: &Path| {
         let parent = path.parent().unwrap_or(Path::new(""));
@@ -44,38 +46,82 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
         there = folder(&there);
     }
     if !there.is_dir() {
-        return Err(refuse(std::io::ErrorKind::NotADirectory.into()));
+        return Err(refuse(ErrorKind::NotADirectory.into()));
     }
-    let trial = there.join(format!(".hgm-{}.part", std::process::id()));
-    std::fs::File::create(&trial).map_err(refuse)?;
+    let (_, trial) = new_part(&there.join(".hgm")).map_err(refuse)?;
     std::fs::remove_file(&trial).map_err(refuse)
 }
 
-/// Writes `bytes` so that `path` holds either all of them or what it held before: to `NAME.part`, flushed, renamed.
-/// Folders are made as needed.
+/// A file of this call's own beside `path`, `NAME.PROCESS-CALL.part`, held by a lock as long as it is open: several processes may write
+/// one name at once, and whoever finds such a file can tell whether somebody is still at it.
+fn new_part(path: &Path) -> std::io::Result<(File, PathBuf)> {
+    static CALLS: AtomicU64 = AtomicU64::new(0);
+    loop {
+        let call = CALLS.fetch_add(1, Ordering::Relaxed);
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!(".{}-{call}.part", std::process::id()));
+        match File::create_new(&name) {
+            Ok(file) => {
+                // Where the disk knows no locks, nobody takes the file away either.
+                file.try_lock().ok();
+                return Ok((file, name.into()));
+            }
+            // A process of the same number on another machine, or one that was killed.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Takes away what a process that was killed has left of this name: such files are held by nobody.
+fn clear_left_parts(path: &Path) {
+    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return };
+    let name = name.to_string_lossy();
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let is_part = |found: &str| {
+        let own = found.strip_prefix(&*name).and_then(|own| own.strip_suffix(".part"));
+        let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        let numbers = own.and_then(|own| own.strip_prefix('.')).and_then(|own| own.split_once('-'));
+        own == Some("") || numbers.is_some_and(|(process, call)| number(process) && number(call))
+    };
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let left = || File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+        if is_part(&entry.file_name().to_string_lossy()) && left() {
+            std::fs::remove_file(entry.path()).ok();
+        }
+    }
+}
+
+/// Writes `bytes` so that `path` holds either all of them or what it held before, whoever else writes it: to a file of its own beside
+/// it, flushed, renamed. Folders are made as needed.
 ///
 /// # Errors
 /// [`WriteError`] when the system refuses.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    /// Another process may take a file away before it is held; not again and again.
+    const TRIES: usize = 5;
     let refuse = |source| WriteError { path: path.to_path_buf(), source };
     let _writing = WRITING.read().unwrap_or_else(PoisonError::into_inner);
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(refuse)?;
     }
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
+    clear_left_parts(path);
     let written = || {
-        let mut file = std::fs::File::create(&part)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&part, path)
+        let (file, part) = new_part(path)?;
+        let whole = (&file).write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(&part, path));
+        whole.inspect_err(|_| {
+            // A full disk stays full, and half a file is nobody's.
+            std::fs::remove_file(&part).ok();
+        })
     };
-    written().map_err(|source| {
-        // A full disk stays full, and half a file is nobody's.
-        std::fs::remove_file(&part).ok();
-        refuse(source)
-    })
+    let mut ended = written();
+    for _ in 1..TRIES {
+        if !ended.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotFound) {
+            break;
+        }
+        ended = written();
+    }
+    ended.map_err(refuse)
 }
 
 /// SHA-256 in lower-case hexadecimal.
@@ -110,6 +156,36 @@ mod tests {
     }
 
     #[test]
+    fn many_may_write_one_name_at_once_and_each_file_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bin");
+        std::thread::scope(|scope| {
+            for byte in 0..8u8 {
+                let bytes = vec![byte; 1 << 16];
+                let path = &path;
+                scope.spawn(move || (0..20).for_each(|_| write_whole(path, &bytes).unwrap()));
+            }
+        });
+        let bytes = std::fs::read(&path).unwrap();
+        assert!(bytes.len() == 1 << 16 && bytes.iter().all(|byte| *byte == bytes[0]));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_a_killed_process_has_left_of_a_name_goes_with_the_next_write_of_it_and_what_is_held_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["x.bin.part", "x.bin.17-3.part", "x.bin.vtu.17-3.part", "x.bin.mine.part", "y.bin.17-3.part"] {
+            std::fs::write(at(name), "half").unwrap();
+        }
+        let (_held, part) = new_part(&at("x.bin")).unwrap();
+        write_whole(&at("x.bin"), b"whole").unwrap();
+        let left = |name: &str| at(name).exists();
+        assert!(part.exists() && !left("x.bin.part") && !left("x.bin.17-3.part"));
+        assert!(left("x.bin.vtu.17-3.part") && left("x.bin.mine.part") && left("y.bin.17-3.part"));
+    }
+
+    #[test]
     fn a_place_that_takes_no_file_is_known_before_there_is_one_and_nothing_is_left_there() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -130,7 +206,7 @@ mod tests {
             let writer = scope.spawn(|| (0..20).for_each(|_| write_whole(&path, &bytes).unwrap()));
             while !writer.is_finished() {
                 let held = no_more_writes();
-                assert!(!folder.path().join("x.bin.part").exists());
+                assert!(std::fs::read_dir(folder.path()).unwrap().all(|file| file.unwrap().file_name() == "x.bin"));
                 drop(held);
                 std::thread::yield_now();
             }
