@@ -1,5 +1,6 @@
 //! The group level: every subject's numbers in one table and one page.
 
+use super::out_folder::may_hold_derivatives;
 use super::{Dataset, POPULATION, learn, member};
 use crate::artefact::write_whole;
 use crate::report::cohort::{Cohort, Member};
@@ -21,11 +22,12 @@ pub struct Group {
 /// Table, page and population of the subjects below `out`; `cases` is below which the case folders lie.
 ///
 /// # Errors
-/// No subject that has been run, one whose files are damaged, a population that cannot be inferred; the disk's.
+/// A folder of scans, no subject that has been run, one whose files are damaged, a population that cannot be inferred; the disk's.
 ///
 /// # Panics
 /// Never: a cohort is plain data.
 pub fn group(dataset: &Dataset, out: &Path, cases: &Path) -> Result<Group, WorkflowError> {
+    may_hold_derivatives(dataset, out)?;
     let members = dataset.subjects.iter().map(|name| member(out, cases, name)).collect::<Result<Vec<Member>, _>>()?;
     if members.iter().all(|m| m.outcome.is_none()) {
         return Err(CohortError::NobodyRun { out: out.to_path_buf() }.into());

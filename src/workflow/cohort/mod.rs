@@ -3,6 +3,7 @@
 mod dataset;
 mod foretold;
 mod group_level;
+mod out_folder;
 mod participant_level;
 mod population;
 
@@ -22,6 +23,7 @@ use crate::layout;
 use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
 use foretold::with_prediction;
+use out_folder::may_hold_derivatives;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -49,8 +51,9 @@ pub struct Log {
 /// Writes what lies once at the top of the derivatives.
 ///
 /// # Errors
-/// [`CohortError`] when the folder cannot be made.
+/// [`CohortError`] when the folder cannot be made, or holds scans.
 pub fn begin(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
+    may_hold_derivatives(dataset, out)?;
     std::fs::create_dir_all(out).map_err(|source| CohortError::NoFolder { out: out.to_path_buf(), source })?;
     let absolute = |folder: &Path| {
         folder.canonicalize().map_err(|source| CohortError::Lost { folder: folder.to_path_buf(), source })

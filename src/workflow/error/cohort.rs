@@ -13,6 +13,12 @@ pub enum CohortError {
     NoFolder { out: PathBuf, source: std::io::Error },
     #[error("{}: the folder cannot be found; check the path: {source}", folder.display())]
     Lost { folder: PathBuf, source: std::io::Error },
+    #[error(
+        "{}: is a data set of scans, whose dataset_description.json and README the derivatives would replace; name another folder \
+         for them, usually {}",
+        out.display(), instead.display()
+    )]
+    RawDataSet { out: PathBuf, instead: PathBuf },
     #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
     Log { file: PathBuf },
     #[error("{}: no subject has been run to its end here", out.display())]
