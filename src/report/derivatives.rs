@@ -123,6 +123,43 @@ pub fn plan_files(case: &Path, pre: &RawScan) -> Result<Vec<CaseFile>, Derivativ
     Ok(files)
 }
 
+/// What lies in the derivatives beside a scan's images and was made of so many scans (two of a case, one of a prediction): files under a
+/// name that the layout has, whatever entities of a scan stand before it, whose sidecar says that this program made them.
+pub fn published(out: &Path, scan: &RawScan, scans: usize) -> Vec<String> {
+    let (folder, file) = scan.0.rsplit_once('/').unwrap_or(("", &scan.0));
+    let begin: Vec<&str> = file.split('_').take(2).collect();
+    let begin = begin.join("_");
+    let plan = format!("space-{TEMPLATE}_label-resection_mask.nii.gz");
+    let names: Vec<String> =
+        layout::TABLE.iter().filter_map(|file| file.bids).map(|bids| bids.spelt()).chain([plan]).collect();
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(out.join(folder)).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let Some(stem) = name.strip_suffix(".json") else { continue };
+        let sidecar = std::fs::read(entry.path()).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let ours = sidecar.is_some_and(|said| {
+            said["GeneratedBy"][0]["Name"] == "hgm" && said["RawSources"].as_array().is_some_and(|s| s.len() == scans)
+        });
+        let ending = stem.strip_prefix(&begin).and_then(|own| names.iter().find_map(|name| ending_of(own, name)));
+        if let Some(ending) = ending.filter(|_| ours) {
+            found.extend([format!("{folder}/{stem}{ending}"), format!("{folder}/{name}")]);
+        }
+    }
+    found
+}
+
+/// The extension of a name of the layout, where a stem ends as that name does; a member of a family is any.
+fn ending_of<'n>(stem: &str, name: &'n str) -> Option<&'n str> {
+    let (spelt, ending) = name.split_at(name.find('.')?);
+    let fits = match spelt.split_once("{state}") {
+        None => stem.ends_with(&format!("_{spelt}")),
+        Some((before, after)) => stem.strip_suffix(after).is_some_and(|own| {
+            own.trim_end_matches(|c: char| c.is_ascii_alphanumeric()).ends_with(&format!("_{before}"))
+        }),
+    };
+    fits.then_some(ending)
+}
+
 /// The files of a family that are there, by member, in order.
 fn members(case: &Path, family: Family) -> Vec<(String, String)> {
     let entries = std::fs::read_dir(case.join(family.folder())).into_iter().flatten().flatten();
@@ -150,7 +187,7 @@ fn sidecar_of_image(bids: &BidsName, scan: &RawScan, both: &[String; 2]) -> Valu
     own
 }
 
-fn generated_by() -> Value {
+pub(crate) fn generated_by() -> Value {
     json!([{"Name": "hgm", "Version": env!("CARGO_PKG_VERSION")}])
 }
 

@@ -1,6 +1,7 @@
 //! The subjects of a data set before the operation, and their predictions once the scan after it is there.
 
 use super::dataset::{Dataset, ScanAndPlan};
+use super::published::Published;
 use crate::artefact::write_whole;
 use crate::layout;
 use crate::report::derivatives::plan_files;
@@ -19,8 +20,8 @@ pub fn plan_folder(out: &Path, subject: &str) -> PathBuf {
 }
 
 /// A subject's page before the operation.
-fn page_of(out: &Path, subject: &str) -> PathBuf {
-    out.join(format!("{subject}_plan.html"))
+fn page_of(subject: &str) -> String {
+    format!("{subject}_plan.html")
 }
 
 /// One subject from the scan before surgery and its plan to a prediction, its fields under BIDS names.
@@ -44,12 +45,15 @@ pub fn planned_subject(
         brain_mask: None,
         ventricle_mask: None,
     };
-    let (case, _) = predict(&inputs, place, settings, progress)?;
-    for (file, bytes) in plan_files(case.folder(), &planned.pre)? {
-        write_whole(&out.join(file), &bytes)?;
-    }
-    let subject = planned.pre.0.split('/').next().unwrap_or_default();
-    write_whole(&page_of(out, subject), &case.read(layout::PAGE)?)?;
+    let page = page_of(planned.pre.0.split('/').next().unwrap_or_default());
+    let published = Published { out, page: page.clone(), scans: &[&planned.pre] };
+    let (case, _) = predict(&inputs, place, settings, progress).or_else(|error| {
+        published.after(&Case::at(&place.folder), &error)?;
+        Err(error)
+    })?;
+    let mut files = plan_files(case.folder(), &planned.pre)?;
+    files.push((page, case.read(layout::PAGE)?));
+    published.replace(&files)?;
     Ok(case)
 }
 
@@ -88,7 +92,7 @@ pub(super) fn held_against(
     let Some(prediction) = beside(case.folder()) else { return Ok(()) };
     let seen = SeenAfterwards { case: Some(case.folder().to_path_buf()), ..SeenAfterwards::default() };
     match evaluate_prediction(prediction.folder(), &seen) {
-        Ok(_) => Ok(write_whole(&page_of(out, subject), &prediction.read(layout::PAGE)?)?),
+        Ok(_) => Ok(write_whole(&out.join(page_of(subject)), &prediction.read(layout::PAGE)?)?),
         Err(error) => {
             progress.noted(&format!("the prediction is not held against the case: {error}"));
             Ok(())

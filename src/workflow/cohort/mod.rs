@@ -6,6 +6,7 @@ mod group_level;
 mod out_folder;
 mod participant_level;
 mod population;
+mod published;
 
 pub use dataset::{Dataset, DatasetError, ScanAndPlan, ScanPair};
 pub use foretold::{plan_folder, planned_subject};
@@ -24,6 +25,7 @@ use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
 use foretold::with_prediction;
 use out_folder::may_hold_derivatives;
+use published::Published;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -65,7 +67,7 @@ pub fn begin(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
     Ok(())
 }
 
-/// One subject from its scans to its files under BIDS names.
+/// One subject from its scans to its files under BIDS names, in place of those of an earlier run.
 ///
 /// # Errors
 /// As [`super::run_to`].
@@ -78,17 +80,12 @@ pub fn subject(
 ) -> Result<Case, WorkflowError> {
     let inputs = Inputs::pair(dataset.folder.join(&pair.pre.0), dataset.folder.join(&pair.post.0));
     let name = pair.pre.0.split('/').next().unwrap_or_default();
+    let published = Published { out, page: format!("{name}.html"), scans: &[&pair.pre, &pair.post] };
     let case = with_prediction(goal, &inputs, place, settings, progress).or_else(|error| {
-        if error.answer().is_some() {
-            // What the scans said has its page, too.
-            let page = Case::at(&place.folder).read(layout::PAGE)?;
-            write_whole(&out.join(format!("{name}.html")), &page)?;
-        }
+        published.after(&Case::at(&place.folder), &error)?;
         Err(error)
     })?;
-    for (file, bytes) in subject_files(case.folder(), &pair.pre, &pair.post)? {
-        write_whole(&out.join(file), &bytes)?;
-    }
+    published.replace(&subject_files(case.folder(), &pair.pre, &pair.post)?)?;
     foretold::held_against(&case, (out, name), progress)?;
     Ok(case)
 }
