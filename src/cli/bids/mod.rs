@@ -15,9 +15,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Level::Participant if args.dry_run => participant::plan(args, &dataset, session),
         Level::Participant => participant::run(args, &dataset, session),
         Level::Group => {
-            let found = group(&dataset, &args.out, args.cases())?;
-            let said = found.population.iter().map(|line| line.clone() + "\n").collect::<String>();
-            session.emit(&found.cohort, &format!("{}\n{said}{}", found.cohort.to_tsv(), found.page.display()))
+            let found = group(&dataset, &args.out, args.cases(), args.dry_run)?;
+            session.emit(&found.cohort, &format!("{}\n{}", found.cohort.to_tsv(), found.said.join("\n")))
         }
     }
 }
