@@ -6,6 +6,8 @@ use thiserror::Error;
 
 /// What a plan's `label` is called.
 const PLANNED: &str = "resection";
+/// What stands for no entity at all where one of several scans is chosen.
+const NONE: &str = "none";
 /// Sessions of the two scans.
 const SESSIONS: [&str; 2] = ["ses-preop", "ses-postop"];
 
@@ -50,7 +52,7 @@ pub enum DatasetError {
     Absent { absent: String, folder: PathBuf, subjects: Vec<String> },
     #[error("{folder}: no {stem}_T1w.nii.gz{}; add the scan, or leave the subject out", with(entities))]
     NoScan { folder: String, stem: String, entities: Vec<String> },
-    #[error("{folder}: {} scans fit ({})", found.len(), found.join(", "))]
+    #[error("{folder}: {} scans fit ({}){}", found.len(), found.join(", "), or_none(found))]
     SeveralScans { folder: String, found: Vec<String>, entity: String },
     #[error(
         "{}: no {stem}_label-{PLANNED}_mask.nii.gz{}; draw what is to be taken in the scan's grid, or leave the subject out",
@@ -86,7 +88,7 @@ impl Dataset {
         Ok(Self { folder: folder.to_path_buf(), subjects })
     }
 
-    /// The two scans of a subject; `entities` (such as `run-2`) choose where a session has several.
+    /// The two scans of a subject; `entities` (such as `run-2`, or `none` for the scan without any) choose where a session has several.
     ///
     /// # Errors
     /// [`DatasetError::NoScan`] or [`DatasetError::SeveralScans`].
@@ -134,7 +136,9 @@ impl Dataset {
         found.retain(|name| {
             let stem = name.strip_suffix(".gz").unwrap_or(name).strip_suffix("_T1w.nii");
             // `run-2` must not choose `run-21`.
-            let has = |stem: &str, entity: &String| stem.split('_').any(|part| part == entity);
+            let has = |stem: &str, entity: &String| {
+                if entity == NONE { is_plain(name) } else { stem.split('_').any(|part| part == entity) }
+            };
             name.starts_with(&begin) && stem.is_some_and(|stem| entities.iter().all(|entity| has(stem, entity)))
         });
         match &found[..] {
@@ -150,11 +154,27 @@ impl Dataset {
     }
 }
 
-/// An entity that the first name has and the second has not.
+/// An entity that one of the names has and no other, else one that not all have.
 fn distinguishing(names: &[String]) -> &str {
-    let other: Vec<&str> = names[1].split('_').collect();
-    let mut own = names[0].split('_').skip(2).filter(|part| part.contains('-') && !other.contains(part));
-    own.next().unwrap_or("run-1")
+    let has = |name: &String, part: &str| name.split('_').any(|own| own == part);
+    let with = |part: &str| names.iter().filter(|name| has(name, part)).count();
+    let parts = || names.iter().flat_map(|name| name.split('_').skip(2)).filter(|part| part.contains('-'));
+    let one = parts().find(|part| with(part) == 1);
+    one.or_else(|| parts().find(|part| with(part) < names.len())).unwrap_or(NONE)
+}
+
+/// Whether a scan's name has nothing but subject and session before its suffix.
+fn is_plain(name: &str) -> bool {
+    name.split('_').count() == 3
+}
+
+/// What chooses the scan without entities, where it is one of several.
+fn or_none(found: &[String]) -> String {
+    if found.iter().any(|name| is_plain(name)) {
+        format!("; `{NONE}` is the one without an entity")
+    } else {
+        String::new()
+    }
 }
 
 /// Names in a folder, in order.
@@ -210,6 +230,26 @@ mod tests {
         assert!(chosen.pre.0.ends_with("run-2_T1w.nii.gz"));
         let missing = dataset.pair("sub-02", &[]).unwrap_err().to_string();
         assert!(missing.contains("sub-02/ses-postop/anat") && missing.contains("leave the subject out"), "{missing}");
+    }
+
+    #[test]
+    fn what_chooses_among_scans_is_there_and_the_plain_one_can_be_chosen() {
+        let (_folder, dataset) = dataset(&[
+            "sub-01/ses-preop/anat/sub-01_ses-preop_T1w.nii.gz",
+            "sub-01/ses-preop/anat/sub-01_ses-preop_ce-gd_T1w.nii.gz",
+            "sub-01/ses-postop/anat/sub-01_ses-postop_T1w.nii.gz",
+            "sub-01/ses-postop/anat/sub-01_ses-postop_ce-gd_T1w.nii.gz",
+        ]);
+        let doubtful = dataset.pair("sub-01", &[]).unwrap_err();
+        assert!(matches!(&doubtful, DatasetError::SeveralScans { entity, .. } if entity == "ce-gd"), "{doubtful:?}");
+        assert!(doubtful.to_string().contains("`none` is the one without"), "{doubtful}");
+        for (chosen, end) in [("ce-gd", "preop_ce-gd_T1w.nii.gz"), ("none", "preop_T1w.nii.gz")] {
+            assert!(dataset.pair("sub-01", &[chosen.to_owned()]).unwrap().pre.0.ends_with(end), "{chosen}");
+        }
+        let crossed = ["a_b_acq-x_run-1_T1w.nii", "a_b_acq-x_run-2_T1w.nii", "a_b_acq-y_run-1_T1w.nii"];
+        let crossed = crossed.map(str::to_owned);
+        assert_eq!(distinguishing(&crossed), "run-2");
+        assert_eq!(distinguishing(&crossed[..2]), "run-1");
     }
 
     #[test]
