@@ -44,12 +44,13 @@ impl Published<'_> {
             return self.replace(&[(self.page.clone(), case.read(layout::PAGE)?)]);
         }
         // Another job's, or none that was ever here.
-        let not_ours = matches!(error, WorkflowError::Case(CaseError::Held { .. })) || case.subject() != self.subject();
+        let not_ours =
+            matches!(error, WorkflowError::Case(CaseError::Held { .. })) || case.subject() != Some(self.subject());
         if not_ours || case.check_outcome().is_ok() { Ok(()) } else { self.replace(&[]) }
     }
 
-    fn subject(&self) -> Option<Subject> {
-        Some(if self.scans.len() == 1 { Subject::Plan } else { Subject::Patient })
+    fn subject(&self) -> Subject {
+        if self.scans.len() == 1 { Subject::Plan } else { Subject::Patient }
     }
 }
 
