@@ -209,7 +209,7 @@ pub fn take_pair_apart(
 
     step("cavity");
     let (post_raw, post_known) = (post.on_template(), post.known());
-    let by_hand = subtract(given.cavity.clone(), given.resected.clone(), &before.brain_mni, &before.labels_mni)?;
+    let of_masks = subtract(given.cavity.clone(), given.resected.clone(), &before.brain_mni, &before.labels_mni)?;
     let tissue = tissue_of(&before.labels_mni);
     let known_tissue = both(&tissue, post_known);
     // Ratios of gain are those of the scans as they are; turning back is turning again.
@@ -228,8 +228,8 @@ pub fn take_pair_apart(
         })
     };
     let post_t1 = if scale.turned_at.is_some() { post_t1.map(|x| scale.of(x)) } else { post_t1 };
-    let computed = by_hand.is_none();
-    let unchanged = given.cavity.as_ref().and_then(|cavity| unchanged_percent(cavity, &before, &post_t1, post_known));
+    let drawn = given.cavity.as_ref().or(given.resected.as_ref());
+    let unchanged = drawn.and_then(|cavity| unchanged_percent(cavity, &before, &post_t1, post_known));
     let pair = CavityPair {
         pre: &before.t1_mni,
         pre_labels: &before.labels_mni,
@@ -240,7 +240,6 @@ pub fn take_pair_apart(
         grey_mean: before.tissue_means[1],
         grey_white_contrast: before.tissue_means[2] - before.tissue_means[1],
     };
-    let found = by_hand.map_or_else(|| find_cavity(&pair, &settings.cavity), Ok);
 
     step("sag");
     let fit_around = |cavity: &Mask<Mni>| {
@@ -250,15 +249,29 @@ pub fn take_pair_apart(
     };
     let template = &atlas::template().labels;
     let has_tissue = |p| template.nearest(template_from_patient.apply(p)).is_some_and(label::is_tissue);
-    let (mut finding, sag, lost_elsewhere_cc) = if computed {
-        with_losses_elsewhere(found, &pair, fit_around, has_tissue, &settings.cavity)?
-    } else {
-        let finding = found?;
+    let seen =
+        || with_losses_elsewhere(find_cavity(&pair, &settings.cavity), &pair, fit_around, has_tissue, &settings.cavity);
+    let around_mask = |finding: CavityFinding| -> Result<_, PairError> {
         let sag = fit_around(&finding.cavity)?;
+        let at_rest = given.cavity.is_none();
+        let finding =
+            if at_rest { CavityFinding { cavity: carried(&finding.cavity, &sag), ..finding } } else { finding };
         let cc = lost_elsewhere_cc(&pair, &sag, &finding.cavity, has_tissue, &settings.cavity);
-        (finding, sag, cc)
+        Ok((finding, sag, cc))
     };
     let mut beside: Vec<SegmentWarning> = Vec::new();
+    let (computed, (mut finding, sag, lost_elsewhere_cc)) = match of_masks {
+        None => (true, seen()?),
+        Some(drawn) if given.cavity.is_some() => (false, around_mask(drawn)?),
+        // The mask of what was taken says what is gone of the brain at rest. Where its walls are now the second scan shows.
+        Some(drawn) => match seen() {
+            Ok(found) if undone(&found.0.cavity, &found.1).dice(&drawn.resected) >= ONE_PLACE => (true, found),
+            _ => {
+                beside.push(SegmentWarning::CavityOfMask);
+                (false, around_mask(drawn)?)
+            }
+        },
+    };
     if computed {
         let near = around(&finding.cavity, settings.cavity.blood_mm + NEAR_MM);
         let cavity = finding.cavity.cropped(&near);
@@ -279,9 +292,11 @@ pub fn take_pair_apart(
         beside.extend(with_blood.told(settings.cavity.smallest_cc));
     }
     let filled_before = undone(&finding.cavity, &sag);
-    if given.resected.is_none() {
-        finding.resected = both(&filled_before, &before.brain_mni);
-    }
+    finding.resected = match (&given.resected, &given.cavity) {
+        (Some(resected), None) => resected.clone(),
+        (Some(_), Some(_)) => finding.resected,
+        (None, _) => both(&filled_before, &before.brain_mni),
+    };
     if finding.resected.count() == 0 {
         return Err(PairError::NothingResected);
     }
@@ -444,6 +459,17 @@ fn undone(cavity: &Mask<Mni>, sag: &AtlasFit<Mni>) -> Mask<Mni> {
     let near = around(cavity, NEAR_MM);
     let [undone] = sag.subject_from_atlas.warp([&cavity.map(f32::from)], &cavity.grid.cropped(&near));
     undone.map(|share| share >= 0.5).within(&cavity.grid, false)
+}
+
+/// A cavity whose tissue, the sag undone, is as much the mask of what was taken is that mask's (Dice): outlines of one cavity by two
+/// hands agree to .8 and more.
+const ONE_PLACE: f64 = 0.6;
+
+/// Where a place of the brain at rest is after its sag.
+fn carried(at_rest: &Mask<Mni>, sag: &AtlasFit<Mni>) -> Mask<Mni> {
+    let near = around(at_rest, NEAR_MM);
+    let [moved] = sag.atlas_from_subject.warp([&at_rest.map(f32::from)], &at_rest.grid.cropped(&near));
+    moved.map(|share| share >= 0.5).within(&at_rest.grid, false)
 }
 
 fn tissue_of(labels: &LabelMap<Mni>) -> Mask<Mni> {

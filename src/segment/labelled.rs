@@ -1,6 +1,6 @@
 //! A scan of any contrast taken apart by a label map that somebody else made.
 
-use super::native::labels_on;
+use super::native::{labels_on, mask_on};
 use super::{PosedScan, SegmentWarning, Segmentation, TissueVolumes, atlas};
 use crate::anatomy::label;
 use crate::geometry::{Frame, Mni, RigidTransform};
@@ -66,7 +66,8 @@ pub fn segment_by_labels<F: Frame>(scan: &PosedScan<'_, F>, given: &LabelMap<F>)
 
     let volume = |l: u8| labels_mni.map(|v| v == l).volume_cc();
     let segmentation = Segmentation {
-        brain: labels.map(|l| l > 0),
+        // As on the template's grid: tools differ in how much of the fluid they draw.
+        brain: mask_on(&brain, &scan.t1.grid, &scan.mni_from_t1),
         labels,
         t1_mni: raw.map(|x| scale.of(x)),
         known_mni: known.clone(),
@@ -192,6 +193,7 @@ mod tests {
             );
             let ventricle = found.labels_mni.map(|l| l == label::VENTRICLE);
             assert!(ventricle.dice(&template.labels.map(|l| l == label::VENTRICLE)) > 0.99);
+            assert_eq!(found.brain.clone().relabelled(), found.brain_mni);
         }
     }
 }

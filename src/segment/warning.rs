@@ -122,6 +122,12 @@ pub enum SegmentWarning {
         /// Share of that tissue, in percent.
         percent: f64,
     },
+    /// The mask of what was taken has no cavity beside it that the second scan shows.
+    #[error(
+        "no cavity is seen where the mask of the resected tissue says that one is: it is taken to be that mask, moved as the brain has \
+         moved; look at the scan after the operation, and give a cavity mask"
+    )]
+    CavityOfMask,
     /// The cavity ends where the scan does.
     #[error(
         "{percent:.0} % of the cavity's outside borders on brain that the post-operative scan does not show: the cavity and what was \
@@ -180,7 +186,10 @@ pub enum SegmentWarning {
         far_percent: f64,
     },
     /// No ventricle was found.
-    #[error("no ventricle was found: look at the labels before trusting the ventricle's boundary")]
+    #[error(
+        "no ventricle was found: their fluid is taken for that of the sulci, and for tissue where it is enclosed; look at the labels, \
+         and give a ventricle mask or a label map that has them"
+    )]
     NoVentricle,
     /// Grey and white matter are hard to tell apart.
     #[error("grey and white matter differ by only {ratio:.1} standard deviations: is this a T1-weighted image?")]
@@ -220,6 +229,8 @@ impl SegmentWarning {
             Self::NotVentricles { tissue_percent, far_percent } => {
                 tissue_percent.max(*far_percent) >= OF_SOMETHING_ELSE_PERCENT
             }
+            // Without them their fluid passes for fluid of the sulci, and is filled up.
+            Self::NoVentricle => true,
             Self::PoseOff { deg, shift_mm } => *deg >= OTHER_POSE_DEG || *shift_mm >= OTHER_POSE_MM,
             Self::LeavesOut { brain, percent, parts } => brain.leaves_too_much(parts, *percent),
             _ => false,
@@ -242,6 +253,7 @@ mod tests {
     #[test]
     fn a_cavity_drawn_over_living_tissue_is_not_believed_and_one_with_blood_in_it_is() {
         assert!(SegmentWarning::UnchangedCavity { percent: 100.0 }.belies_the_masks());
+        assert!(SegmentWarning::NoVentricle.belies_the_masks());
         assert!(!SegmentWarning::UnchangedCavity { percent: 60.0 }.belies_the_masks());
         assert!(
             !SegmentWarning::UnlikeScans { folds: 0.3 }.belies_the_masks(),

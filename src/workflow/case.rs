@@ -131,12 +131,16 @@ impl Case {
     /// # Errors
     /// [`WorkflowError::QualityGate`] with a sentence per mask; a phantom's are not asked.
     pub fn image_gate(&self) -> Result<(), WorkflowError> {
-        let stage = match self.subject() {
-            Some(Subject::Patient) => StageName::Anat,
-            Some(Subject::Plan) => StageName::Plan,
+        let stages: &[StageName] = match self.subject() {
+            Some(Subject::Patient) => &[StageName::Registration, StageName::Anat],
+            Some(Subject::Plan) => &[StageName::Plan],
             _ => return Ok(()),
         };
-        let (_, Implausible { implausible }) = self.stage(&stage)?;
+        let mut implausible = Vec::new();
+        for stage in stages {
+            let (_, of_stage): (_, Implausible) = self.stage(stage)?;
+            implausible.extend(of_stage.implausible);
+        }
         if implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(implausible)) }
     }
 

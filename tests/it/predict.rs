@@ -350,6 +350,9 @@ fn slow_a_pair_takes_up_its_prediction_to_the_same_bytes_and_holds_it_against_wh
     let as_planned = ["--resected-mask", mask.as_str()];
     let (ended, without) = run("alone", &as_planned);
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    // A mask of what was taken says what is gone at rest: where the cavity's walls are now is what the second scan shows, as ever.
+    const CAVITY: &str = "anat/post_space-MNI_label-cavity_mask.nii.gz";
+    assert_eq!(contents(&without)[CAVITY], contents(&finished_pair())[CAVITY]);
     let (ended, case) = run("planned", &[&as_planned[..], &["--prediction", &taken_up]].concat());
     assert!(ended.status.success() && mesh_is_theirs(&ended), "{}", String::from_utf8_lossy(&ended.stderr));
     same(&without, &case);

@@ -9,7 +9,7 @@ use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Volume};
 use crate::layout;
 use crate::register::transform_text::{rigid_from_text, to_itk_text, to_matrix_text};
-use crate::register::{RigidFit, register_two_scans};
+use crate::register::{FitWarning, RigidFit, register_two_scans};
 use crate::segment::{pose_of_head, pose_of_head_from, pose_of_labels};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
@@ -21,7 +21,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const NAME: StageName = StageName::Registration;
 /// What the pose is called, and how what is odd about it begins.
 pub(crate) const OF_POSE: &str = "pre to MNI";
@@ -31,6 +31,9 @@ pub(crate) const OF_POSE: &str = "pre to MNI";
 pub struct RegistrationFacts {
     /// Post to pre, then pre to MNI.
     pub fits: Vec<RegistrationOutcome>,
+    /// Why the fit of the second scan is not to be believed, a sentence each.
+    #[serde(default)]
+    pub implausible: Vec<String>,
 }
 
 /// The stage with its settings and inputs.
@@ -83,7 +86,12 @@ pub(crate) fn registration(
         let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
         write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
         let fits = vec![outcome(&pre_from_post, &scans.post.grid), fit];
-        produced.facts = facts(&RegistrationFacts { fits });
+        // Masks of one's own say that two scans are one person's, not which side is which.
+        let mirrored =
+            |warning: &&FitWarning| matches!(warning, FitWarning::MirrorFitsBetter { .. }) && warning.denies_the_fit();
+        let implausible =
+            pre_from_post.warnings.iter().filter(mirrored).map(|warning| format!("post to pre: {warning}")).collect();
+        produced.facts = facts(&RegistrationFacts { fits, implausible });
         Ok(produced)
     })
 }
