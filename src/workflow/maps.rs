@@ -151,7 +151,7 @@ impl Map {
         }
     }
 
-    /// Carries a point (mm).
+    /// Carries a point (mm). Its standard deviation is told in tissue alone: elsewhere nothing is believed of the field.
     pub fn carry(&self, x_mm: [f64; 3]) -> Carried {
         let x = Position::new(x_mm[0], x_mm[1], x_mm[2]);
         let rigid: [f64; 3] = self.rigid.apply(x).mm.into();
@@ -172,7 +172,8 @@ impl Map {
             Some(false) if still => PointState::Outside,
             Some(false) => PointState::Fluid,
         };
-        let sd_mm = self.sd.as_ref().filter(|_| state != PointState::Outside).and_then(|sd| sd.trilinear(at_rest));
+        // Of the very voxel that says it is tissue: those beside it that were taken hold 0, and those of fluid a continuation.
+        let sd_mm = self.sd.as_ref().filter(|_| state == PointState::Tissue).and_then(|sd| sd.nearest(at_rest));
         Carried { mm, sd_mm: sd_mm.map(f64::from), state }
     }
 
@@ -243,4 +244,49 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
     };
     let sd = native(field.on_whole(&field.sd_mm));
     Ok((vectors, Some(sd), native(field.on_whole(&field.believed))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Voxels of 1 mm along x, all moved by a third of a mm: two of tissue that was taken, four of tissue, two of fluid.
+    fn margin() -> Map {
+        let grid = Grid::<Native>::axis_aligned([8, 2, 2], [1.0; 3], [0.0; 3]);
+        let x = |n: usize| grid.voxel(n)[0];
+        let tissue = |n: usize| (2..6).contains(&x(n));
+        // Beside the tissue the field goes on, and falls to nothing.
+        let sd = |n: usize| match x(n) {
+            0 | 1 => 0.0,
+            6 => 0.4,
+            7 => 0.1,
+            _ => 0.8,
+        };
+        Map {
+            forward: Some(Volume::from_voxels(grid, |_| [0.0, 0.0, 0.3])),
+            sd: Some(Volume::from_data(grid, (0..grid.len()).map(sd).collect())),
+            believed: Some(Mask::from_fn(grid, tissue)),
+            resected: Some(Mask::from_fn(grid, |n| x(n) < 2)),
+            ..Map::still()
+        }
+    }
+
+    #[test]
+    fn a_point_of_tissue_has_the_tissues_spread_however_near_to_what_was_taken_or_to_fluid() {
+        let map = margin();
+        for x in [1.55, 2.0, 3.3, 5.45] {
+            let carried = map.carry([x, 0.5, 0.5]);
+            assert_eq!(carried.state, PointState::Tissue, "{x}");
+            assert!((carried.sd_mm.unwrap() - 0.8).abs() < 1e-6, "{x}: {carried:?}");
+        }
+    }
+
+    #[test]
+    fn a_point_in_fluid_or_in_what_was_taken_has_no_spread() {
+        let map = margin();
+        for (x, state) in [(1.45, PointState::Removed), (5.55, PointState::Fluid), (6.0, PointState::Fluid)] {
+            let carried = map.carry([x, 0.5, 0.5]);
+            assert_eq!((carried.state, carried.sd_mm), (state, None), "{x}");
+        }
+    }
 }
