@@ -11,7 +11,7 @@ use crate::artefact::write_whole;
 use crate::experiment::landmarks::{CarriedLandmarks, Evaluation, evaluate};
 use crate::geometry::Position;
 use crate::layout::LANDMARKS_JSON;
-use crate::overlay::Carried;
+use crate::overlay::{Carried, PointState};
 use crate::report::case::results_sha256;
 use std::path::Path;
 
@@ -35,17 +35,18 @@ pub fn evaluate_landmarks(folder: &Path, landmarks: &Landmarks) -> Result<Evalua
     }];
     let model = case.model()?;
     let with_model = model.iter().map(String::as_str).chain([FUSED]).filter(|_| model.is_some());
-    let mut places: Vec<(String, bool)> = vec![("tissue".to_owned(), true); pairs.len()];
+    let mut seen_in: Vec<Vec<PointState>> = Vec::new();
     for state in [OBSERVED].into_iter().chain(with_model) {
         let (map, _) = Map::of_case(&case, Some(state), WarpTo::Post, Part::Points)?;
         let to: Vec<Carried> = pairs.iter().map(|(_, x, _)| map.carry(*x)).collect();
-        places = to.iter().map(|c| (c.state.to_string(), c.state.moves_with_the_brain())).collect();
+        seen_in.push(to.iter().map(|c| c.state).collect());
         carried.push(CarriedLandmarks {
             state: state.to_owned(),
             to_mm: to.iter().map(|c| c.mm).collect(),
             sd_mm: to.iter().map(|c| c.sd_mm).collect(),
         });
     }
+    let places: Vec<(String, bool)> = (0..pairs.len()).map(|n| place(seen_in.iter().map(|states| states[n]))).collect();
     if !places.iter().any(|(_, counts)| *counts) {
         return Err(LandmarkError::NoneInside { file: shown(&landmarks.pre) }.into());
     }
@@ -59,4 +60,40 @@ pub fn evaluate_landmarks(folder: &Path, landmarks: &Landmarks) -> Result<Evalua
     let text = format!("{:#}\n", super::work::facts(&kept));
     write_whole(&case.path(LANDMARKS_JSON), text.as_bytes())?;
     Ok(evaluation)
+}
+
+/// Where a landmark lies, and whether it counts, by where each state has it. All rows of the summary are of the same landmarks, so
+/// one that any state moves with the brain counts in all: a state whose field ends short of it has its error there, too.
+fn place(states: impl Iterator<Item = PointState>) -> (String, bool) {
+    // The first of those that are farthest inside.
+    let inside = |state: &PointState| match state {
+        PointState::Tissue => 0,
+        PointState::Fluid => 1,
+        PointState::Removed => 2,
+        PointState::Outside => 3,
+    };
+    let state = states.min_by_key(inside).unwrap_or(PointState::Tissue);
+    (state.to_string(), state.moves_with_the_brain())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_landmark_counts_where_any_state_moves_it_in_whatever_order_they_come() {
+        use PointState::{Fluid, Outside, Removed, Tissue};
+        for (states, expected) in [
+            ([Tissue, Outside], ("tissue", true)),
+            ([Fluid, Outside], ("fluid", true)),
+            ([Fluid, Tissue], ("tissue", true)),
+            ([Removed, Removed], ("removed", false)),
+            ([Outside, Outside], ("outside", false)),
+        ] {
+            for order in [states, [states[1], states[0]]] {
+                let (name, counts) = place(order.into_iter());
+                assert_eq!((name.as_str(), counts), expected, "{order:?}");
+            }
+        }
+    }
 }
