@@ -17,14 +17,15 @@ use crate::experiment::predict::{
 };
 use crate::experiment::resection::Supports;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
-use crate::image::LabelMap;
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
+use crate::image::{LabelMap, Mask};
 use crate::layout::{
     NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTED_DRAWS, PREDICTED_STATE, PREDICTION_JSON, SHIFT, SHIFT_BACK,
     SHIFT_MASK, SHIFT_PROBABILITY, SHIFT_REACH, SHIFT_REACH_50, SHIFT_SD,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
+use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
 use crate::workflow::stage_name::StageName;
 use crate::workflow::targets::Targets;
@@ -34,7 +35,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;
@@ -139,6 +140,7 @@ struct Patient<'a> {
     head: PlannedHead,
     mni_from_pre: RigidTransform<Pre, Mni>,
     around: Surroundings,
+    planned: Mask<Pre>,
     targets: Vec<Target>,
     settings: &'a crate::workflow::Settings,
 }
@@ -147,13 +149,10 @@ impl<'a> Patient<'a> {
     fn read(work: &'a Work<'_>, input: &'a PredictInput<'a>) -> Result<Self, WorkflowError> {
         let case = &work.case;
         let mni_from_pre = pose(case)?;
-        let grid = spaced(grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?, work.settings.fields.spacing_mm);
-        let around = Surroundings {
-            brain: mask_of(case, PRE_NATIVE_BRAIN, &grid)?,
-            resected: mask_of(case, NATIVE_RESECTED, &grid)?,
-        };
+        let (around, planned) = surroundings(case, work.settings.fields.spacing_mm)?;
         let head = PlannedHead::read(case)?;
-        let mut patient = Self { input, head, mni_from_pre, around, targets: Vec::new(), settings: work.settings };
+        let (targets, settings) = (Vec::new(), work.settings);
+        let mut patient = Self { input, head, mni_from_pre, around, planned, targets, settings };
         patient.targets = input.targets.map_or_else(Vec::new, |targets| patient.targets_of(targets));
         Ok(patient)
     }
@@ -163,11 +162,7 @@ impl<'a> Patient<'a> {
         let of = |(x, name): (&[f64; 3], &Option<String>)| {
             let p: Position<Pre> = Position::new(x[0], x[1], x[2]);
             let found = Locator(self.input.mesh.0).find(self.mni_from_pre.apply(p).mm.into());
-            let place = match self.around.resected.nearest(p) {
-                Some(true) => TargetPlace::Removed,
-                _ if found.outside_mm > 0.0 => TargetPlace::Fluid,
-                _ => TargetPlace::Tissue,
-            };
+            let place = place_in(&self.planned, p, found.outside_mm);
             Target { name: name.clone(), at_mm: *x, place, found }
         };
         targets.points_mm.iter().zip(&targets.names).map(of).collect()
@@ -251,6 +246,27 @@ impl<'a> Patient<'a> {
             produced.warn([Warning::Folds { state: state.to_owned(), voxels: field.changed }]);
         }
         Ok(modes.draws)
+    }
+}
+
+/// What is around the mesh on the grid of the fields, and the plan on the scan's own: a coarse grid loses what is thin, and moves
+/// the margin by half of its spacing.
+fn surroundings(case: &Case, spacing_mm: f64) -> Result<(Surroundings, Mask<Pre>), WorkflowError> {
+    let own = grid_of::<Pre>(case, PRE_NATIVE_BRAIN)?;
+    let grid = spaced(own, spacing_mm);
+    let around = Surroundings {
+        brain: mask_of(case, PRE_NATIVE_BRAIN, &grid)?,
+        resected: mask_of(case, NATIVE_RESECTED, &grid)?,
+    };
+    Ok((around, mask_of(case, NATIVE_RESECTED, &own)?))
+}
+
+/// Where a target lies, so far from the mesh.
+fn place_in(planned: &Mask<Pre>, target: Position<Pre>, outside_mm: f64) -> TargetPlace {
+    match planned.nearest(target) {
+        Some(true) => TargetPlace::Removed,
+        _ if outside_mm > 0.0 => TargetPlace::Fluid,
+        _ => TargetPlace::Tissue,
     }
 }
 
@@ -414,4 +430,32 @@ pub(crate) fn fluid_of_head(
 /// Micrometres: more than any use needs.
 fn rounded(x: f64) -> f64 {
     (x * 1e3).round() / 1e3 + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    #[test]
+    fn what_a_plan_takes_of_the_targets_is_the_same_however_coarse_the_fields_are() {
+        let folder = tempfile::tempdir().unwrap();
+        // A cut of 3 mm through a block of 40.
+        let grid = Grid::<Pre>::axis_aligned([40; 3], [1.0; 3], [0.0; 3]);
+        let cut = Mask::from_fn(grid, |n| (22..25).contains(&grid.voxel(n)[0]));
+        for (file, mask) in [(PRE_NATIVE_BRAIN, Mask::filled(grid, true)), (NATIVE_RESECTED, cut)] {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, encode_mask(&mask)).unwrap();
+        }
+        for spacing_mm in [0.0, 2.0, 10.0] {
+            let (around, planned) = surroundings(&Case::at(folder.path()), spacing_mm).unwrap();
+            assert_eq!(around.resected.grid.spacing_mm()[0].round(), if spacing_mm > 0.0 { spacing_mm } else { 1.0 });
+            let at = |x: f64, outside_mm| place_in(&planned, Position::new(x, 20.0, 20.0), outside_mm);
+            let places = [21.0, 22.0, 24.4, 24.6].map(|x| at(x, 0.0));
+            let (tissue, removed) = (TargetPlace::Tissue, TargetPlace::Removed);
+            assert_eq!(places, [tissue, removed, removed, tissue], "{spacing_mm}");
+            assert_eq!((at(23.0, 1.0), at(30.0, 1.0)), (removed, TargetPlace::Fluid), "{spacing_mm}");
+        }
+    }
 }
