@@ -104,9 +104,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         | WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
             "see --tissues and --population"
         }
-        WorkflowError::Predict(PredictError::Taught(TaughtError::OtherWeight { .. })) => {
-            "see --population, --drained and --fluid-below"
-        }
+        WorkflowError::Predict(PredictError::Taught(_)) => "see --population, --drained and --fluid-below",
         WorkflowError::Predict(PredictError::Level(LevelError::BelowBrain { .. })) => "see --fluid-below and --drained",
         WorkflowError::Predict(PredictError::Level(LevelError::NoBrain)) => "--dseg takes labels of your own",
         WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",

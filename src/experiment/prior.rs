@@ -3,7 +3,7 @@
 use super::estimate::{Average, LogPrior, Scale, Unknown};
 use super::moments::mean_and_sd;
 use super::person_prior::{person_correlations, person_materials, person_prior};
-use super::population::PopulationPrior;
+use super::population::{Kind, PopulationPrior};
 use super::sample::{Sample, Tissue, TissueSample, every_combination};
 use crate::material::generative::{
     GenerativeModel, SampleSettings, SampledMaterial, draw_materials, joint_tissue_prior, sample_shear_moduli,
@@ -76,12 +76,13 @@ impl PriorSettings {
         Self { model: Some(self.model_of_estimates()), ..self.clone() }
     }
 
-    /// Refuses a population that is not of patients like this one.
+    /// Refuses a population that is not of patients like this one, whose load and Poisson's ratio are these.
     ///
     /// # Errors
     /// What is wrong, in words.
-    pub fn check(&self, density_kg_per_m3: f64) -> Result<(), String> {
-        self.population.as_ref().map_or(Ok(()), |population| population.check(self.law, density_kg_per_m3))
+    pub fn check(&self, density_kg_per_m3: f64, poisson_ratio: f64, drained: Option<f64>) -> Result<(), String> {
+        let job = Kind { law: self.law, density_kg_per_m3, poisson_ratio: Some(poisson_ratio), drained };
+        self.population.as_ref().map_or(Ok(()), |population| population.check(&job))
     }
 
     /// The cohort's prior of an unknown where it has one, else what was known before.

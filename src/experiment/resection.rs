@@ -171,6 +171,11 @@ impl ResectionSettings {
         weight || self.pressure.iter().any(|load| load.pressure_pa != 0.0)
     }
 
+    /// The part of the fluid that has drained, where there is a fluid.
+    pub fn drained(&self) -> Option<f64> {
+        self.csf.as_ref().map(|csf| csf.drained)
+    }
+
     /// The same brain in fluid: as these settings have it, or as most are.
     #[must_use]
     pub fn in_fluid(&self) -> Self {

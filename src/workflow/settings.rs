@@ -101,6 +101,12 @@ fn kept<E: Display>(checked: Result<(), E>) -> Checked {
     checked.map_err(|e| e.to_string())
 }
 
+/// Refuses a population of patients who were posed otherwise than this one.
+fn suits_prior(settings: &Settings) -> Result<(), String> {
+    let own = &settings.resection;
+    settings.prior.check(own.density_kg_per_m3, own.poisson_ratio, own.drained())
+}
+
 /// Refuses a fluid of unknown level where other settings take the load as known, or do not look at it.
 fn suits_fluid(settings: &Settings) -> Result<(), String> {
     let estimate = &settings.estimate;
@@ -130,7 +136,7 @@ const ROOMS: [Room; 16] = [
     ("mesh", read::<MeshSettings>, |s| kept(s.mesh.check())),
     ("phantom", read::<PhantomSettings>, |s| kept(s.phantom.check())),
     ("predict", read::<PredictSettings>, |s| kept(s.predict.check())),
-    ("prior", read::<PriorSettings>, |s| s.prior.check(s.resection.density_kg_per_m3)),
+    ("prior", read::<PriorSettings>, suits_prior),
     ("register", read::<RigidSettings>, |s| kept(s.register.check())),
     ("resection", read::<ResectionSettings>, |s| kept(s.resection.check())),
     ("segment", read::<SegmentSettings>, |s| kept(s.segment.check())),

@@ -2,7 +2,7 @@
 
 use crate::job::{contents, output, sample};
 use crate::made::prepared_pair;
-use hgm::experiment::population::{Moments, PopulationFile};
+use hgm::experiment::population::{Kind, Moments, PopulationFile};
 use hgm::material::meta_model::MetaModel;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,8 @@ pub fn of_brains(log_moduli: &[f64]) -> String {
     let one = |mean: &f64| Moments { information: vec![100.0 * mean], precision: vec![vec![100.0]] };
     let brain = [("shear_modulus_pa of brain".to_owned(), LITERATURE)];
     let moments = log_moduli.iter().map(one).collect();
-    PopulationFile::new((MetaModel::NEO_HOOKEAN, 100.0), &brain, moments, BTreeMap::new()).unwrap().to_toml()
+    let kind = Kind { law: MetaModel::NEO_HOOKEAN, density_kg_per_m3: 100.0, poisson_ratio: Some(0.45), drained: None };
+    PopulationFile::new(kind, &brain, moments, BTreeMap::new()).unwrap().to_toml()
 }
 
 fn said(result: &Output) -> String {

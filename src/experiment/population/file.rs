@@ -1,6 +1,7 @@
 //! `population.toml`: what a cohort says of people, and the moments that it says so from.
 
 use super::hierarchy::{Inferred, MEAN_SD, Population, SPREAD_SCALE, TooMany};
+use super::kind::Kind;
 use super::learnt::{LearntPrior, PopulationPrior};
 use super::moments::Moments;
 use crate::material::meta_model::MetaModel;
@@ -32,6 +33,12 @@ pub struct PopulationFile {
     pub law: MetaModel,
     /// The effective density that every patient was estimated under, kg/m3.
     pub density_kg_per_m3: f64,
+    /// The Poisson's ratio that every patient was estimated with; left out by older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
+    /// The part of a given fluid that had drained; left out without a fluid, and by older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drained: Option<f64>,
     /// Patients who teach.
     pub patients: usize,
     /// Patients who do not, by the reason.
@@ -135,7 +142,7 @@ impl PopulationFile {
     /// # Errors
     /// [`TooMany`].
     pub fn new(
-        (law, density_kg_per_m3): (MetaModel, f64),
+        kind: Kind,
         parameters: &[(String, Literature)],
         mut moments: Vec<Moments>,
         left_out: BTreeMap<String, usize>,
@@ -167,13 +174,21 @@ impl PopulationFile {
         Ok(Self {
             format: FORMAT,
             program: concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned(),
-            law,
-            density_kg_per_m3,
+            law: kind.law,
+            density_kg_per_m3: kind.density_kg_per_m3,
+            poisson_ratio: kind.poisson_ratio,
+            drained: kind.drained,
             patients: moments.len(),
             left_out,
             parameters: parameters.iter().enumerate().map(taught).collect(),
             moments,
         })
+    }
+
+    /// How its patients were estimated.
+    pub fn kind(&self) -> Kind {
+        let Self { law, density_kg_per_m3, poisson_ratio, drained, .. } = *self;
+        Kind { law, density_kg_per_m3, poisson_ratio, drained }
     }
 
     /// The population behind it, for its own patients.
@@ -192,6 +207,8 @@ impl PopulationFile {
         PopulationPrior {
             law: self.law,
             density_kg_per_m3: self.density_kg_per_m3,
+            poisson_ratio: self.poisson_ratio,
+            drained: self.drained,
             patients: self.patients,
             parameters: self.parameters.iter().filter(|taught| taught.moves_prior).map(learnt).collect(),
         }
@@ -235,8 +252,8 @@ impl PopulationFile {
     fn check_figures(&self) -> Result<(), String> {
         let known = |t: &Taught| (t.name.clone(), (t.literature_log_mean, t.literature_log_sd));
         let parameters: Vec<(String, Literature)> = self.parameters.iter().map(known).collect();
-        let cohort = (self.law, self.density_kg_per_m3);
-        let again = Self::new(cohort, &parameters, self.moments.clone(), BTreeMap::new()).map_err(|e| e.to_string())?;
+        let again =
+            Self::new(self.kind(), &parameters, self.moments.clone(), BTreeMap::new()).map_err(|e| e.to_string())?;
         for (read, follows) in self.parameters.iter().zip(&again.parameters) {
             let name = &read.name;
             if (read.patients, read.moves_prior) != (follows.patients, follows.moves_prior) {
@@ -265,6 +282,12 @@ impl PopulationFile {
         }
         if !(self.density_kg_per_m3 > 0.0 && self.density_kg_per_m3.is_finite()) {
             return Err(format!("`density_kg_per_m3` is {}: it must be above 0", self.density_kg_per_m3));
+        }
+        if let Some(ratio) = self.poisson_ratio.filter(|ratio| !(0.0..0.5).contains(ratio)) {
+            return Err(format!("`poisson_ratio` is {ratio}: it must be from 0 to below 0.5"));
+        }
+        if let Some(part) = self.drained.filter(|part| !(0.0..=1.0).contains(part)) {
+            return Err(format!("`drained` is {part}: it must be a part from 0 to 1"));
         }
         for (n, taught) in self.parameters.iter().enumerate() {
             let name = &taught.name;
@@ -301,13 +324,15 @@ impl PopulationFile {
 /// [`MergeError`].
 pub fn merged(files: &[(String, PopulationFile)]) -> Result<PopulationFile, MergeError> {
     let (first_name, first) = &files[0];
-    let how = |f: &PopulationFile| format!("with the law {} under {} kg/m3", f.law, f.density_kg_per_m3);
+    // Older files tell less: the first that tells all is what the others are held against, and what the whole is.
+    let (kind_name, kind) =
+        files.iter().find(|(_, f)| f.kind().tells_fluid()).map_or((first_name, first.kind()), |(n, f)| (n, f.kind()));
     let mut parameters: BTreeMap<String, Literature> = BTreeMap::new();
     let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
     for (name, file) in files {
-        if (file.law, file.density_kg_per_m3) != (first.law, first.density_kg_per_m3) {
-            let (file, first) = ((name.clone(), how(file)), (first_name.clone(), how(first)));
-            return Err(MergeError::Otherwise { file: file.0, first: first.0, its: file.1, those: first.1 });
+        if !file.kind().is_as(&kind) {
+            let (file, first, its) = (name.clone(), kind_name.clone(), file.kind().to_string());
+            return Err(MergeError::Otherwise { file, first, its, those: kind.to_string() });
         }
         for taught in &file.parameters {
             let own = (taught.literature_log_mean, taught.literature_log_sd);
@@ -334,5 +359,5 @@ pub fn merged(files: &[(String, PopulationFile)]) -> Result<PopulationFile, Merg
         }
         moments.extend(own);
     }
-    Ok(PopulationFile::new((first.law, first.density_kg_per_m3), &parameters, moments, left_out)?)
+    Ok(PopulationFile::new(kind, &parameters, moments, left_out)?)
 }

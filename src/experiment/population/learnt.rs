@@ -1,5 +1,6 @@
 //! What a cohort has taught, as the prior of the next patient.
 
+use super::kind::Kind;
 use crate::material::meta_model::MetaModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,6 +15,12 @@ pub struct PopulationPrior {
     pub law: MetaModel,
     /// The effective density that the patients were estimated under: gravity fixes a modulus only in proportion to it.
     pub density_kg_per_m3: f64,
+    /// The Poisson's ratio that they were estimated with; left out by older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
+    /// The part of a given fluid that had drained; left out without a fluid, and by older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drained: Option<f64>,
     /// Patients behind it.
     pub patients: usize,
     /// The parameters that it knows better than the literature does.
@@ -33,13 +40,17 @@ pub struct LearntPrior {
     pub log_sd: f64,
 }
 
-/// Effective densities nearer to each other than this share are the same.
-const SAME_DENSITY: f64 = 1e-6;
-
 impl PopulationPrior {
     /// No population: the literature's priors.
     pub fn none() -> Self {
-        Self { law: MetaModel::NEO_HOOKEAN, density_kg_per_m3: 0.0, patients: 0, parameters: Vec::new() }
+        Self {
+            law: MetaModel::NEO_HOOKEAN,
+            density_kg_per_m3: 0.0,
+            poisson_ratio: None,
+            drained: None,
+            patients: 0,
+            parameters: Vec::new(),
+        }
     }
 
     /// What it says of a parameter.
@@ -47,16 +58,17 @@ impl PopulationPrior {
         self.parameters.iter().find(|learnt| learnt.name == name)
     }
 
-    /// Whether its patients were estimated under this effective density.
-    pub fn is_under(&self, density_kg_per_m3: f64) -> bool {
-        (self.density_kg_per_m3 - density_kg_per_m3).abs() <= SAME_DENSITY * density_kg_per_m3.abs()
+    /// How its patients were estimated.
+    pub fn kind(&self) -> Kind {
+        let Self { law, density_kg_per_m3, poisson_ratio, drained, .. } = *self;
+        Kind { law, density_kg_per_m3, poisson_ratio, drained }
     }
 
     /// Refuses numbers that are no prior, and a job that is not the patients'.
     ///
     /// # Errors
     /// What is wrong, in words.
-    pub fn check(&self, law: MetaModel, density_kg_per_m3: f64) -> Result<(), String> {
+    pub fn check(&self, job: &Kind) -> Result<(), String> {
         for (n, learnt) in self.parameters.iter().enumerate() {
             let LearntPrior { name, log_mean, log_sd } = learnt;
             if !(log_mean.is_finite() && *log_sd > 0.0 && log_sd.is_finite()) {
@@ -72,18 +84,33 @@ impl PopulationPrior {
         if self.parameters.is_empty() {
             return Ok(());
         }
-        if self.law != law {
+        let own = self.kind();
+        if own.law != job.law {
             return Err(format!(
-                "`population` was learnt with the law {}, and this job's is {law}: give `law = \"{}\"` in the table [prior], or leave \
+                "`population` was learnt with the law {}, and this job's is {}: give `law = \"{}\"` in the table [prior], or leave \
                  the population out",
-                self.law, self.law
+                own.law, job.law, own.law
             ));
         }
-        if !self.is_under(density_kg_per_m3) {
+        if !own.weighs_as(job) {
             return Err(format!(
                 "`population` was learnt under an effective density of {} kg/m3, and `density_kg_per_m3` of [resection] is {}: moduli \
                  go with it; give the same, or leave the population out",
-                self.density_kg_per_m3, density_kg_per_m3
+                own.density_kg_per_m3, job.density_kg_per_m3
+            ));
+        }
+        if let Some((learnt, given)) = own.poisson_ratio.zip(job.poisson_ratio).filter(|_| !own.gives_as(job)) {
+            return Err(format!(
+                "`population` was learnt with a Poisson's ratio of {learnt}, and `poisson_ratio` of [resection] is {given}: moduli go \
+                 with it; give the same, or leave the population out"
+            ));
+        }
+        if !own.floats_as(job) {
+            return Err(format!(
+                "`population` was learnt with {}, and the table [resection.csf] (`drained`) says {}: moduli go with the fluid that \
+                 carries the brain; give the same, or leave the population out",
+                own.fluid(),
+                job.fluid()
             ));
         }
         Ok(())

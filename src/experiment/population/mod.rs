@@ -8,6 +8,7 @@
 mod file;
 mod grid;
 mod hierarchy;
+mod kind;
 mod learnt;
 mod mixture;
 mod moments;
@@ -16,5 +17,6 @@ mod tests;
 
 pub use file::{Literature, MergeError, PopulationFile, PopulationFileError, Taught, merged};
 pub use hierarchy::{Inferred, MOST_PARAMETERS, Population, Shrunken, TooMany};
+pub use kind::Kind;
 pub use learnt::{LearntPrior, PopulationPrior};
 pub use moments::Moments;

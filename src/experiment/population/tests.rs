@@ -85,8 +85,12 @@ fn moments(cohort: &[([f64; 2], EstimateOutcome)]) -> Vec<Moments> {
     cohort.iter().map(|(_, found)| Moments::of_estimate(found, &names()).unwrap()).collect()
 }
 
+/// How they were all estimated.
+const KIND: Kind =
+    Kind { law: MetaModel::NEO_HOOKEAN, density_kg_per_m3: 100.0, poisson_ratio: Some(0.45), drained: None };
+
 fn file(moments: Vec<Moments>) -> PopulationFile {
-    PopulationFile::new((MetaModel::NEO_HOOKEAN, 100.0), &parameters(), moments, BTreeMap::new()).unwrap()
+    PopulationFile::new(KIND, &parameters(), moments, BTreeMap::new()).unwrap()
 }
 
 #[test]
@@ -173,7 +177,7 @@ fn cohorts_of_one_and_of_two_tissues_merge_and_each_teaches_its_own() {
     let two = moments(&cohort(12, 5));
     let white_alone: Vec<Moments> = moments(&cohort(9, 6)).iter().map(|m| m.among(&[Some(1)])).collect();
     let one = PopulationFile::new(
-        (MetaModel::NEO_HOOKEAN, 100.0),
+        KIND,
         &[(WHITE.to_owned(), LITERATURE[1])],
         white_alone,
         BTreeMap::from([("no shift seen".to_owned(), 2)]),
@@ -210,6 +214,8 @@ fn a_file_reads_back_and_a_slip_in_it_is_refused_by_name() {
         ("format = 1", "format = 9", "`format` is 9"),
         ("patients = 6", "patients = 7", "there are 6 `moments`"),
         ("patients = 6", "patient = 6", "`patient`"),
+        ("poisson_ratio = 0.45", "poisson_ratio = 0.5", "`poisson_ratio` is 0.5"),
+        ("poisson_ratio = 0.45", "drained = 1.5", "`drained` is 1.5"),
         ("next_log_sd = ", "next_log_sd = -", "`next_log_sd`"),
         ("information = [", "information = [1.0, ", "must have 2 numbers"),
         ("law = \"neo-hookean\"", "law = \"neo\"", "neo"),
@@ -236,8 +242,45 @@ fn the_same_patients_give_the_same_bytes_in_any_order_and_on_one_thread() {
 #[test]
 fn a_prior_learnt_under_another_law_or_density_is_refused() {
     let prior = file(moments(&cohort(40, 4))).prior();
-    assert_eq!(prior.check(MetaModel::NEO_HOOKEAN, 100.0), Ok(()));
-    assert!(prior.check(MetaModel::OGDEN, 100.0).unwrap_err().contains("`law = \"neo-hookean\"` in the table [prior]"));
-    assert!(prior.check(MetaModel::NEO_HOOKEAN, 200.0).unwrap_err().contains("200"));
-    assert_eq!(PopulationPrior::none().check(MetaModel::OGDEN, 1.0), Ok(()));
+    assert_eq!(prior.check(&KIND), Ok(()));
+    let refused = |job: Kind| prior.check(&job).unwrap_err();
+    let ogden = Kind { law: MetaModel::OGDEN, ..KIND };
+    assert!(refused(ogden).contains("`law = \"neo-hookean\"` in the table [prior]"));
+    assert!(refused(Kind { density_kg_per_m3: 200.0, ..KIND }).contains("200"));
+    assert_eq!(PopulationPrior::none().check(&ogden), Ok(()));
+}
+
+#[test]
+fn a_prior_learnt_with_another_poissons_ratio_or_fluid_is_refused_and_an_older_one_that_does_not_tell_is_taken() {
+    let prior = file(moments(&cohort(40, 4))).prior();
+    let stiff = Kind { poisson_ratio: Some(0.49), ..KIND };
+    let said = prior.check(&stiff).unwrap_err();
+    assert!(said.contains("0.45") && said.contains("0.49") && said.contains("`poisson_ratio`"), "{said}");
+    let wet = Kind { drained: Some(0.3), ..KIND };
+    let said = prior.check(&wet).unwrap_err();
+    assert!(said.contains("no fluid") && said.contains("a part of 0.3") && said.contains("[resection.csf]"), "{said}");
+    let older = PopulationPrior { poisson_ratio: None, ..prior };
+    assert_eq!([KIND, stiff, wet].map(|job| older.check(&job)), [Ok(()), Ok(()), Ok(())]);
+}
+
+#[test]
+fn cohorts_merge_under_one_poissons_ratio_and_one_fluid_and_an_older_file_takes_those_of_the_others() {
+    let all = moments(&cohort(40, 3));
+    let whole = file(all.clone());
+    let [one, two, three] = [&all[..10], &all[10..20], &all[20..]].map(|some| file(some.to_vec()));
+    let older = PopulationFile { poisson_ratio: None, ..one.clone() };
+    let text = older.to_toml();
+    assert!(!text.contains("poisson") && PopulationFile::from_toml(&text, "older.toml").unwrap() == older);
+    let named = |file: &PopulationFile| (file.patients.to_string(), file.clone());
+    for files in [[&older, &two, &three], [&three, &two, &older]] {
+        assert_eq!(merged(&files.map(named)).unwrap(), whole);
+    }
+    let others = [(Some(0.49), None, "ratio 0.49"), (Some(0.45), Some(0.3), "a part of 0.3 of the fluid drained")];
+    for (poisson_ratio, drained, its) in others {
+        let other = PopulationFile { poisson_ratio, drained, ..two.clone() };
+        for files in [[&older, &three, &other], [&three, &older, &other]] {
+            let refused = merged(&files.map(named)).unwrap_err().to_string();
+            assert!(refused.contains(its) && refused.contains("ratio 0.45, no fluid"), "{refused}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //! cohort's all the same.
 
 use super::settings::PredictSettings;
+use crate::experiment::population::Kind;
 use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::Tissue;
@@ -25,10 +26,15 @@ pub enum TaughtError {
          (`drained` or `fluid_level` of the table [predict]) tissue weighs {weighs} kg/m3: moduli go with the weight; leave the population or that out"
     )]
     OtherWeight { learnt: f64, weighs: f64 },
+    #[error(
+        "`population` of the table [prior] was learnt with {learnt}, and `drained` or `fluid_level` of the table [predict] says {given}: moduli \
+         go with the fluid that carries the brain; leave the population or that out"
+    )]
+    OtherFluid { learnt: String, given: String },
 }
 
 impl PredictSettings {
-    /// Refuses a cohort of other tissues, or one that was weighed otherwise.
+    /// Refuses a cohort of other tissues, or one that was weighed otherwise or in another fluid.
     ///
     /// # Errors
     /// [`TaughtError`].
@@ -42,10 +48,18 @@ impl PredictSettings {
         // Where nothing is said of the fluid the load is what the settings were held against already.
         let fluid = self.drained.is_some() || self.fluid_level.is_some();
         let weighs = if fluid { self.tissue_density_kg_per_m3 } else { own.density_kg_per_m3 };
-        if population.is_under(weighs) {
-            return Ok(());
+        let learnt = population.kind();
+        let job = Kind { density_kg_per_m3: weighs, drained: self.drained, ..learnt };
+        if !learnt.weighs_as(&job) {
+            return Err(TaughtError::OtherWeight { learnt: population.density_kg_per_m3, weighs });
         }
-        Err(TaughtError::OtherWeight { learnt: population.density_kg_per_m3, weighs })
+        // Which part of the fluid a level leaves is another one in every head and every way of lying.
+        let level = self.fluid_level.is_some() && learnt.tells_fluid();
+        if level || (fluid && !learnt.floats_as(&job)) {
+            let given = if level { "a level of its own".to_owned() } else { job.fluid() };
+            return Err(TaughtError::OtherFluid { learnt: learnt.fluid(), given });
+        }
+        Ok(())
     }
 }
 
@@ -121,5 +135,28 @@ mod tests {
         let level = PredictSettings { drained: None, fluid_level, ..drained.clone() };
         assert!(refused(&level, &["brain"]).unwrap().contains("`fluid_level`"));
         assert_eq!(refused(&PredictSettings { tissue_density_kg_per_m3: 100.0, ..drained }, &["brain"]), None);
+    }
+
+    #[test]
+    fn a_cohort_in_another_fluid_is_refused_and_one_in_the_same_is_taken() {
+        let own = ResectionSettings::default();
+        let weighs = PredictSettings::default().tissue_density_kg_per_m3;
+        let said = |learnt: Option<f64>, settings: &PredictSettings| {
+            let mut prior = taught(&["brain"]);
+            let population = prior.population.as_mut().unwrap();
+            (population.density_kg_per_m3, population.poisson_ratio, population.drained) = (weighs, Some(0.45), learnt);
+            settings.check_taught(&own, &prior).err().map(|e| e.to_string())
+        };
+        let drained = PredictSettings { tissues: 1, drained: Some(0.3), ..PredictSettings::default() };
+        assert_eq!(said(Some(0.3), &drained), None);
+        let other = said(Some(0.5), &drained).unwrap();
+        assert!(
+            other.contains("a part of 0.5") && other.contains("a part of 0.3") && other.contains("`drained`"),
+            "{other}"
+        );
+        assert!(said(None, &drained).unwrap().contains("no fluid"));
+        let fluid_level = Some(KnownLevel { below_top_mm: 20.0, sd_mm: 5.0 });
+        let level = PredictSettings { drained: None, fluid_level, ..drained };
+        assert!(said(Some(0.3), &level).unwrap().contains("`fluid_level`"));
     }
 }

@@ -3,11 +3,10 @@
 use super::case_folder;
 use crate::artefact::write_whole;
 use crate::experiment::estimate::EstimateOutcome;
-use crate::experiment::population::{Literature, Moments, PopulationFile, PopulationPrior, merged};
+use crate::experiment::population::{Kind, Literature, Moments, PopulationFile, PopulationPrior, merged};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
 use crate::experiment::sample::Tissue;
 use crate::experiment::verdict::Finding;
-use crate::material::meta_model::MetaModel;
 use crate::report::cohort::{CohortPopulation, Member, Pupil, Status};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::user_file::{read_text, shown};
@@ -31,7 +30,7 @@ enum LeftOut {
     Finding(Finding),
     #[error("{}", .0.name())]
     Status(Status),
-    #[error("another law or density than most")]
+    #[error("another law, density, Poisson's ratio or fluid than most")]
     OtherKind,
     #[error("moduli under a fluid of unknown level")]
     UnknownFluid,
@@ -47,9 +46,15 @@ struct Teacher<'a> {
 }
 
 impl Teacher<'_> {
-    /// What moduli must have in common to be one population's: the law, and the density that they are in proportion to.
-    fn kind(&self) -> (MetaModel, f64) {
-        (self.settings.prior.law, self.settings.resection.density_kg_per_m3)
+    /// What moduli must have in common to be one population's.
+    fn kind(&self) -> Kind {
+        let own = &self.settings.resection;
+        Kind {
+            law: self.settings.prior.law,
+            density_kg_per_m3: own.density_kg_per_m3,
+            poisson_ratio: Some(own.poisson_ratio),
+            drained: own.drained(),
+        }
     }
 }
 
@@ -215,19 +220,30 @@ mod tests {
         members.push(member(9, 9000.0, Finding::Conflict, &settings));
         members.push(member(10, 600.0, Finding::NoShift, &settings));
         members.push(Member { status: Status::QualityGate, ..member(11, 600.0, Finding::Identified, &settings) });
-        // One under another density: its modulus is in proportion to that.
-        let case = case_folder(folder.path(), "sub-12");
-        std::fs::create_dir_all(&case).unwrap();
-        std::fs::write(case.join(crate::layout::SETTINGS), "[resection]\ndensity_kg_per_m3 = 50.0\n").unwrap();
-        members.push(member(12, 300.0, Finding::Identified, &settings));
+        // Others under another density, which a modulus is in proportion to, another Poisson's ratio, and in a fluid.
+        let others = [
+            "density_kg_per_m3 = 50.0",
+            "poisson_ratio = 0.49",
+            "density_kg_per_m3 = 1040.0\n[resection.csf]\ndrained = 0.5",
+        ];
+        for (n, other) in (12..).zip(others) {
+            let case = case_folder(folder.path(), &format!("sub-{n}"));
+            std::fs::create_dir_all(&case).unwrap();
+            std::fs::write(case.join(crate::layout::SETTINGS), format!("[resection]\n{other}\n")).unwrap();
+            members.push(member(n, 300.0, Finding::Identified, &settings));
+        }
         let (file, told) = learn(&members, folder.path()).unwrap().unwrap();
         let file = file.unwrap();
-        assert_eq!(file.patients, 9);
+        assert_eq!((file.patients, file.poisson_ratio, file.drained), (9, Some(0.45), None));
         let left: Vec<(&str, usize)> = told.left_out.iter().map(|(why, n)| (why.as_str(), *n)).collect();
-        let expected =
-            ["another law or density than most", "contradicts what is known", "no shift seen", "quality-gate"];
-        assert_eq!(left, expected.map(|why| (why, 1)));
-        assert!(told.sentences()[0].starts_with("9 of 13 estimated patients teach"), "{:?}", told.sentences());
+        let expected = [
+            "another law, density, Poisson's ratio or fluid than most",
+            "contradicts what is known",
+            "no shift seen",
+            "quality-gate",
+        ];
+        assert_eq!(left, expected.into_iter().zip([3, 1, 1, 1]).collect::<Vec<_>>());
+        assert!(told.sentences()[0].starts_with("9 of 15 estimated patients teach"), "{:?}", told.sentences());
         // Drawn towards the others, the lowest up and the highest of the eight down.
         let of = |n: usize| told.subjects[n].shrunken[0].value;
         assert!(of(0) > 500.0 && of(7) < 675.0 && of(0) < of(7), "{} {}", of(0), of(7));
