@@ -25,8 +25,8 @@ pub enum FemError {
     )]
     TwoMovements { first: String, second: String, node: u32 },
     #[error(
-        "the whole body lies beyond the plane before set `{set}`, by {least_mm:.1} mm and more: turn `wall.normal`, which points to \
-         the side that is free, or move `wall.point_mm`"
+        "the whole body lies at or beyond the plane before set `{set}`, by {least_mm:.1} mm and more: turn `wall.normal`, which points \
+         to the side that is free, or move `wall.point_mm`"
     )]
     BeyondWall { set: String, least_mm: f64 },
     #[error(

@@ -397,15 +397,20 @@ impl Supports {
     }
 }
 
-/// A plane with the whole body beyond it leaves no state to begin from: it looks the wrong way, or stands elsewhere.
+/// A plane with the whole body at it or beyond it leaves no state to begin from: it looks the wrong way, or stands elsewhere. A
+/// plane that lies upon a face of the body and looks away from it has nothing but rounding before it.
 fn check_plane(set: &str, point_mm: [f64; 3], normal: [f64; 3], at: &Numbering) -> Result<(), FemError> {
+    /// The part of the body's height over the plane that counts as being before it.
+    const LEAST_PART: f64 = 1e-3;
     let (n, point) = (Vector3::from(normal).normalize(), Vector3::from(metres(point_mm)));
     let rooms = at.nodes_m.iter().map(|x| n.dot(&(Vector3::from(*x) - point)));
-    let most = rooms.fold(f64::NEG_INFINITY, f64::max);
-    if most >= 0.0 {
+    let outermost = |(least, most): (f64, f64), room: f64| (least.min(room), most.max(room));
+    let (least, most) = rooms.fold((f64::INFINITY, f64::NEG_INFINITY), outermost);
+    if most > LEAST_PART * (most - least) {
         return Ok(());
     }
-    Err(FemError::BeyondWall { set: set.to_owned(), least_mm: -most / METRES_PER_MM })
+    // Rounding on the near side is no distance.
+    Err(FemError::BeyondWall { set: set.to_owned(), least_mm: (-most).max(0.0) / METRES_PER_MM + 0.0 })
 }
 
 /// Nodes on springs that leave no direction free, in the mesh's numbering.

@@ -158,8 +158,14 @@ fn a_plane_before_which_nothing_lies_is_named_for_what_it_is() {
     let (error, message) = refusal(&mesh, &wall(200.0, 1.0));
     assert!(matches!(error, FemError::BeyondWall { .. }) && message.contains("`wall.normal`"), "{message}");
     assert!(message.contains("190.0 mm"), "{message}");
+    // Flush with the face that it looks away from it would pull the body through itself, and so a hair within it.
+    for z in [10.0, 9.9999] {
+        let (error, message) = refusal(&mesh, &wall(z, 1.0));
+        assert!(matches!(error, FemError::BeyondWall { .. }) && message.contains("at or beyond"), "{message}");
+        assert!(message.contains("by 0.0 mm"), "{message}");
+    }
     // Turned round it is far away, and a plane a little into the body presses it.
-    for (z, up) in [(200.0, -1.0), (9.9, -1.0)] {
+    for (z, up) in [(200.0, -1.0), (10.0, -1.0), (9.9, -1.0)] {
         assert!(simulate(&mesh, &Scenario::from_toml(&wall(z, up)).unwrap(), &|_| ()).is_ok());
     }
 }
