@@ -45,6 +45,11 @@ pub enum FemError {
     UnnamedLabel { cell: usize, label: u8 },
     #[error("cell {cell} has label {label} (`{name}`), but the scenario has no `[materials.{name}]`; add it")]
     NoMaterial { cell: usize, label: u8, name: String },
+    #[error(
+        "cell {cell} has label {label}, but the mesh says by `fraction:` arrays what its cells are filled with, and there is none of \
+         that label: write one (`{name}`), or take all `fraction:` arrays away so that every cell is of its label alone"
+    )]
+    NoFraction { cell: usize, label: u8, name: String },
     #[error("`[materials.{name}]`: `{name}` is no label: name its number in `[labels]` (`{name} = 1`)")]
     UnknownLabel { name: String },
     #[error("labels `{first}` and `{second}` have the same number {number} in `[labels]`; give each its own")]
@@ -56,6 +61,17 @@ pub enum FemError {
          that holds whole facets of the surface"
     )]
     NoFacets { set: String },
+    #[error(
+        "{stray} of the {of} facets of set `{set}` are no facet of any cell, and would swallow part of its force or pressure: take them \
+         out of the set, or mesh the body so that it conforms to them"
+    )]
+    StrayFacets { set: String, stray: usize, of: usize },
+    #[error(
+        "a pressure on set `{set}`, which lies within the body, has no side to push from: neighbours at the edge of nodes {} and {} \
+         are turned to different sides; turn all its facets to one side, or name a set of the boundary",
+        ends[0], ends[1]
+    )]
+    NoSide { set: String, ends: [u32; 2] },
     #[error(
         "set `{set}` cannot slide on both sides: it is no sheet of facets but has all four facets of cell {cell}; mesh the \
          body so that it conforms to the sheet, or hold the set in `fixed`"

@@ -12,6 +12,7 @@ use super::FemError;
 use super::portion::Portion;
 use super::scenario::Scenario;
 use crate::mesh::TetMesh;
+use crate::mesh::format::vtu::fraction_name;
 
 /// A tissue with less of a cell is left to the others. About a hundred parts of a cell are counted, so less than this is hardly
 /// told from none, and every tissue of a cell is assembled by itself.
@@ -43,6 +44,7 @@ pub(super) fn portions(mesh: &TetMesh, scenario: &Scenario) -> Result<(Vec<Porti
         index_of_label[usize::from(label)] = Some(index);
         Ok(index)
     };
+    check_fractions(mesh)?;
     let mut portions = Vec::with_capacity(mesh.tets().len());
     for (cell, &label) in mesh.labels().iter().enumerate() {
         let of_cell =
@@ -56,6 +58,15 @@ pub(super) fn portions(mesh: &TetMesh, scenario: &Scenario) -> Result<(Vec<Porti
         }
     }
     Ok((portions, names))
+}
+
+/// Labels that were changed after the fractions were written would be of no effect, as what lies within a cell counts.
+fn check_fractions(mesh: &TetMesh) -> Result<(), FemError> {
+    let of = mesh.fractions();
+    match mesh.labels().iter().enumerate().find(|(_, label)| !of.is_empty() && !of.contains_key(label)) {
+        Some((cell, &label)) => Err(FemError::NoFraction { cell, label, name: fraction_name(label) }),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -95,6 +106,18 @@ mod tests {
         assert_eq!(shares(0.96), [(0, 1.0)]);
         // What lies within a cell counts, not what it is labelled.
         assert_eq!(shares(0.04), [(1, 1.0)]);
+    }
+
+    #[test]
+    fn a_label_of_which_no_fraction_is_told_is_refused_and_one_that_is_told_of_as_none_is_not() {
+        let nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3]], vec![6]).unwrap();
+        mesh.set_fractions(Fractions::from([(2, vec![1.0])])).unwrap();
+        let refused = portions(&mesh, &Scenario::from_toml(LAWS).unwrap()).unwrap_err();
+        assert!(matches!(refused, FemError::NoFraction { cell: 0, label: 6, .. }), "{refused}");
+        assert!(refused.to_string().contains("`fraction:tumour`"), "{refused}");
+        mesh.set_fractions(Fractions::from([(2, vec![1.0]), (6, vec![0.0])])).unwrap();
+        assert!(portions(&mesh, &Scenario::from_toml(LAWS).unwrap()).is_ok());
     }
 
     /// The block with white matter in every cell, more of it from cell to cell.

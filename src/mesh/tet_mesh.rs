@@ -238,7 +238,8 @@ impl TetMesh {
         let mut part = Self::new(nodes, tets, kept.iter().map(|&t| self.labels[t]).collect()).ok()?;
         for (&label, of) in &self.fractions {
             let of: Vec<f64> = kept.iter().map(|&t| of[t]).collect();
-            if of.iter().any(|f| *f > 0.0) {
+            // A label of the part is told of, be it that none of it lies in any cell.
+            if of.iter().any(|f| *f > 0.0) || part.labels.contains(&label) {
                 part.fractions.insert(label, of);
             }
         }
@@ -311,6 +312,9 @@ mod tests {
             &Fractions::from([(2, vec![0.25]), (3, vec![0.75])])
         );
         assert_eq!(mesh.restricted(|label| label == 2).unwrap().0.fractions(), &Fractions::from([(2, vec![1.0])]));
+        let mut other = mesh.clone();
+        other.set_fractions(with([0.0, 0.25], [1.0, 0.75])).unwrap();
+        assert!(other.restricted(|label| label == 2).unwrap().0.fractions().contains_key(&2));
         assert_eq!(mesh.clone().moved(|p| p).unwrap(), mesh);
         assert_eq!(mesh.cut_along("sheet", &[[1, 2, 3]]).fractions(), mesh.fractions());
         for wrong in [with([1.0, 0.25], [0.0, 0.7]), with([1.0, 1.5], [0.0, -0.5]), with([f64::NAN, 0.0], [0.0, 1.0])] {
