@@ -7,6 +7,7 @@ use super::units::{METRES_PER_MM, metres};
 use super::{FemError, element::cross};
 use crate::mesh::TetMesh;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Weight of each tetrahedron shared by its nodes (equally by the four corners of a linear one).
 fn add_weight_n(sharing: &Sharing, loads: &Loads, forces: &mut [[f64; 3]]) {
@@ -36,6 +37,41 @@ pub(super) fn facets_of(mesh: &TetMesh, set: &str) -> Result<Vec<[u32; 3]>, FemE
         return Err(FemError::NoFacets { set: set.to_owned() });
     }
     Ok(facets)
+}
+
+/// What of a mesh's facets bears loads: every facet by its sorted nodes, and whether it lies between two tetrahedra.
+struct Bearing(BTreeMap<[u32; 3], bool>);
+
+impl Bearing {
+    /// The mesh's facets are only looked at where a facet set is loaded: of a node set only facets of the boundary are taken.
+    fn of(mesh: &TetMesh, loads: &Loads) -> Option<Self> {
+        let mut sets = loads.patch.iter().map(|l| &l.set).chain(loads.pressure.iter().map(|l| &l.set));
+        let facets = || mesh.facets().into_iter().map(|(facet, _, other)| (sorted(facet), other.is_some()));
+        sets.any(|set| mesh.facet_sets.contains_key(set)).then(|| Self(facets().collect()))
+    }
+
+    /// A facet of no tetrahedron would take its part of the load and hand it to nothing, or to nodes far from the set's area.
+    fn check_cells(&self, set: &str, facets: &[[u32; 3]]) -> Result<(), FemError> {
+        let stray = facets.iter().filter(|facet| !self.0.contains_key(&sorted(**facet))).count();
+        if stray == 0 { Ok(()) } else { Err(FemError::StrayFacets { set: set.to_owned(), stray, of: facets.len() }) }
+    }
+
+    /// A facet between two tetrahedra has the side that it is turned to. Where two neighbours go along their edge the same way they
+    /// are turned to different sides, and their pressures cancel.
+    fn check_sides(&self, set: &str, facets: &[[u32; 3]]) -> Result<(), FemError> {
+        let within = facets.iter().filter(|facet| self.0.get(&sorted(**facet)) == Some(&true));
+        let mut edges: Vec<[u32; 2]> = within.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        edges.sort_unstable();
+        match edges.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(FemError::NoSide { set: set.to_owned(), ends: pair[0] }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn sorted(mut facet: [u32; 3]) -> [u32; 3] {
+    facet.sort_unstable();
+    facet
 }
 
 /// Area vector of a facet, m2, along its normal.
@@ -71,6 +107,7 @@ pub(super) fn nodal_forces_n(
     buoyancy: Option<&Buoyancy>,
 ) -> Result<Vec<NodalForces>, FemError> {
     let mesh = sharing.mesh;
+    let bearing = Bearing::of(mesh, loads);
     let none = || vec![[0.0; 3]; sharing.nodes()];
     let mut parts = Vec::new();
     if loads.gravity_m_per_s2 != [0.0; 3] {
@@ -84,6 +121,9 @@ pub(super) fn nodal_forces_n(
     for (n, patch) in loads.patch.iter().enumerate() {
         let mut forces = none();
         let facets = facets_of(mesh, &patch.set)?;
+        if let Some(bearing) = &bearing {
+            bearing.check_cells(&patch.set, &facets)?;
+        }
         let areas: Vec<f64> = facets.iter().map(|&f| size(area_m2(mesh, f))).collect();
         let whole: f64 = areas.iter().sum();
         for (facet, area) in facets.iter().zip(&areas) {
@@ -95,7 +135,12 @@ pub(super) fn nodal_forces_n(
     }
     for (n, pressure) in loads.pressure.iter().enumerate() {
         let mut forces = none();
-        for facet in facets_of(mesh, &pressure.set)? {
+        let facets = facets_of(mesh, &pressure.set)?;
+        if let Some(bearing) = &bearing {
+            bearing.check_cells(&pressure.set, &facets)?;
+            bearing.check_sides(&pressure.set, &facets)?;
+        }
+        for facet in facets {
             let area = area_m2(mesh, facet);
             for n in sharing.of_facet(facet) {
                 (0..3).for_each(|i| forces[n as usize][i] -= pressure.pressure_pa * area[i] / 3.0);

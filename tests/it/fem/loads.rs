@@ -1,7 +1,7 @@
 //! What the supports carry tells what was loaded.
 
 use super::meshes::cube;
-use hgm::fem::{Scenario, simulate};
+use hgm::fem::{FemError, Scenario, simulate};
 use hgm::mesh::TetMesh;
 
 const GREY: &str = "[materials.grey_matter]\nlaw = 'neo-hookean'\nshear_modulus_pa = 3000.0\npoisson_ratio = 0.4\n";
@@ -47,4 +47,49 @@ fn pressure_pushes_along_the_inward_normal_with_the_area() {
 fn a_patch_force_is_carried_whole() {
     let mesh = cube(3, 40.0);
     close(carried(&mesh, "z0", "patch = [{ set = 'z1', force_n = [0.2, -0.3, 0.4] }]"), [-0.2, 0.3, -0.4]);
+}
+
+fn refused(mesh: &TetMesh, loads: &str) -> FemError {
+    simulate(mesh, &Scenario::from_toml(&format!("fixed = ['z0']\n{GREY}[loads]\n{loads}")).unwrap(), &|_| ())
+        .unwrap_err()
+}
+
+const BOTH: [&str; 2] =
+    ["patch = [{ set = 'drawn', force_n = [0.2, -0.3, 0.4] }]", "pressure = [{ set = 'drawn', pressure_pa = 200.0 }]"];
+
+#[test]
+fn facets_of_no_cell_bear_no_load_and_are_refused() {
+    let mut mesh = cube(2, 40.0);
+    let top = mesh.node_sets["z1"].clone();
+    let mut drawn = mesh.boundary_facets(|_| true);
+    drawn.retain(|f| f.iter().all(|n| top.binary_search(n).is_ok()));
+    mesh.facet_sets.insert("drawn".into(), drawn.clone());
+    close(carried(&mesh, "z0", BOTH[0]), [-0.2, 0.3, -0.4]);
+    close(carried(&mesh, "z0", BOTH[1]), [0.0, 0.0, 200.0 * 16e-4]);
+    // Three corners of the cube are no facet of a cell.
+    drawn.push([0, 2, 6]);
+    mesh.facet_sets.insert("drawn".into(), drawn);
+    for loads in BOTH {
+        let error = refused(&mesh, loads);
+        assert!(matches!(error, FemError::StrayFacets { stray: 1, of: 9, .. }), "{error}");
+        assert!(error.to_string().contains("`drawn`") && error.to_string().contains("take them out"), "{error}");
+    }
+}
+
+#[test]
+fn pressure_on_facets_within_the_body_acts_on_the_side_they_are_turned_to_or_is_refused() {
+    let mut mesh = cube(2, 40.0);
+    let middle = |n: u32| (mesh.nodes_mm()[n as usize][0] - 20.0).abs() < 1e-9;
+    let turned_to_x = |f: [u32; 3]| if mesh.area_vector_mm2(f).x > 0.0 { f } else { [f[0], f[2], f[1]] };
+    let mut drawn: Vec<[u32; 3]> =
+        mesh.facets().into_iter().map(|f| f.0).filter(|f| f.iter().all(|&n| middle(n))).map(turned_to_x).collect();
+    mesh.facet_sets.insert("drawn".into(), drawn.clone());
+    close(carried(&mesh, "z0", BOTH[1]), [200.0 * 16e-4, 0.0, 0.0]);
+    drawn[3].swap(0, 1);
+    mesh.facet_sets.insert("drawn".into(), drawn);
+    let error = refused(&mesh, BOTH[1]);
+    assert!(matches!(error, FemError::NoSide { .. }), "{error}");
+    assert!(error.to_string().contains("`drawn`") && error.to_string().contains("turn all its facets"), "{error}");
+    // A force has its own direction.
+    close(carried(&mesh, "z0", BOTH[0]), [-0.2, 0.3, -0.4]);
 }
