@@ -22,6 +22,7 @@ mod order;
 mod outcome;
 mod portion;
 mod reduce;
+mod remarks;
 mod scenario;
 mod sensitivity;
 mod sharing;
@@ -49,6 +50,7 @@ pub use stiffness::Stiffness;
 pub use warning::{FemWarning, Idle};
 
 use crate::mesh::TetMesh;
+use remarks::with_remarks;
 
 /// One deformation, or one motion: the mesh under the scenario's loads.
 ///
@@ -57,10 +59,11 @@ use crate::mesh::TetMesh;
 pub fn simulate(mesh: &TetMesh, scenario: &Scenario, progress: &dyn Fn(&Progress)) -> Result<Outcome, FemError> {
     check::check_supports(mesh, scenario)?;
     let model = Model::new(mesh, scenario)?;
-    match scenario.solver.method {
+    let found = match scenario.solver.method {
         Method::Static => model.solve(&scenario.materials, None, progress).map(|(outcome, _)| outcome),
         Method::BackwardEuler => model.run(&scenario.materials, progress),
-    }
+    };
+    found.map(|outcome| with_remarks(mesh, scenario, outcome))
 }
 
 /// [`simulate`] from a displacement of the nodes (mm) near the answer, such as that of neighbouring materials: fewer
@@ -78,5 +81,6 @@ pub fn simulate_from(
     check::check_supports(mesh, scenario)?;
     let model = Model::new(mesh, scenario)?;
     let start = model.state(start_mm)?;
-    model.solve(&scenario.materials, Some(&start), progress).map(|(outcome, _)| outcome)
+    let found = model.solve(&scenario.materials, Some(&start), progress);
+    found.map(|(outcome, _)| with_remarks(mesh, scenario, outcome))
 }

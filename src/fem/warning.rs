@@ -66,6 +66,27 @@ pub enum FemWarning {
     )]
     NoEffect { set: String, idle: Idle },
     #[error(
+        "nothing loads the body, which stays as it is: give `loads.gravity_m_per_s2`, a force (`loads.patch`), a pressure \
+         (`loads.pressure`) or a displacement (`prescribed`)"
+    )]
+    Unloaded,
+    #[error(
+        "the fluid of `loads.csf` has no effect without gravity: give `loads.gravity_m_per_s2`, or leave `loads.csf` out"
+    )]
+    FluidWithoutGravity,
+    #[error(
+        "`[dynamics]` has no effect on an equilibrium: write `method = \"backward-euler\"` into `[solver]` for a motion, or leave \
+         `[dynamics]` out"
+    )]
+    StepsOfNoMotion,
+    #[error(
+        "{facets} facets of the mesh lie upon others without sharing their nodes, the first of them at ({:.1}, {:.1}, {:.1}) mm: nothing \
+         holds the two sides together there; merge their nodes (gmsh: `Coherence Mesh`, ParaView: Clean to Grid), or, where a gap is \
+         meant, name a set of both sides in `supports` or `contact`",
+        at_mm[0], at_mm[1], at_mm[2]
+    )]
+    Unglued { facets: usize, at_mm: [f64; 3] },
+    #[error(
         "volume {number} is called `{name}` in the mesh and taken for `{taken}`, by its number: give its number in the scenario's \
          `[labels]`"
     )]

@@ -10,6 +10,7 @@ mod meshes;
 mod mixed_cells;
 mod motion;
 mod refusals;
+mod remarks;
 mod sensitivities;
 mod statics;
 mod stiffness;
