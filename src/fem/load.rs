@@ -39,15 +39,21 @@ pub(super) fn facets_of(mesh: &TetMesh, set: &str) -> Result<Vec<[u32; 3]>, FemE
     Ok(facets)
 }
 
-/// What of a mesh's facets bears loads: every facet by its sorted nodes, and whether it lies between two tetrahedra.
+/// The facets of loaded facet sets that a tetrahedron has, by their sorted nodes, and whether they lie between two.
 struct Bearing(BTreeMap<[u32; 3], bool>);
 
 impl Bearing {
     /// The mesh's facets are only looked at where a facet set is loaded: of a node set only facets of the boundary are taken.
     fn of(mesh: &TetMesh, loads: &Loads) -> Option<Self> {
-        let mut sets = loads.patch.iter().map(|l| &l.set).chain(loads.pressure.iter().map(|l| &l.set));
-        let facets = || mesh.facets().into_iter().map(|(facet, _, other)| (sorted(facet), other.is_some()));
-        sets.any(|set| mesh.facet_sets.contains_key(set)).then(|| Self(facets().collect()))
+        let sets = loads.patch.iter().map(|l| &l.set).chain(loads.pressure.iter().map(|l| &l.set));
+        let drawn: Vec<&Vec<[u32; 3]>> = sets.filter_map(|set| mesh.facet_sets.get(set)).collect();
+        if drawn.is_empty() {
+            return None;
+        }
+        let mut loaded: Vec<[u32; 3]> = drawn.into_iter().flatten().map(|facet| sorted(*facet)).collect();
+        loaded.sort_unstable();
+        let facets = mesh.facets().into_iter().map(|(facet, _, other)| (sorted(facet), other.is_some()));
+        Some(Self(facets.filter(|(facet, _)| loaded.binary_search(facet).is_ok()).collect()))
     }
 
     /// A facet of no tetrahedron would take its part of the load and hand it to nothing, or to nodes far from the set's area.
@@ -108,6 +114,7 @@ pub(super) fn nodal_forces_n(
 ) -> Result<Vec<NodalForces>, FemError> {
     let mesh = sharing.mesh;
     let bearing = Bearing::of(mesh, loads);
+    let bearing = |set: &String| bearing.as_ref().filter(|_| mesh.facet_sets.contains_key(set));
     let none = || vec![[0.0; 3]; sharing.nodes()];
     let mut parts = Vec::new();
     if loads.gravity_m_per_s2 != [0.0; 3] {
@@ -121,7 +128,7 @@ pub(super) fn nodal_forces_n(
     for (n, patch) in loads.patch.iter().enumerate() {
         let mut forces = none();
         let facets = facets_of(mesh, &patch.set)?;
-        if let Some(bearing) = &bearing {
+        if let Some(bearing) = bearing(&patch.set) {
             bearing.check_cells(&patch.set, &facets)?;
         }
         let areas: Vec<f64> = facets.iter().map(|&f| size(area_m2(mesh, f))).collect();
@@ -136,7 +143,7 @@ pub(super) fn nodal_forces_n(
     for (n, pressure) in loads.pressure.iter().enumerate() {
         let mut forces = none();
         let facets = facets_of(mesh, &pressure.set)?;
-        if let Some(bearing) = &bearing {
+        if let Some(bearing) = bearing(&pressure.set) {
             bearing.check_cells(&pressure.set, &facets)?;
             bearing.check_sides(&pressure.set, &facets)?;
         }

@@ -66,6 +66,9 @@ fn facets_of_no_cell_bear_no_load_and_are_refused() {
     mesh.facet_sets.insert("drawn".into(), drawn.clone());
     close(carried(&mesh, "z0", BOTH[0]), [-0.2, 0.3, -0.4]);
     close(carried(&mesh, "z0", BOTH[1]), [0.0, 0.0, 200.0 * 16e-4]);
+    // A node set that is loaded beside it has the facets of the boundary.
+    let beside = format!("{}\npressure = [{{ set = 'x1', pressure_pa = 200.0 }}]", BOTH[0]);
+    close(carried(&mesh, "z0", &beside), [200.0 * 16e-4 - 0.2, 0.3, -0.4]);
     // Three corners of the cube are no facet of a cell.
     drawn.push([0, 2, 6]);
     mesh.facet_sets.insert("drawn".into(), drawn);
