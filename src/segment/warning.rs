@@ -113,10 +113,10 @@ pub enum SegmentWarning {
         /// The correlation of their folds.
         folds: f64,
     },
-    /// A cavity drawn by hand holds tissue.
+    /// A cavity, or what was taken, drawn by hand holds tissue.
     #[error(
-        "{percent:.0} % of the tissue under the cavity mask looks as it did before the operation: is the mask of this scan, and on \
-         the right side?"
+        "{percent:.0} % of the tissue under the mask of the cavity, or of what was taken, looks as it did before the operation: is it of \
+         this scan, and on the right side?"
     )]
     UnchangedCavity {
         /// Share of that tissue, in percent.

@@ -209,3 +209,29 @@ impl Case {
         Ok(String::from_utf8(self.read(name)?).map_err(damaged)?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::artefact::{Produced, Stage};
+    use serde_json::json;
+    use std::convert::Infallible;
+
+    #[test]
+    fn a_patients_masks_are_believed_where_neither_registration_nor_segmentation_speaks_against_them() {
+        let gate = |registration: &[&str], anat: &[&str]| {
+            let folder = tempfile::tempdir().unwrap();
+            for (stage, implausible) in [("registration", registration), ("anat", anat)] {
+                let made = Produced { facts: json!({ "implausible": implausible }), ..Produced::default() };
+                Stage::new(stage, 1, folder.path(), &()).run(false, || Ok::<_, Infallible>(made)).unwrap();
+            }
+            match Case::at(folder.path()).image_gate() {
+                Err(WorkflowError::QualityGate(why)) => why,
+                ended => ended.map(|()| Vec::new()).unwrap(),
+            }
+        };
+        assert_eq!(gate(&[], &[]), Vec::<String>::new());
+        assert_eq!(gate(&["mirrored"], &[]), ["mirrored"]);
+        assert_eq!(gate(&["mirrored"], &["outside"]), ["mirrored", "outside"]);
+    }
+}

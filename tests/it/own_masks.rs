@@ -1,4 +1,4 @@
-//! `hgm prep --no-mesh` and a user's own ventricles: what stands in the case folder.
+//! `hgm prep --no-mesh` and a user's own masks: what stands in the case folder.
 
 use crate::job::{CHEAP, contents, output, sample};
 use hgm::geometry::{Frame, Position, Post, Pre, RigidTransform};
@@ -97,4 +97,19 @@ fn slow_prep_without_mesh_leaves_images_and_masks_with_the_ventricles_given_in_e
     assert!(dice > 0.9 && ventricles(&case) != mine, "{dice}");
     let fit = "xfm/from-post_to-pre.txt";
     assert!(std::fs::read(case.join(fit)).unwrap() == files[fit]);
+}
+
+#[test]
+fn slow_a_mask_of_what_was_taken_where_nothing_is_gone_is_told_and_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (case, mask) = (folder.path().join("case"), folder.path().join("mine.nii.gz"));
+    std::fs::write(&mask, encode_mask(&ball(grid::<Pre>("pre.nii.gz"), in_white_matter()))).unwrap();
+    let [pre, post] = ["pre.nii.gz", "post.nii.gz"].map(|name| sample(name).to_str().unwrap().to_owned());
+    let [folder, mask] = [&case, &mask].map(|path| path.to_str().unwrap());
+    let words = ["prep", "-q", "--no-mesh", &pre, &post, "--resected-mask", mask, "-o", folder];
+    let made = output(&[&words[..], &CHEAP[..]].concat());
+    let said = String::from_utf8_lossy(&made.stderr);
+    assert!(made.status.code() == Some(4) && said.contains("looks as it did before the operation"), "{said}");
+    let outcome = String::from_utf8_lossy(&contents(&case)["sim/outcome.json"]).into_owned();
+    assert!(outcome.contains("no cavity is seen where the mask"), "{outcome}");
 }

@@ -10,7 +10,7 @@ use crate::mesh::TriMesh;
 /// assert_eq!(stl::encode(&TriMesh { nodes_mm, triangles: vec![[0, 1, 2]] }).len(), 84 + 50);
 /// ```
 pub fn encode(surface: &TriMesh) -> Vec<u8> {
-    // The header must not start with `solid`, which marks the text flavour.
+    // The header must not start with `solid`, which marks the text flavour; 3D Slicer takes a file that names no space for LPS.
     let mut bytes = b"binary STL, mm, SPACE=RAS".to_vec();
     bytes.resize(80, b' ');
     bytes.extend((surface.triangles.len() as u32).to_le_bytes());
