@@ -178,7 +178,7 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         figures.insert(name, value);
     };
     if let Some(outcome) = &member.outcome {
-        let best = outcome.best();
+        let (best, judged) = (outcome.best(), outcome.judged());
         // A stiffness that is not claimed takes no part in a cohort's.
         let claimed = outcome.verdict.finding.has_stiffness();
         for tissue in &outcome.tissues {
@@ -208,9 +208,9 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         }
         for set in outcome.rmse_sets() {
             add(format!("rest_rmse_{set}_mm"), outcome.rest_rmse_mm.get(&set).copied());
-            add(format!("rmse_{set}_mm"), best.and_then(|sample| sample.rmse_mm.get(&set).copied()));
+            add(format!("rmse_{set}_mm"), judged.and_then(|sample| sample.rmse_mm.get(&set).copied()));
             add(format!("rest_surface_distance_{set}_mm"), outcome.rest_surface_distance_mm.get(&set).copied());
-            let distance = best.and_then(|sample| sample.surface_distance_mm.get(&set).copied());
+            let distance = judged.and_then(|sample| sample.surface_distance_mm.get(&set).copied());
             add(format!("surface_distance_{set}_mm"), distance);
         }
         let floor = outcome.noise_floor.unwrap_or_default();
@@ -225,7 +225,7 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         add("ventricle_change_percent".to_owned(), change.filter(|percent| percent.is_finite()));
         add("midline_shift_mm".to_owned(), volumes.midline_shift_mm);
         add("brain_cc".to_owned(), volumes.brain_cc);
-        add("displacement_max_mm".to_owned(), best.and_then(|sample| sample.displacement_max_mm));
+        add("displacement_max_mm".to_owned(), judged.and_then(|sample| sample.displacement_max_mm));
     }
     Row {
         participant_id: member.participant_id.clone(),

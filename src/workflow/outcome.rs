@@ -7,6 +7,7 @@ use super::fresh::{GATHERED, Provenance, StageRecord};
 use super::work::Work;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
+use crate::experiment::verdict::Claim;
 use crate::layout;
 use crate::report::case::report_files;
 
@@ -90,19 +91,26 @@ fn samples_table(outcome: &ExperimentOutcome) -> String {
     lines.join("\n") + "\n"
 }
 
-/// The outcome with the estimate as one more sample; it is the best one where no sweep has chosen another.
+/// The outcome with the estimate as one more sample, its moduli as far as they are claimed; it is the best one where no sweep
+/// has chosen another.
 pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFacts) {
     let name = &facts.record.id;
     outcome.samples.retain(|s| s.id != *name);
     if outcome.samples.is_empty() {
         outcome.tissues = facts.record.shear_modulus_pa.keys().cloned().collect();
     }
-    outcome.samples.push(facts.record.clone());
+    let claimed = |of: &String| {
+        let claim = facts.estimate.verdict.moduli.iter().find(|(tissue, _)| tissue == of);
+        matches!(claim, Some((_, Claim::Interval { .. } | Claim::Range { .. })))
+    };
+    let mut record = facts.record.clone();
+    record.shear_modulus_pa.retain(|tissue, _| claimed(tissue));
+    // Samples are drawn from the prior of an average person, an estimate from nothing: its level would be of another prior.
+    record.sd_levels.clear();
+    outcome.samples.push(record);
     if outcome.best_sample.is_none() {
         outcome.best_sample = Some(name.clone());
     }
-    outcome.warnings.retain(|w| !w.starts_with("estimate: "));
-    outcome.warnings.extend(facts.estimate.limits.iter().map(|limit| format!("estimate: {limit}")));
     outcome.estimate = Some(facts.estimate.clone());
     outcome.comparison.clone_from(&facts.comparison);
 }

@@ -390,10 +390,10 @@ impl<'w, 'a> Patient<'w, 'a> {
     /// Outcome and page of what is there.
     pub fn gather(&self) -> Result<(), WorkflowError> {
         let Self { work, prepared, .. } = self;
-        let Found { outcome, samples, mut made } = self.found()?;
+        let Found { mut outcome, samples, mut made } = self.found()?;
         stages::fields(work, &mut made, &fields_of(&outcome, &samples))?;
-        let own = [StageName::Estimate, StageName::Fields];
-        let own = own.iter().filter_map(|stage| made.get(stage));
+        let own = in_order(&made, &[StageName::Estimate, StageName::Fields]);
+        outcome.warnings.extend(own.iter().flat_map(|m| m.warnings.iter().cloned()));
         let all: Vec<&Manifest> = prepared.manifests().into_iter().chain(&samples).chain(own).collect();
         finish(work, &outcome, &all)
     }

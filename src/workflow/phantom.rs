@@ -121,6 +121,7 @@ impl<'w, 'a> Phantom<'w, 'a> {
             with_estimate(&mut outcome, &facts);
         }
         let own = made.get(&StageName::Estimate);
+        outcome.warnings.extend(own.iter().flat_map(|m| m.warnings.iter().cloned()));
         let prepared = PREPARED.iter().filter_map(|stage| made.get(stage));
         let all: Vec<&Manifest> = prepared.chain(&of_samples).chain(own).collect();
         finish(work, &outcome, &all)

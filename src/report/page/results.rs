@@ -5,7 +5,7 @@ use super::super::colour::ColourScale;
 use super::super::html::{count, fixed, number};
 use super::parts::{quantity, tile};
 use crate::experiment::outcome::{
-    ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
+    ESTIMATE, ExperimentOutcome, MeshOutcome, RegistrationOutcome, ResectionVolumes, SampleOutcome,
 };
 use crate::experiment::verdict::{Claim, pa, range};
 use maud::{Markup, PreEscaped, html};
@@ -66,9 +66,10 @@ pub fn table(caption: &str, head: &[String], rows: &[Row]) -> Markup {
 /// Key figures, what speaks for the verdict, and what was compared.
 pub fn summary(outcome: &ExperimentOutcome) -> Markup {
     let mut tiles: Vec<Markup> = Vec::new();
-    if let Some(best) = outcome.best() {
+    // The state the verdict is about, as on the first screen.
+    if let Some(judged) = outcome.judged() {
         for set in outcome.rmse_sets() {
-            let Some(&rmse) = best.rmse_mm.get(&set) else { continue };
+            let Some(&rmse) = judged.rmse_mm.get(&set) else { continue };
             let note = outcome
                 .rest_rmse_mm
                 .get(&set)
@@ -299,7 +300,11 @@ pub fn figures(outcome: &ExperimentOutcome) -> Markup {
     if let Some(grid) = Grid::of(outcome) {
         return html! { @for set in outcome.rmse_sets() { (grid.figure(outcome, &set)) } };
     }
-    html! { figure { (PreEscaped(curve(outcome))) figcaption { (curve_caption(outcome)) } } }
+    html! {
+        @if let Some(curve) = curve(outcome) {
+            figure { (PreEscaped(curve)) figcaption { (curve_caption(outcome)) } }
+        }
+    }
 }
 
 fn curve_caption(outcome: &ExperimentOutcome) -> String {
@@ -308,8 +313,8 @@ fn curve_caption(outcome: &ExperimentOutcome) -> String {
     format!("RMSE of every sample; the ring marks the best one.{floor}")
 }
 
-/// RMSE over the modulus (one tissue) or over the SD level (several tissues that move together).
-fn curve(outcome: &ExperimentOutcome) -> String {
+/// RMSE over the modulus (one tissue) or over the SD level (several tissues that move together); `None` where no sample has one.
+fn curve(outcome: &ExperimentOutcome) -> Option<String> {
     let one = outcome.tissues.len() == 1;
     let tissue = outcome.tissues.first().cloned().unwrap_or_default();
     let abscissa =
@@ -342,6 +347,9 @@ fn curve(outcome: &ExperimentOutcome) -> String {
             series.push(Series { name: task.map_or_else(|| set_name(&set), |task| task.replace('-', " ")), points });
         }
     }
+    if series.is_empty() {
+        return None;
+    }
     let mut y_rules: Vec<Rule> = outcome
         .rest_rmse_mm
         .iter()
@@ -366,7 +374,7 @@ fn curve(outcome: &ExperimentOutcome) -> String {
         x_rules: truth.map(|t| Rule { at: *t, name: "reference".to_owned() }).into_iter().collect(),
         ..LineChart::default()
     };
-    chart.to_svg()
+    Some(chart.to_svg())
 }
 
 /// Samples of two tissues on a full grid.
@@ -383,8 +391,9 @@ impl Grid {
     fn of(outcome: &ExperimentOutcome) -> Option<Self> {
         let [a, b] = <[String; 2]>::try_from(outcome.tissues.clone()).ok()?;
         let distinct = |tissue: &String| {
-            let mut values: Vec<f64> =
-                outcome.samples.iter().filter_map(|s| s.shear_modulus_pa.get(tissue).copied()).collect();
+            // An estimate lies between the lines.
+            let swept = outcome.samples.iter().filter(|s| s.id != ESTIMATE);
+            let mut values: Vec<f64> = swept.filter_map(|s| s.shear_modulus_pa.get(tissue).copied()).collect();
             values.sort_unstable_by(f64::total_cmp);
             values.dedup();
             values
@@ -477,7 +486,8 @@ fn sample_table(outcome: &ExperimentOutcome) -> Markup {
         rows.push((false, words(row)));
     }
     for s in &outcome.samples {
-        let best = outcome.best_sample.as_deref() == Some(s.id.as_str());
+        // An estimate that claims no modulus has won against nothing.
+        let best = outcome.best_sample.as_deref() == Some(s.id.as_str()) && !s.shear_modulus_pa.is_empty();
         let mut row = vec![if best { format!("{} · best", s.id) } else { s.id.clone() }];
         row.extend(levelled.iter().map(|t| s.sd_levels.get(t).map_or_else(dash, |level| signed(*level))));
         let modulus = |t: &String| s.shear_modulus_pa.get(t).map_or_else(dash, |mu| number(*mu, 4));
