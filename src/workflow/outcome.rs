@@ -114,3 +114,53 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
     outcome.estimate = Some(facts.estimate.clone());
     outcome.comparison.clone_from(&facts.comparison);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::SampleOutcome;
+    use serde_json::json;
+
+    /// An estimate of two tissues that claims a modulus of the first alone.
+    fn half_claimed() -> EstimateFacts {
+        let estimate = json!({
+            "posterior": {
+                "names": ["grey", "white"], "mode": [975.0, 717.0], "log_sd": [0.1, 9.0],
+                "interval_95": [[774.0, 1230.0], [0.1, 1e7]], "log_covariance": [[0.01, 0.0], [0.0, 81.0]],
+                "identifiability": {
+                    "verdicts": ["identified", "withheld"], "sensitivity_correlation": [[1.0, 0.0], [0.0, 1.0]],
+                    "condition": 1.0, "valley": [1.0, 0.0], "valley_log_sd": 0.1
+                }
+            },
+            "prior": [], "observations": 12, "independent_observations": 12.0, "noise_mm": 0.3, "residual_rms_mm": 0.4,
+            "convergence": "step-below-tolerance", "solves": 9, "tangent_solves": 18, "limits": ["told once"],
+            "verdict": {
+                "finding": "identified", "explained_share": 0.9, "reasons": [], "sentence": "",
+                "moduli": [
+                    ["grey_matter", {"kind": "interval", "mode_pa": 975.0, "interval_95_pa": [774.0, 1230.0]}],
+                    ["white_matter", {"kind": "withheld"}]
+                ]
+            }
+        });
+        let of_both = |grey: f64, white: f64| [("grey_matter".to_owned(), grey), ("white_matter".to_owned(), white)];
+        let record = SampleOutcome {
+            id: "estimate".to_owned(),
+            shear_modulus_pa: of_both(975.0, 717.0).into(),
+            sd_levels: of_both(-0.3, -0.2).into(),
+            converged: true,
+            ..SampleOutcome::default()
+        };
+        EstimateFacts { estimate: serde_json::from_value(estimate).unwrap(), record, comparison: None }
+    }
+
+    #[test]
+    fn samples_show_of_an_estimate_what_it_claims() {
+        let mut outcome = ExperimentOutcome::default();
+        with_estimate(&mut outcome, &half_claimed());
+        assert_eq!(outcome.samples[0].shear_modulus_pa, [("grey_matter".to_owned(), 975.0)].into());
+        let table = samples_table(&outcome);
+        assert!(table.ends_with("\nestimate,,975,,,true,0,\n"), "{table}");
+        // The stage's own warnings say them.
+        assert_eq!(outcome.warnings, [""; 0]);
+    }
+}

@@ -37,7 +37,19 @@ fn slow_an_estimate_means_the_settings_its_case_was_made_with() {
     assert_eq!(kept["anat"]["sag"]["iterations"].as_array().unwrap()[0].as_integer(), Some(20));
     assert_eq!(kept["prior"]["study"].as_str(), Some("mre"));
     assert_eq!(kept["mesh"]["size"]["cells"].as_integer(), Some(3000));
+    what_every_stage_warned_of_is_in_the_outcome(Path::new(&one));
     what_would_be_estimated_again_is_told(&one, &config);
+}
+
+fn what_every_stage_warned_of_is_in_the_outcome(case: &Path) {
+    let read = |file: &str| -> Value { serde_json::from_slice(&std::fs::read(case.join(file)).unwrap()).unwrap() };
+    let told = &read("sim/outcome.json")["warnings"];
+    let stages = read("provenance.json")["stages"].as_array().unwrap().clone();
+    let of_stage = |stage: &Value| read(&format!(".stages/{}.manifest.json", stage["stage"].as_str().unwrap()));
+    let warned: Vec<Value> =
+        stages.iter().flat_map(|stage| of_stage(stage)["warnings"].as_array().unwrap().clone()).collect();
+    assert_eq!(told, &Value::from(warned.clone()));
+    assert!(warned.iter().any(|w| w.as_str().unwrap().contains("estimate: ")), "{warned:?}");
 }
 
 /// Of a run with the same settings nothing; of a patient who lay another way the estimate, and with it the fields.
