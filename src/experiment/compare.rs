@@ -20,10 +20,17 @@ pub struct Candidate {
     pub weight: f64,
     /// What its own estimate comes down to.
     pub finding: Finding,
-    /// Share of the seen shift it explains.
+    /// Share of the seen shift it explains; zero where it saw none ([`Candidate::explained`]).
     pub explained_share: f64,
     /// Shear moduli by tissue: most probable and 95 % interval, Pa.
     pub moduli_pa: Vec<(String, [f64; 3])>,
+}
+
+impl Candidate {
+    /// Share of the seen shift that it explains; `None` where it saw none.
+    pub fn explained(&self) -> Option<f64> {
+        (self.finding != Finding::NoShift).then_some(self.explained_share)
+    }
 }
 
 /// The family, the most probable model first.

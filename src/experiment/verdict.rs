@@ -352,7 +352,7 @@ pub struct Verdict {
     pub finding: Finding,
     /// One sentence or two.
     pub sentence: String,
-    /// Share of the seen shift that the model explains: 1 - sum |seen - model|^2 / sum |seen|^2.
+    /// Share of the seen shift that the model explains: 1 - sum |seen - model|^2 / sum |seen|^2; absent where none was seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub explained_share: Option<f64>,
     /// What is said of each tissue's shear modulus.
@@ -371,6 +371,8 @@ impl Verdict {
         moduli: Vec<(String, Claim)>,
         reasons: Vec<Reason>,
     ) -> Self {
+        // Of a shift that was not seen there is no share: 0 would say that the model misses it.
+        let explained_share = explained_share.filter(|_| finding != Finding::NoShift);
         let sentence = sentence(finding, explained_share, &moduli, &reasons);
         Self { finding, sentence, explained_share, moduli, reasons }
     }
@@ -547,7 +549,9 @@ mod tests {
     fn no_shift_gives_a_bound_and_names_what_would_have_been_seen() {
         let reason = Reason::StillAsProbable { log_odds: -2.0, would_be_seen_mm: 0.64 };
         let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
-        let text = Verdict::new(Finding::NoShift, None, vec![bound], vec![reason]).sentence;
+        let verdict = Verdict::new(Finding::NoShift, Some(0.0), vec![bound], vec![reason]);
+        assert_eq!(verdict.explained_share, None, "of nothing there is no share");
+        let text = verdict.sentence;
         assert!(text.contains("0.6 mm") && text.contains("grey matter is stiffer than 2,140 Pa"), "{text}");
         let said = |log_odds| Reason::StillAsProbable { log_odds, would_be_seen_mm: 0.64 }.sentence();
         assert!(said(-2.0).contains("about as probable") && said(-6.5).contains("moved is more probable"));

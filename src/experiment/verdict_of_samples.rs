@@ -12,6 +12,8 @@ impl ExperimentOutcome {
         if self.verdict.finding == Finding::NoShift {
             // Every sample fits noise as well as any other.
             self.best_sample = None;
+            // A file of an earlier version has 0 % of nothing.
+            self.verdict.explained_share = None;
         }
         self
     }

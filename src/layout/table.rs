@@ -312,7 +312,7 @@ pub const TABLE: &[Entry] = &[
     file(LABELS_FOR_SLICER, "labels for 3D Slicer", Space::Mni, Maker::Report),
     file(CAVITY_FOR_SLICER, "cavity for 3D Slicer", Space::Mni, Maker::Report),
     file(BEST_SURFACE.0, "deformed surface of the best sample, for Workbench", Space::Mni, Maker::Report),
-    file(BEST_ERRORS.0, "its error in mm, for Workbench", Space::Mni, Maker::Report),
+    file(BEST_ERRORS.0, "its error in mm, NaN where no target is, for Workbench", Space::Mni, Maker::Report),
     file(SAMPLES_SERIES, "the samples as one series for ParaView", Space::Mni, Maker::Report),
 ];
 

@@ -3,7 +3,7 @@
 pub use super::case_files::ReportError;
 
 use super::case_files::{Case, best_sample, displaced};
-use super::case_views::add_results;
+use super::case_views::{add_results, observed_errors};
 use super::figure::CaseImages;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
@@ -99,7 +99,8 @@ fn expected_of(case: &Case<'_>, prediction: Option<&Prediction>) -> Result<Optio
 /// The page of a case directory.
 ///
 /// # Errors
-/// [`ReportError`] for a file that is there but cannot be used; what is not there is named on the page.
+/// [`ReportError`] for a file that is there but cannot be used; what is not there is named on the page, and so are numbers that
+/// another version wrote.
 pub fn read_case(folder: &Path) -> Result<CasePage, ReportError> {
     Ok(read_with_images(folder)?.0)
 }
@@ -130,10 +131,11 @@ fn read_with_images(folder: &Path) -> Result<(CasePage, Option<CaseImages>), Rep
     if let Some(png) = case.bytes(layout::REFUSED_PICTURE)? {
         page.refused = Some(refused(png));
     }
-    page.prediction = case.numbers(layout::PREDICTION_JSON)?;
-    page.evaluation = evaluation_of(&case)?;
-    page.brain_shift = case.numbers(layout::SHIFT_JSON)?;
-    page.landmarks = landmarks_in(&case)?.filter(|_| page.brain_shift.is_some());
+    let absent = &mut page.absent;
+    page.prediction = case.numbers(layout::PREDICTION_JSON, ["the brain shift expected", "hgm predict"], absent)?;
+    page.evaluation = evaluation_of(&case, absent)?;
+    page.brain_shift = case.numbers(layout::SHIFT_JSON, ["the brain shift", "hgm run"], absent)?;
+    page.landmarks = landmarks_in(&case, absent)?.filter(|_| page.brain_shift.is_some());
     let estimated = outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some());
     // Sections that need nothing of each other are drawn side by side.
     let ((scans, cuts), (results, (shift, (expected, residuals)))) = rayon::join(
@@ -166,15 +168,17 @@ fn read_with_images(folder: &Path) -> Result<(CasePage, Option<CaseImages>), Rep
 }
 
 /// The prediction against what was seen: nothing where another prediction was evaluated.
-fn evaluation_of(case: &Case<'_>) -> Result<Option<PredictionEvaluation>, ReportError> {
+fn evaluation_of(case: &Case<'_>, absent: &mut Vec<String>) -> Result<Option<PredictionEvaluation>, ReportError> {
     let sum = case.bytes(layout::PREDICTION_JSON)?.map(|bytes| sha256_hex(&bytes));
-    let found: Option<PredictionEvaluation> = case.numbers(layout::EVALUATION_JSON)?;
+    let what = ["the prediction against what was seen", "hgm evaluate"];
+    let found: Option<PredictionEvaluation> = case.numbers(layout::EVALUATION_JSON, what, absent)?;
     Ok(found.filter(|found| sum.as_ref() == Some(&found.prediction_sha256)))
 }
 
 /// Landmarks that were held against the results that are there now.
-fn landmarks_in(case: &Case<'_>) -> Result<Option<Evaluation>, ReportError> {
-    let found: Option<Evaluation> = case.numbers(layout::LANDMARKS_JSON)?;
+fn landmarks_in(case: &Case<'_>, absent: &mut Vec<String>) -> Result<Option<Evaluation>, ReportError> {
+    let what = ["landmarks against the brain shift", "hgm evaluate"];
+    let found: Option<Evaluation> = case.numbers(layout::LANDMARKS_JSON, what, absent)?;
     let now = found.is_some().then(|| results_sha256(case.folder)).transpose()?;
     Ok(found.filter(|found| now.as_ref() == Some(&found.of_sha256)))
 }
@@ -228,11 +232,11 @@ pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
     if let Some(outcome) = &page.outcome {
         files.extend(hand_off::series(outcome));
         if let Some((file, sample)) = best_sample(&case, outcome)?
-            && let Some(errors) = sample.point_field("rmse_mm")
+            && let Some(errors) = observed_errors(&sample)
         {
             let deformed = displaced(&file, &sample)?;
             let sets = outcome.rmse_sets();
-            let surfaces = hand_off::error_surfaces(&sample.mesh, &deformed, &errors.values, &sets);
+            let surfaces = hand_off::error_surfaces(&sample.mesh, &deformed, &errors, &sets);
             files.extend(surfaces.map_err(ReportError::HandOff)?);
         }
     }
@@ -270,7 +274,7 @@ mod tests {
     use crate::experiment::outcome::SampleOutcome;
     use crate::geometry::Position;
     use crate::image::{Grid, Mask};
-    use crate::mesh::format::vtu;
+    use crate::mesh::format::{gifti, vtu};
 
     fn mesh() -> TetMesh {
         let nodes = vec![[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0], [50.0, 50.0, 50.0]];
@@ -370,13 +374,46 @@ mod tests {
     }
 
     #[test]
+    fn a_node_without_a_target_is_without_an_error_in_the_files_for_other_viewers_too() {
+        let folder = tempfile::tempdir().unwrap();
+        case(folder.path());
+        let files = report_files(folder.path()).unwrap();
+        let errors = |set: &str| {
+            let (name, bytes) = files.iter().find(|(name, _)| *name == layout::BEST_ERRORS.of(set)).unwrap();
+            gifti::decode_shape(bytes, name).unwrap().swap_remove(0).values
+        };
+        // Not 0 mm: the file's zero stands for nothing there.
+        assert!(errors("pial")[0].is_nan() && errors("pial")[1..] == [1.0, 2.0, 0.5, 3.75], "{:?}", errors("pial"));
+        assert_eq!(errors("margin"), [1.0, 2.0, 3.75]);
+    }
+
+    #[test]
+    fn numbers_that_are_there_but_cannot_be_read_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        case(folder.path());
+        let before = read_case(folder.path()).unwrap().absent.len();
+        let all = [layout::PREDICTION_JSON, layout::EVALUATION_JSON, layout::SHIFT_JSON, layout::LANDMARKS_JSON];
+        for file in all {
+            write(folder.path(), file, b"{\"of_a_later_version\": 1}");
+        }
+        let page = read_case(folder.path()).unwrap();
+        assert_eq!(page.absent.len(), before + all.len(), "{:?}", page.absent);
+        for file in all {
+            let named =
+                |what: &String| what.contains(file) && what.contains("cannot be read") && what.contains("`hgm ");
+            assert!(page.absent.iter().any(named), "{file}: {:?}", page.absent);
+        }
+        assert!(page.prediction.is_none() && page.brain_shift.is_none());
+    }
+
+    #[test]
     fn landmarks_of_results_that_are_no_longer_there_are_not_shown() {
         let folder = tempfile::tempdir().unwrap();
         let write = |file: &str, text: &str| write_whole(&folder.path().join(file), text.as_bytes()).unwrap();
         write(layout::OUTCOME, "{}");
         let kept = Evaluation { of_sha256: results_sha256(folder.path()).unwrap(), ..Evaluation::default() };
         write(layout::LANDMARKS_JSON, &serde_json::to_string(&kept).unwrap());
-        let shown = || landmarks_in(&Case { folder: folder.path() }).unwrap();
+        let shown = || landmarks_in(&Case { folder: folder.path() }, &mut Vec::new()).unwrap();
         assert_eq!(shown(), Some(kept));
         write(layout::OUTCOME, "{\"made\": \"again\"}");
         assert_eq!(shown(), None);

@@ -78,9 +78,23 @@ impl Case<'_> {
         String::from_utf8(bytes).map(Some).map_err(|_| ReportError::Text { file: file.to_owned() })
     }
 
-    /// Numbers of ours; `None` when they are not there or another version's.
-    pub(super) fn numbers<T: DeserializeOwned>(&self, file: &str) -> Result<Option<T>, ReportError> {
-        Ok(self.text(file)?.and_then(|text| serde_json::from_str(&text).ok()))
+    /// Numbers of ours; `None` when they are not there. Those that are there and cannot be read, as another version's, are named
+    /// in `absent`: what they are, and what makes them again.
+    pub(super) fn numbers<T: DeserializeOwned>(
+        &self,
+        file: &str,
+        [what, command]: [&str; 2],
+        absent: &mut Vec<String>,
+    ) -> Result<Option<T>, ReportError> {
+        let Some(text) = self.text(file)? else { return Ok(None) };
+        let unread = |why: &serde_json::Error| {
+            format!(
+                "{what} ({file} cannot be read, as another version's or a damaged file: {why}; run `{command}` again)"
+            )
+        };
+        let read = serde_json::from_str::<T>(&text);
+        absent.extend(read.as_ref().err().map(unread));
+        Ok(read.ok())
     }
 
     pub(super) fn mesh(&self, file: &str) -> Result<Option<MeshWithFields>, ReportError> {

@@ -15,7 +15,7 @@ use crate::mesh::format::{Field, MeshWithFields};
 use crate::mesh::{TetMesh, TriMesh};
 
 /// The error of every node, NaN where the reference says nothing of it: such a node is not without error.
-fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
+pub(super) fn observed_errors(sample: &MeshWithFields) -> Option<Vec<f64>> {
     let errors = sample.point_field("rmse_mm").filter(|f| f.values.len() == sample.mesh.nodes_mm().len())?;
     let mut seen = vec![f64::NAN; errors.values.len()];
     // In a file from before node sets were marked, or written again by another program, the array is read as a set.
@@ -67,6 +67,7 @@ pub(super) fn add_results(
             scale: scale.clone(),
             pictures: value_views(mesh, &deformed, errors, scale, &named, PICTURE),
             errors_mm: sets.iter().filter_map(of_set).collect(),
+            on_two_sets: on_two_sets(mesh, &sets),
         });
     } else {
         page.absent.push(format!("the error per node ({file} has no point array `rmse_mm`)"));
@@ -76,6 +77,17 @@ pub(super) fn add_results(
     viewer.slices = linked_slices(case, images)?;
     page.viewer = Some(viewer);
     Ok(())
+}
+
+/// How many nodes lie on two of the sets and more. A file has one error of each node, and of these it is the smallest one. Where
+/// every node has an error of its own (set `all`) no set's error is another.
+fn on_two_sets(mesh: &TetMesh, sets: &[String]) -> usize {
+    if sets.iter().any(|set| set == "all") {
+        return 0;
+    }
+    let mut times = vec![0; mesh.nodes_mm().len()];
+    sets.iter().filter_map(|set| mesh.node_sets.get(set)).flatten().for_each(|&n| times[n as usize] += 1);
+    times.iter().filter(|times| **times > 1).count()
 }
 
 /// The states of a sweep on one surface; `None` where they form no row, or one of their files is not there or has another mesh.
@@ -133,4 +145,21 @@ fn viewer(
         surfaces.push(plain(&format!("reference: {what}"), surface));
     }
     Ok(Viewer { surfaces, scale, states: None, slices: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_where_two_sets_meet_is_counted_once_and_none_where_every_node_has_an_error_of_its_own() {
+        let nodes = vec![[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+        let mut mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3]], vec![2]).unwrap();
+        mesh.set_nodes("margin", vec![0, 1, 2]).unwrap();
+        mesh.set_nodes("ventricle", vec![2, 3]).unwrap();
+        let of = |sets: &[&str]| on_two_sets(&mesh, &sets.iter().map(|set| (*set).to_owned()).collect::<Vec<_>>());
+        assert_eq!(of(&["margin", "ventricle"]), 1);
+        assert_eq!(of(&["margin"]), 0);
+        assert_eq!(of(&["all", "margin", "ventricle"]), 0);
+    }
 }

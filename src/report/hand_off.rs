@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `anat/pre_space-MNI_dseg.seg.nrrd` | 3D Slicer: tissue, ventricles and resected tissue with names and colours |
 //! | `anat/post_space-MNI_label-cavity.seg.nrrd` | 3D Slicer: the cavity |
-//! | `sim/best_SET.surf.gii`, `sim/best_SET.shape.gii` | Workbench, FreeSurfer: the deformed surface and its error in mm |
+//! | `sim/best_SET.surf.gii`, `sim/best_SET.shape.gii` | Workbench, FreeSurfer: the deformed surface and its error in mm (NaN: no target there) |
 //! | `sim/samples.pvd` | ParaView: the samples as one series |
 
 use super::colour::{CAVITY, RESECTED, Rgb, VENTRICLE, of_label};
@@ -61,7 +61,8 @@ pub fn segmentations(images: &CaseImages) -> Vec<CaseFile> {
     files
 }
 
-/// Deformed surfaces with their errors: the outer one as `pial`, then every set with facets.
+/// Deformed surfaces with their errors: the outer one as `pial`, then every set with facets. An error is NaN where a node has no
+/// target: such a node is not without error.
 ///
 /// # Errors
 /// [`WriteError`] when there is not one error per node.

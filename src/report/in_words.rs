@@ -130,8 +130,9 @@ pub fn models_table(comparison: &Comparison) -> String {
     let mut text =
         String::from("model                                              log odds  weight  explained  finding\n");
     for c in &comparison.candidates {
-        let (odds, share, finding) = (c.log_evidence - best, 100.0 * c.explained_share, c.finding.short());
-        text += &format!("{:<49} {odds:>9.1} {:>7.3} {share:>8.0} %  {finding}\n", c.name, c.weight);
+        let (odds, finding) = (c.log_evidence - best, c.finding.short());
+        let share = c.explained().map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        text += &format!("{:<49} {odds:>9.1} {:>7.3} {share:>10}  {finding}\n", c.name, c.weight);
     }
     text
 }

@@ -30,13 +30,13 @@ pub struct BrainShift {
 pub struct StateShift {
     /// `estimate`, `sample-05`, `fused`, `observed`.
     pub state: String,
-    /// Largest displacement of tissue, mm.
+    /// Largest displacement of tissue that is believed, mm; this and the next three are 0 where none is.
     pub largest_mm: f64,
-    /// Median displacement of tissue, mm.
+    /// Median displacement of the same, mm.
     pub median_mm: f64,
     /// Where the largest is, mm, RAS, pre-operative scan.
     pub largest_at_mm: [f64; 3],
-    /// Median standard deviation over the tissue (root of the trace of the covariance), mm.
+    /// Median standard deviation over the same (root of the trace of the covariance), mm.
     pub sd_median_mm: f64,
     /// Smallest determinant of the field's gradient.
     pub jacobian_min: f64,
@@ -44,6 +44,9 @@ pub struct StateShift {
     pub smoothed_voxels: usize,
     /// Tissue whose displacement is believed, cc.
     pub believed_cc: f64,
+    /// Tissue that is left out of all sizes because the state folds there, cc; absent in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_believed_cc: Option<f64>,
 }
 
 /// The process over what the model leaves of the seen displacement.
@@ -71,6 +74,7 @@ impl StateShift {
             field.believed.iter().zip(&field.sd_mm).filter(|(b, _)| **b).map(|(_, sd)| *sd).collect();
         let count = sd.len();
         let median = (count > 0).then(|| *sd.select_nth_unstable_by(count / 2, f32::total_cmp).1);
+        let voxel_mm3 = field.forward.grid.voxel_volume_mm3();
         Self {
             state: state.to_owned(),
             largest_mm: rounded(largest_mm),
@@ -79,8 +83,15 @@ impl StateShift {
             sd_median_mm: rounded(median.map_or(0.0, f64::from)),
             jacobian_min: rounded(field.jacobian_min),
             smoothed_voxels: field.changed,
-            believed_cc: rounded(count as f64 * field.forward.grid.voxel_volume_mm3() / 1000.0),
+            believed_cc: rounded(count as f64 * voxel_mm3 / 1000.0),
+            // A single voxel is not rounded away.
+            not_believed_cc: Some(rounded(field.changed as f64 * voxel_mm3) / 1000.0),
         }
+    }
+
+    /// Whether any of its displacement is believed; where none is, its sizes say nothing.
+    pub fn is_believed(&self) -> bool {
+        self.believed_cc > 0.0
     }
 }
 
@@ -101,4 +112,45 @@ impl Discrepancy {
 /// Micrometres: more than any use needs.
 fn rounded(x: f64) -> f64 {
     (x * 1e3).round() / 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Grid, Volume};
+
+    /// Four voxels of 8 mm3 of tissue, the last one moved far.
+    fn field(believed: [bool; 4]) -> ShiftField {
+        let grid = Grid::axis_aligned([4, 1, 1], [2.0; 3], [0.0; 3]);
+        let vectors = vec![[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [9.0, 0.0, 0.0]];
+        ShiftField {
+            whole: grid,
+            first: [0; 3],
+            forward: Volume::from_data(grid, vectors.clone()),
+            inverse: Volume::from_data(grid, vectors),
+            sd_mm: vec![0.5; 4],
+            reach95_mm: vec![10.0; 4],
+            believed: believed.to_vec(),
+            jacobian_min: 0.05,
+            changed: believed.iter().filter(|b| !**b).count(),
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_of_the_sizes_is_counted_and_no_tissue_is_not_tissue_that_stands_still() {
+        let folded = StateShift::of("estimate", &field([true, true, true, false]));
+        assert_eq!((folded.largest_mm, folded.believed_cc, folded.not_believed_cc), (3.0, 0.024, Some(0.008)));
+        assert!(folded.is_believed());
+        let none = StateShift::of("estimate", &field([false; 4]));
+        assert!(!none.is_believed() && none.not_believed_cc == Some(0.032), "{none:?}");
+    }
+
+    #[test]
+    fn a_file_from_before_what_is_left_out_was_counted_is_still_read() {
+        let shift = StateShift::of("estimate", &field([true; 4]));
+        let mut old = serde_json::to_value(&shift).unwrap();
+        old.as_object_mut().unwrap().remove("not_believed_cc").unwrap();
+        let read: StateShift = serde_json::from_value(old).unwrap();
+        assert_eq!(read, StateShift { not_believed_cc: None, ..shift });
+    }
 }

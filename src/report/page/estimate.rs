@@ -127,11 +127,33 @@ fn table_of_models(models: &Comparison) -> Markup {
             c.name.clone(),
             fixed(c.log_evidence - best, 1),
             fixed(c.weight, 3),
-            format!("{} %", fixed(100.0 * c.explained_share, 0)),
+            c.explained().map_or_else(|| "–".to_owned(), |share| format!("{} %", fixed(100.0 * share, 0))),
             c.finding.short().to_owned(),
         ];
         (n == 0, words(cells))
     };
     let rows: Vec<Row> = models.candidates.iter().enumerate().map(row).collect();
     table("Models", &head, &rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::verdict::{Finding, Verdict};
+
+    #[test]
+    fn a_model_that_saw_no_shift_explains_no_share_of_it() {
+        let candidate = |finding, explained_share| Candidate {
+            name: "supports sliding".to_owned(),
+            log_evidence: -10.0,
+            weight: 0.5,
+            finding,
+            explained_share,
+            moduli_pa: Vec::new(),
+        };
+        let candidates = vec![candidate(Finding::Identified, 0.86), candidate(Finding::NoShift, 0.0)];
+        let html =
+            table_of_models(&Comparison { candidates, log_odds: None, verdict: Verdict::default() }).into_string();
+        assert!(html.contains("<td>86 %</td>") && html.contains("<td>–</td>") && !html.contains("<td>0 %"), "{html}");
+    }
 }

@@ -24,10 +24,10 @@ use super::chart;
 use super::colour::{ColourScale, Rgb, hex};
 use super::figure::{Mosaic, RegistrationFigure};
 use super::glance_figure::GlanceFigure;
-use super::html::{png_address, without_control_characters};
+use super::html::{count, png_address, without_control_characters};
 use super::listing::Listed;
 use super::viewer::Viewer;
-use crate::experiment::field::BrainShift;
+use crate::experiment::field::{BrainShift, StateShift};
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, PredictionEvaluation};
@@ -60,6 +60,8 @@ pub struct ErrorMap {
     pub pictures: Vec<CaptionedPicture>,
     /// Errors of the nodes, mm, per set.
     pub errors_mm: Vec<(String, Vec<f64>)>,
+    /// Nodes on two of the sets: their error is the smaller of the two.
+    pub on_two_sets: usize,
 }
 
 /// The brain shift on a slice: seen, modelled, what is between them.
@@ -91,7 +93,7 @@ pub struct CasePage {
     pub version: String,
     /// Warnings that are not in the outcome.
     pub warnings: Vec<String>,
-    /// Parts that could not be shown because their files are not there.
+    /// Parts that could not be shown because their files are not there, or are not of this version.
     pub absent: Vec<String>,
     /// What the experiment found.
     pub outcome: Option<ExperimentOutcome>,
@@ -238,7 +240,10 @@ impl CasePage {
         };
         let note = "The images are masked to the brain; of the scans' headers the page holds no names, dates or places (the \
                     heading is the folder's name), and it makes no request to any other place.";
-        let glance = glance::block(self.outcome.as_ref(), self.glance.as_ref(), self.brain_shift.as_ref());
+        // A shift of which nothing is believed has no size.
+        let sized = |shift: &&BrainShift| shift.states.first().is_some_and(StateShift::is_believed);
+        let shift = self.brain_shift.as_ref().filter(sized);
+        let glance = glance::block(self.outcome.as_ref(), self.glance.as_ref(), shift);
         let expected = self.prediction.as_ref().map(prediction::in_a_sentence);
         let first = html! {
             @if let Some(expected) = expected { p class="verdict" { (expected) } "\n" }
@@ -412,6 +417,13 @@ fn error_section(map: &ErrorMap) -> Markup {
             "Distance at every node between the best sample and the target. Grey: no target there. The colours end at the 95th \
              percentile."
         } "\n"
+        @if map.on_two_sets > 0 {
+            p {
+                "Nodes that lie on two of the sets, as where the margin meets the ventricle wall: " (count(map.on_two_sets))
+                ". They are coloured, and counted in the histograms of both, with the smaller of their two errors; the RMSE of a \
+                 set takes the error against its own target."
+            } "\n"
+        }
         (pictures(&map.pictures))
         div class="bar-row" { (PreEscaped(chart::colour_bar(&map.scale))) } "\n"
         div class="charts" {

@@ -243,6 +243,42 @@ fn an_empty_case_still_gives_a_page_that_says_what_is_absent() {
     assert!(!html.contains("id=\"samples\""));
 }
 
+#[test]
+fn a_shift_of_which_nothing_is_believed_has_no_number_on_the_first_screen() {
+    let shown = |believed_cc: f64| {
+        let state = StateShift {
+            state: "estimate".to_owned(),
+            largest_mm: 0.0,
+            median_mm: 0.0,
+            largest_at_mm: [0.0; 3],
+            sd_median_mm: 0.0,
+            jacobian_min: 0.05,
+            smoothed_voxels: 10,
+            believed_cc,
+            not_believed_cc: Some(0.01),
+        };
+        let brain_shift = Some(BrainShift { states: vec![state], ..BrainShift::default() });
+        let html = CasePage { brain_shift, ..page(ExperimentOutcome::default()) }.to_html();
+        html.split("id=\"warnings\"").next().unwrap().contains("Largest displacement")
+    };
+    assert!(shown(900.0) && !shown(0.0));
+}
+
+#[test]
+fn the_errors_of_nodes_that_two_sets_share_are_told_to_be_the_smaller_ones() {
+    let shown = |on_two_sets| {
+        let map = ErrorMap {
+            scale: ColourScale::over([0.0, 2.0].into_iter(), "error per node (mm)").unwrap(),
+            pictures: Vec::new(),
+            errors_mm: vec![("margin".to_owned(), vec![0.5, 2.0])],
+            on_two_sets,
+        };
+        error_section(&map).into_string()
+    };
+    assert!(shown(17).contains("17") && shown(17).contains("the smaller of their two errors"));
+    assert!(!shown(0).contains("smaller of their two"));
+}
+
 fn scan(contrast_to_noise: f64, air: Air) -> ScanQuality {
     let told = (air == Air::Seen).then_some(0.5);
     ScanQuality {
