@@ -3,6 +3,7 @@
 use super::super::chart::colour_bar;
 use super::super::glance_figure::GlanceFigure;
 use super::super::html::{fixed, number};
+use super::brain_shift::left_out;
 use super::parts::{legend, quantity, tile, tile_figure};
 use super::results::{modulus, set_name};
 use crate::experiment::field::BrainShift;
@@ -53,7 +54,8 @@ fn numbers(outcome: &ExperimentOutcome, shift: Option<&BrainShift>) -> Vec<Marku
     }
     tiles.extend(errors(outcome));
     if let Some(state) = shift.and_then(|shift| shift.states.first()) {
-        let note = format!("{} mm in the median, state {}", number(state.median_mm, 2), state.state);
+        let left_out = left_out(state).map_or_else(String::new, |what| format!("; {what}"));
+        let note = format!("{} mm in the median, state {}{left_out}", number(state.median_mm, 2), state.state);
         tiles.push(tile("Largest displacement", &quantity(Some(state.largest_mm), 2, "mm"), &note));
     }
     let floor = outcome.noise_floor.and_then(|floor| floor.combined_mm());

@@ -91,7 +91,8 @@ pub fn summary(outcome: &ExperimentOutcome) -> Markup {
             "held at the prior of abnormal tissue, not estimated",
         ));
     }
-    tiles.extend(outcome.volumes.iter().flat_map(volume_tiles));
+    let floor_mm = outcome.noise_floor.and_then(|floor| floor.combined_mm());
+    tiles.extend(outcome.volumes.iter().flat_map(|v| volume_tiles(v, floor_mm)));
     if let Some(floor) = outcome.noise_floor {
         let part = |name: &str, mm: Option<f64>| mm.map(|mm| format!("{name} {} mm", number(mm, 2)));
         let parts: Vec<String> = [
@@ -137,7 +138,7 @@ pub fn modulus(tissue: &str, claim: &Claim) -> Option<Markup> {
     Some(tile(&name, &html! { (value) span class="unit" { " Pa" } }, &note))
 }
 
-fn volume_tiles(v: &ResectionVolumes) -> Vec<Markup> {
+fn volume_tiles(v: &ResectionVolumes, floor_mm: Option<f64>) -> Vec<Markup> {
     let mut tiles = Vec::new();
     if v.resected_cc.is_some() {
         tiles.push(tile("Resected tissue", &quantity(v.resected_cc, 3, "cc"), "on the image before surgery"));
@@ -152,13 +153,25 @@ fn volume_tiles(v: &ResectionVolumes) -> Vec<Markup> {
         tiles.push(tile("Ventricles before surgery", &quantity(v.ventricle_before_cc, 3, "cc"), &note));
     }
     if let Some(shift) = v.midline_shift_mm {
-        let side = if shift > 0.0 { "to the right" } else { "to the left" };
-        tiles.push(tile("Midline shift", &quantity(Some(shift.abs()), 2, "mm"), side));
+        tiles.push(midline_tile(shift, floor_mm));
     }
     if v.brain_cc.is_some() {
         tiles.push(tile("Brain before surgery", &quantity(v.brain_cc, 4, "cc"), ""));
     }
     tiles
+}
+
+/// How far the midline has moved; to no side where that is less than the scans can tell, or than the decimal that is shown.
+fn midline_tile(shift_mm: f64, floor_mm: Option<f64>) -> Markup {
+    /// What one decimal rounds to nothing, mm.
+    const SHOWN_MM: f64 = 0.05;
+    let side = match floor_mm.filter(|floor| *floor > SHOWN_MM) {
+        Some(floor) if shift_mm.abs() < floor => "to no side: below the noise floor",
+        None if shift_mm.abs() < SHOWN_MM => "to no side",
+        _ if shift_mm > 0.0 => "to the right",
+        _ => "to the left",
+    };
+    tile("Midline shift", &html! { (fixed(shift_mm.abs(), 1)) span class="unit" { " mm" } }, side)
 }
 
 fn signed_fixed(percent: f64) -> String {

@@ -190,6 +190,21 @@ fn what_the_images_show_of_the_shift_is_told_with_its_side() {
 }
 
 #[test]
+fn a_midline_that_moved_less_than_can_be_told_has_moved_to_no_side() {
+    let shown = |midline_mm: f64, floor_mm: Option<f64>| {
+        let mut outcome = outcome(ExperimentKind::Resection);
+        outcome.noise_floor = floor_mm.map(|mm| NoiseFloor { at_rest_mm: Some(mm), ..NoiseFloor::default() });
+        outcome.volumes = Some(ResectionVolumes { midline_shift_mm: Some(midline_mm), ..ResectionVolumes::default() });
+        let html = page(outcome).to_html();
+        html.split("Midline shift").nth(1).unwrap()[..120].to_owned()
+    };
+    assert!(shown(-0.0048, None).contains("0.0<") && shown(-0.0048, None).contains("to no side"));
+    assert!(shown(-0.06, None).contains("0.1<") && shown(-0.06, None).contains("to the left"));
+    assert!(shown(0.4, Some(0.5)).contains("below the noise floor"));
+    assert!(shown(0.6, Some(0.5)).contains("to the right"));
+}
+
+#[test]
 fn how_a_prediction_was_drawn_stands_in_its_methods_once() {
     let html = page(outcome(ExperimentKind::Prediction)).to_html();
     assert_eq!(html.matches("Halton").count(), 1);
