@@ -55,6 +55,11 @@ impl Colours {
         all.into_iter().filter(known).collect()
     }
 
+    /// The place of a colour among those that are known; 0, which every body has, for one that is not.
+    pub fn place(&self, colour: Colour) -> u32 {
+        self.known().iter().position(|known| *known == colour).unwrap_or_default() as u32
+    }
+
     /// Whether nothing has to be made first.
     pub fn is_ready(&self, colour: Colour) -> bool {
         self.known().contains(&colour) && (colour != Colour::PriorSd || self.prior_sd_mm.is_some())

@@ -14,7 +14,7 @@ const SCAN: u32 = 4;
 /// Words of a frame's header.
 pub const HEAD: usize = 20;
 
-/// What the clock says, for the header.
+/// What the header says besides the session.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
     /// Steps a second.
@@ -23,6 +23,9 @@ pub struct Pace {
     pub taken: u32,
     /// No steps are taken.
     pub paused: bool,
+    /// What the numbers are, as its place among what the body can be coloured by: the page names what it shows after this, not
+    /// after what was asked for.
+    pub colour: u32,
 }
 
 /// The mesh: words (magic, 1, nodes, tetrahedra, facets, facets without the resected tissue, label of that or 255), then nodes
@@ -98,7 +101,7 @@ pub fn frame_bytes(session: &Session, readout: &Readout, pace: &Pace, numbers: &
         session.time_step_s(),
         session.recovered() as f64,
         report.linear_iterations as f64,
-        0.0,
+        f64::from(pace.colour),
     ];
     for x in figures {
         bytes.extend((x as f32).to_le_bytes());

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const WALLS: [&str; 2] = ["ventricle", "margin"];
 
 /// What the page needs to know of the body.
-pub(super) fn hello(body: &LiveBody, session: &Session, colours: &Colours) -> String {
+pub(super) fn hello(body: &LiveBody, session: &Session, colours: &Colours) -> serde_json::Value {
     let scenario = session.scenario();
     let mesh = session.mesh();
     let tissues: Vec<serde_json::Value> = body
@@ -49,10 +49,11 @@ pub(super) fn hello(body: &LiveBody, session: &Session, colours: &Colours) -> St
         "pressed": pressed,
         "pressure": scenario.loads.pressure,
         "gravity_m_per_s2": scenario.loads.gravity_m_per_s2,
+        // What "as in the scenario" means: a page that comes later has never seen it.
+        "scenario_gravity_m_per_s2": body.scenario.loads.gravity_m_per_s2,
         "density_kg_per_m3": scenario.loads.density_kg_per_m3,
         "resection": session.resection(),
         "quasi_static": session.is_quasi_static(),
         "csf_level_mm": scenario.loads.csf.map(|csf| csf.level_mm),
     })
-    .to_string()
 }

@@ -166,7 +166,7 @@ impl<'a> Driver<'a> {
         self.dirty = true;
         // The page knows what it has asked for, but not what is taken back.
         if matches!(command, Command::Undo {} | Command::Reset {}) {
-            self.desk.answer(hello(self.body, &self.session, &self.colours));
+            self.desk.answer(self.hello().to_string());
         }
         if self.recorded {
             self.keep(command);
@@ -189,18 +189,25 @@ impl<'a> Driver<'a> {
         commands.push(Timed { step, command });
     }
 
+    fn hello(&self) -> serde_json::Value {
+        hello(self.body, &self.session, &self.colours)
+    }
+
     fn take_up(&mut self, order: &Order) {
+        let mut of_hand = false;
         let done = match order {
             Order::Message(text) => {
                 self.taken = self.taken.wrapping_add(1);
-                Message::read(text).and_then(|message| match message {
+                let message = Message::read(text);
+                of_hand = matches!(&message, Ok(Message::Command(Command::Drag { .. } | Command::Ball { .. })));
+                message.and_then(|message| match message {
                     Message::Command(command) => self.apply(command),
                     Message::View(view) => self.view(&view),
                 })
             }
             Order::Joined => {
                 (self.dirty, self.taken) = (true, 0);
-                self.desk.answer(hello(self.body, &self.session, &self.colours));
+                self.desk.answer(self.hello().to_string());
                 Ok(())
             }
             Order::Left => {
@@ -209,7 +216,13 @@ impl<'a> Driver<'a> {
             }
         };
         if let Err(reason) = done {
-            self.desk.answer(serde_json::json!({ "refused": reason }).to_string());
+            let mut answer = serde_json::json!({ "refused": reason });
+            if !of_hand {
+                // The page's switch stands where it was put: how the body stands, it has to be told. A hand has no switch, and
+                // asks eighty times a second.
+                answer["stands"] = self.hello();
+            }
+            self.desk.answer(answer.to_string());
         }
     }
 
@@ -246,7 +259,8 @@ impl<'a> Driver<'a> {
             self.readout = (self.session.stepper().readout(), Some(Instant::now()));
         }
         let hz = if still { 0.0 } else { self.hz };
-        let pace = Pace { hz: hz as f32, taken: self.taken, paused: self.paused };
+        let colour = self.colours.place(self.colour);
+        let pace = Pace { hz: hz as f32, taken: self.taken, paused: self.paused, colour };
         let numbers = self.colours.numbers(&self.session, self.colour);
         self.desk.put_frame(frame_bytes(&self.session, &self.readout.0, &pace, &numbers));
         self.dirty = false;

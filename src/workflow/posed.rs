@@ -8,12 +8,14 @@ use super::settings::{Settings, in_words};
 use super::sights::Sights;
 use super::simulation::mesh_in;
 use super::stage_name::Subject;
-use super::stages;
+use super::stages::{self, HeldBody};
 use super::user_file::{read_input, read_text, shown};
 use super::work::{Place, Work};
 use crate::anatomy::label;
+use crate::experiment::compare::Comparison;
 use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
+use crate::experiment::verdict::{Finding, Verdict};
 use crate::fem::Scenario;
 use crate::material::law::Material;
 use crate::mesh::TetMesh;
@@ -39,6 +41,8 @@ pub struct Posed {
     pub estimate: Option<EstimateFacts>,
     /// What is to be seen beside it.
     pub sights: Sights,
+    /// Where the body is not as the case's estimate has it, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Whether a case's body has the tissue that was taken.
@@ -78,8 +82,9 @@ impl BodySource {
     }
 }
 
-/// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are the estimate's, or the
-/// means of the prior.
+/// The body of a case: its mesh, held at base and falx, under the loads of its settings; materials are those of an
+/// estimate that claims a stiffness, else the means of the prior. Estimates of bodies that slide are posed at the fixed base, too;
+/// what is not as the estimate has it stands in the notes.
 ///
 /// # Errors
 /// A folder that is no case, and files that are missing or damaged; a resection to be undone where there was none, and what the
@@ -132,7 +137,9 @@ pub fn posed_case(
         }
     };
     add_materials(&mesh, &mut scenario, ratio, &settings.prior)?;
-    if let Some(facts) = &estimate {
+    // What is withheld, or only bounded, is no answer to open a body on.
+    let claimed = estimate.as_ref().filter(|facts| facts.estimate.verdict.finding.has_stiffness());
+    if let Some(facts) = claimed {
         for (tissue, &pa) in &facts.record.shear_modulus_pa {
             let of_tissue = |name: &str| name == tissue || (tissue == "brain" && OF_BRAIN.contains(&name));
             for (_, material) in scenario.materials.iter_mut().filter(|(name, _)| of_tissue(name)) {
@@ -141,11 +148,34 @@ pub fn posed_case(
         }
     }
     let mut sights = Sights::of(&case, &mesh)?;
-    if estimate.is_none() {
-        // Of an estimate that another job has left.
+    if claimed.is_none() {
+        // Of an estimate that another job has left, or of moduli that the body does not have.
         sights.estimate_sd_mm = None;
     }
-    Ok(Posed { name: shown(folder), mesh, scenario, estimate, sights })
+    let supports = (subject == Some(Subject::Patient)).then_some(settings.resection.supports);
+    let notes = estimate.as_ref().map_or_else(Vec::new, |facts| {
+        notes(&facts.estimate.verdict, facts.comparison.as_ref(), supports.unwrap_or(Supports::Fixed))
+    });
+    Ok(Posed { name: shown(folder), mesh, scenario, estimate, sights, notes })
+}
+
+/// What of a body is not as the estimate with this verdict has it; `supports` are those it was asked for.
+fn notes(verdict: &Verdict, compared: Option<&Comparison>, supports: Supports) -> Vec<String> {
+    let finding = verdict.finding;
+    if !finding.has_stiffness() {
+        let why = finding.short();
+        return vec![format!("the case's estimate is withheld ({why}): moduli are the prior's means")];
+    }
+    let averaged = finding == Finding::CannotTell;
+    let slides = compared.map_or(supports == Supports::Sliding, |compared| {
+        // An average has something of every model.
+        let models = if averaged { compared.candidates.len() } else { 1 };
+        compared.candidates.iter().take(models).any(|model| HeldBody::slides(&model.name))
+    });
+    let average = "moduli are an average over models that cannot be told apart: no curve is drawn of it";
+    let held = "the case's estimate slides along the skull, or some of its models do; here the base is held";
+    let notes = [averaged.then_some(average), slides.then_some(held)];
+    notes.into_iter().flatten().map(str::to_owned).collect()
 }
 
 /// The body of a mesh in a file, by the scenario in another; without one every tissue is the mean of its prior under the
@@ -168,7 +198,7 @@ pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> 
         add_materials(&mesh, &mut scenario, own.poisson_ratio, &settings.prior)?;
         scenario
     };
-    Ok(Posed { name: shown(file), mesh, scenario, estimate: None, sights: Sights::default() })
+    Ok(Posed { name: shown(file), mesh, scenario, estimate: None, sights: Sights::default(), notes: Vec::new() })
 }
 
 /// The mean of the prior for every tissue of the mesh that the scenario has no material for.
@@ -194,6 +224,38 @@ fn add_materials(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::compare::Candidate;
+
+    #[test]
+    fn a_body_says_where_it_is_not_as_the_estimate_has_it() {
+        let verdict = |finding| Verdict { finding, ..Verdict::default() };
+        let model = |name: &str| Candidate {
+            name: name.to_owned(),
+            log_evidence: 0.0,
+            weight: 0.5,
+            finding: Finding::Identified,
+            explained_share: 0.9,
+            moduli_pa: Vec::new(),
+        };
+        let of = |finding, models: &[&str], supports| {
+            let candidates: Vec<Candidate> = models.iter().map(|name| model(name)).collect();
+            let comparison = Comparison { candidates, log_odds: Some(1.0), verdict: verdict(finding) };
+            notes(&verdict(finding), (!models.is_empty()).then_some(&comparison), supports).join("; ")
+        };
+        let both = ["supports fixed", "supports sliding, fluid of unknown level"];
+        let turned = [both[1], both[0]];
+        for finding in [Finding::NoShift, Finding::Unexplained, Finding::Conflict] {
+            let said = of(finding, &turned, Supports::Evidence);
+            assert!(said.contains(finding.short()) && said.contains("prior's means"), "{said}");
+        }
+        assert_eq!(of(Finding::Identified, &both, Supports::Evidence), "");
+        assert!(of(Finding::Identified, &turned, Supports::Evidence).contains("slides"));
+        assert!(of(Finding::Widened, &[], Supports::Sliding).contains("slides"));
+        assert_eq!(of(Finding::Widened, &[], Supports::Fixed), "");
+        let said = of(Finding::CannotTell, &both, Supports::Evidence);
+        assert!(said.contains("average") && said.contains("slides"), "an average has something of both: {said}");
+        assert!(!of(Finding::CannotTell, &["supports fixed"], Supports::Evidence).contains("slides"));
+    }
 
     #[test]
     fn a_folder_is_a_case_a_file_a_mesh_and_neither_takes_what_is_the_others() {

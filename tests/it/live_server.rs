@@ -206,6 +206,45 @@ fn malformed_messages_are_refused_with_a_reason_and_change_nothing() {
 }
 
 #[test]
+fn a_refusal_says_how_the_body_stands_and_a_page_that_comes_later_what_is_shown() {
+    let (server, address) = served();
+    let mut socket = enter(&address);
+    let first = next_text(&mut socket);
+    let said = |socket: &mut WebSocket<TcpStream>, text: &str| {
+        socket.send(Message::text(text)).unwrap();
+        next_text(socket)
+    };
+    // Nothing would hold the body any more.
+    let said_of_base = said(&mut socket, r#"{"do":"support","set":"base","held":false}"#);
+    assert!(said_of_base["refused"].is_string(), "{said_of_base}");
+    assert_eq!(said_of_base["stands"]["held"], serde_json::json!(["base"]));
+    let of_hand = said(&mut socket, r#"{"do":"drag","node":1000000,"to_mm":[0,0,0]}"#);
+    assert!(of_hand["refused"].is_string() && of_hand["stands"].is_null(), "{of_hand}");
+
+    let shown = |socket: &mut WebSocket<TcpStream>| f32::from_bits(next_frame(socket)[19]) as usize;
+    let name = |hello: &serde_json::Value, place: usize| hello["colours"][place].as_str().unwrap().to_owned();
+    let begin = Instant::now();
+    socket.send(Message::text(r#"{"do":"gravity","m_per_s2":[0,9.81,0]}"#)).unwrap();
+    socket.send(Message::text(r#"{"do":"colour","by":"energy"}"#)).unwrap();
+    while name(&first, shown(&mut socket)) != "energy" {
+        assert!(begin.elapsed() < Duration::from_secs(20));
+    }
+    // What the body has not got leaves the colour as it is.
+    assert!(said(&mut socket, r#"{"do":"colour","by":"estimate_sd"}"#)["refused"].is_string());
+    socket.close(None).unwrap();
+    drop(socket);
+    let mut again = enter(&address);
+    let hello = next_text(&mut again);
+    // A body at rest may have shown its only frame already.
+    again.send(Message::text(r#"{"do":"step"}"#)).unwrap();
+    assert_eq!(hello["gravity_m_per_s2"], serde_json::json!([0.0, 9.81, 0.0]));
+    assert_eq!(hello["scenario_gravity_m_per_s2"], first["gravity_m_per_s2"]);
+    assert_eq!(name(&hello, shown(&mut again)), "energy");
+    server.stopper()();
+    server.wait().unwrap();
+}
+
+#[test]
 fn a_client_that_never_reads_holds_up_nobody() {
     let (server, address) = served();
     let (port, token) = parts(&address);

@@ -233,6 +233,40 @@ def what_a_case_knows_is_seen_and_nothing_else_is_offered(options):
         return f"{', '.join(ranges)}; {boxes} targets; scan {browser.evaluate('scan.known')}"
 
 
+def shown_names(browser):
+    """What is shown by the legend, the select and the frame itself."""
+    return browser.evaluate("""(() => { const select = document.getElementById('colour');
+      return [document.getElementById('quantity').textContent, select.selectedOptions[0].textContent, select.value,
+        hello.colours[frame.colour], document.getElementById('unit').textContent]; })()""")
+
+
+@check
+def a_page_that_is_loaded_again_names_what_is_shown_and_what_the_body_has(options):
+    with Live(options) as live, Browser(served=True) as browser:
+        enter(browser, live)
+        choose(browser, "colour", "energy")
+        choose(browser, "gravity", "0,0,0")
+        settle(browser)
+        before = shown_names(browser)
+        # The first page has to be gone before another may come.
+        browser.open("about:blank")
+        browser.listen(1)
+        enter(browser, live)
+        settle(browser)
+        after = shown_names(browser)
+        require(before == after and after[2:] == ["energy", "energy", "Pa"] and after[0] == after[1], f"{before}, then {after}")
+        gravity = browser.evaluate("document.getElementById('gravity').value")
+        require(gravity == "0,0,0", f"gravity {gravity!r}")
+        choose(browser, "gravity", "own")
+        settle(browser)
+        # What is refused goes back to what there is: a label says the body's number, not the slider's.
+        browser.evaluate("send({ do: 'modulus', tissue: hello.tissues[0].name, pa: 30000 })")
+        browser.evaluate("send({ do: 'colour', by: 'no such thing' })")
+        browser.wait_for("document.getElementById('modulus-0-said').textContent === '30000 Pa'", 20)
+        require(shown_names(browser) == before, f"after a refusal {shown_names(browser)}")
+        return ", ".join(after)
+
+
 @check
 def a_second_page_is_told_and_the_first_goes_on(options):
     with Live(options) as live, Browser(served=True) as first, Browser(served=True) as second:

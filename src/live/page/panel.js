@@ -55,12 +55,15 @@ function flush() { if (pending) { send(pending); pending = null; } }
 setInterval(flush, 12);
 
 // --- The panel.
+/// A slider has ends and steps, the body's own number need not lie on them: until a hand moves it, the label says that number.
 function slider(id, unitOf, then) {
-  const input = $(id), told = () => { const said = $(`${id}-said`); if (said) said.textContent = unitOf(Number(input.value)); };
-  input.addEventListener("input", () => { told(); then(Number(input.value)); });
-  input.told = told;
-  told();
+  const input = $(id);
+  input.told = (value) => { const said = $(`${id}-said`); if (said) said.textContent = unitOf(value); };
+  input.put = (value) => { input.value = value; input.told(value); };
+  input.addEventListener("input", () => { input.told(Number(input.value)); then(Number(input.value)); });
+  input.told(Number(input.value));
 }
+const rounded = (x, decimals) => String(Number(x.toFixed(decimals)));
 function line(parent, text, id) {
   const label = document.createElement("label");
   label.className = "line";
@@ -102,7 +105,7 @@ function tissueBox(tissue, n) {
   [curve(tissue.prior, "prior"), curve(tissue.posterior, "posterior")].forEach((path) => path && picture.append(path));
   box.append(picture);
   const input = line(box, "shear modulus ", `modulus-${n}`);
-  Object.assign(input, { min: LOW, max: HIGH, step: 0.01, value: Math.log(tissue.shear_modulus_pa) });
+  Object.assign(input, { min: LOW, max: HIGH, step: 0.01 });
   box.append(Object.assign(document.createElement("p"), { className: "small", textContent: words }));
   const label = Object.assign(document.createElement("label"), { className: "line", textContent: "law " });
   const select = Object.assign(document.createElement("select"), { id: `law-${n}` });
@@ -111,18 +114,22 @@ function tissueBox(tissue, n) {
   label.append(select);
   box.append(label);
   const ratio = line(box, "Poisson's ratio ", `ratio-${n}`);
-  Object.assign(ratio, { min: 0, max: 0.495, step: 0.005, value: tissue.poisson_ratio });
+  Object.assign(ratio, { min: 0, max: 0.495, step: 0.005 });
   $("tissues").append(box);
   slider(`modulus-${n}`, (x) => `${Math.exp(x).toFixed(0)} Pa`, (x) => send({ do: "modulus", tissue: tissue.name, pa: Math.exp(x) }));
-  slider(`ratio-${n}`, (x) => x.toFixed(3), (x) => send({ do: "poisson_ratio", tissue: tissue.name, ratio: x }));
+  slider(`ratio-${n}`, (x) => rounded(x, 5), (x) => send({ do: "poisson_ratio", tissue: tissue.name, ratio: x }));
+  input.put(Math.log(tissue.shear_modulus_pa));
+  ratio.put(tissue.poisson_ratio);
   select.addEventListener("change", () => send({ do: "law", tissue: tissue.name, law: select.value }));
 }
 function build() {
+  // What is made anew loses the keyboard.
+  const focused = document.activeElement && document.activeElement.id;
   $("name").textContent = document.title = `hgm live: ${hello.name}`;
   ["tissues", "pressures", "supports", "notes"].forEach((id) => $(id).replaceChildren());
   hello.tissues.forEach(tissueBox);
   hello.sets.forEach((set) => {
-    const label = document.createElement("label"), input = Object.assign(document.createElement("input"), { type: "checkbox" });
+    const label = document.createElement("label"), input = Object.assign(document.createElement("input"), { type: "checkbox", id: `held-${set}` });
     input.checked = hello.held.includes(set);
     input.dataset.set = set;
     input.addEventListener("change", () => send({ do: "support", set, held: input.checked }));
@@ -132,11 +139,12 @@ function build() {
   hello.pressed.filter((set) => set.includes("ventricle")).forEach((set) => {
     const input = line($("pressures"), `pressure, ${set} `, `pressure-${set}`);
     const own = hello.pressure.find((load) => load.set === set);
-    Object.assign(input, { min: -2000, max: 2000, step: 10, value: own ? own.pressure_pa : 0 });
-    slider(input.id, (x) => `${x.toFixed(0)} Pa`, (x) => send({ do: "pressure", set, pa: x }));
+    Object.assign(input, { min: -2000, max: 2000, step: 10 });
+    slider(input.id, (x) => `${rounded(x, 1)} Pa`, (x) => send({ do: "pressure", set, pa: x }));
+    input.put(own ? own.pressure_pa : 0);
   });
-  $("density").value = hello.density_kg_per_m3;
-  $("density").told?.();
+  $("gravity").value = gravityOption();
+  $("density").put(hello.density_kg_per_m3);
   $("csf").checked = hello.csf_level_mm !== null;
   $("quasi").checked = hello.quasi_static;
   $("resection-row").hidden = hello.resection === null;
@@ -146,37 +154,59 @@ function build() {
   if (mesh) facetsChanged();
   ranges();
   hello.notes.forEach((note) => $("notes").append(Object.assign(document.createElement("li"), { textContent: note })));
+  if (focused && document.activeElement.id !== focused) $(focused)?.focus();
+}
+/// The way to lie that the body's gravity is; none of them leaves the choice empty.
+function gravityOption() {
+  const now = hello.gravity_m_per_s2.map(Number).join();
+  if (now === hello.scenario_gravity_m_per_s2.map(Number).join()) return "own";
+  return [...$("gravity").options].map((option) => option.value).find((value) => value.split(",").map(Number).join() === now) ?? "";
+}
+/// What is shown has the name and the unit of the frame's own numbers: what was asked for may be refused, or still be made.
+let asked = 0;
+function legend() {
+  if (!frame || !hello) return;
+  const option = [...$("colour").options].find((one) => one.value === hello.colours[frame.colour]);
+  if (!option) return;
+  $("quantity").textContent = option.textContent;
+  $("unit").textContent = option.value === "energy" ? "Pa" : "mm";
+  if (frame.taken >= asked && $("colour").value !== option.value) $("colour").value = option.value;
 }
 function ranges() {
   if (!mesh || !hello) return;
   const low = Math.min(...mesh.low), high = Math.max(...mesh.high);
-  Object.assign($("level"), { min: low - 10, max: high + 10, value: hello.csf_level_mm ?? high });
-  $("level").told();
+  Object.assign($("level"), { min: low - 10, max: high + 10 });
+  // Without fluid there is no number but the slider's.
+  $("level").put(hello.csf_level_mm ?? high);
+  if (hello.csf_level_mm === null) $("level").told(Number($("level").value));
   cutRange();
 }
 function cutRange() {
   const axis = $("cut").value === "" ? -1 : Number($("cut").value);
   if (axis >= 0 && axis !== cut.axis) Object.assign($("at"), { min: mesh.low[axis], max: mesh.high[axis], value: (mesh.low[axis] + mesh.high[axis]) / 2 });
   Object.assign(cut, { axis, at: Number($("at").value) });
-  $("at").told();
+  $("at").told(cut.at);
   turned = true;
 }
 slider("radius", (x) => `${x} mm`, () => {});
 slider("depth", (x) => `${x} mm`, () => {});
-slider("density", (x) => `${x} kg/m3`, (x) => send({ do: "density", kg_per_m3: x }));
-slider("level", (x) => `${x.toFixed(0)} mm`, (x) => { if ($("csf").checked) send({ do: "csf", level_mm: x }); });
+slider("density", (x) => `${rounded(x, 1)} kg/m3`, (x) => send({ do: "density", kg_per_m3: x }));
+slider("level", (x) => `${rounded(x, 1)} mm`, (x) => { if ($("csf").checked) send({ do: "csf", level_mm: x }); });
 slider("at", (x) => `${x.toFixed(1)} mm`, (x) => { cut.at = x; turned = true; });
-$("csf").addEventListener("change", () => send({ do: "csf", level_mm: $("csf").checked ? Number($("level").value) : null }));
+$("csf").addEventListener("change", () => {
+  // From here on it is the slider's number that the body has.
+  $("level").told(Number($("level").value));
+  send({ do: "csf", level_mm: $("csf").checked ? Number($("level").value) : null });
+});
 $("gravity").addEventListener("change", () => {
   const own = $("gravity").value === "own";
-  send({ do: "gravity", m_per_s2: own ? first.gravity_m_per_s2 : $("gravity").value.split(",").map(Number) });
+  send({ do: "gravity", m_per_s2: own ? hello.scenario_gravity_m_per_s2 : $("gravity").value.split(",").map(Number) });
 });
 $("resection").addEventListener("change", () => send({ do: "resection", removed: $("resection").checked }));
 $("quasi").addEventListener("change", () => send({ do: "manner", quasi_static: $("quasi").checked }));
 $("colour").addEventListener("change", () => {
-  scale = 1e-6;
-  $("unit").textContent = $("colour").value === "energy" ? "Pa" : "mm";
   send({ do: "colour", by: $("colour").value });
+  asked = sent;
 });
 $("cut").addEventListener("change", cutRange);
 ["show", "scan"].forEach((id) => $(id).addEventListener("change", () => { turned = true; }));
@@ -185,10 +215,7 @@ function pause() {
   $("pause").setAttribute("aria-pressed", on);
   send({ do: "pause", paused: on });
 }
-function reset() {
-  send({ do: "reset" });
-  $("gravity").value = "own";
-}
+const reset = () => send({ do: "reset" });
 $("pause").onclick = pause;
 $("step").onclick = () => send({ do: "step" });
 $("undo").onclick = () => send({ do: "undo" });

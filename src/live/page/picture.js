@@ -153,10 +153,13 @@ function ballMesh({ centre, radius }) {
   }
   return [new Float32Array(places), new Float32Array(out), new Float32Array(places.length / 3)];
 }
-let scale = 1, shown = 0, drawn = 0, turned = true, sections = 0;
+let scale = 1, scaled = -1, shown = 0, drawn = 0, turned = true, sections = 0;
 function uploadFrame() {
   socket.send('{"do":"ack"}');
   fill(surface, [frame.at, normalsOf(frame.at, mesh.facets, mesh.normals), frame.scalar]);
+  legend();
+  // Of another quantity the old scale means nothing, nor may its number stay beside the new unit.
+  if (frame.colour !== scaled) [scaled, scale, toldAt] = [frame.colour, 1e-6, 0];
   let most = 1e-6;
   for (let n = 0; n < frame.scalar.length; n += 1) if (frame.scalar[n] > most) most = frame.scalar[n];
   // The scale follows slowly, so that colours do not flicker.

@@ -8,7 +8,7 @@ const say = (text) => { $("said").textContent = text; };
 const MAGIC = 0x4c4d4748, HEAD = 20;
 const socket = new WebSocket(location.href.replace(/^http/, "ws").replace(/[^/]*$/, "socket"));
 socket.binaryType = "arraybuffer";
-let sent = 0, mesh = null, frame = null, fresh = false, waiting = null, hello = null, first = null;
+let sent = 0, mesh = null, frame = null, fresh = false, waiting = null, hello = null;
 const latencies = [];
 function send(message) {
   if (socket.readyState !== WebSocket.OPEN) return;
@@ -31,14 +31,19 @@ socket.onmessage = (event) => {
 };
 function heard(message) {
   if (message.refused) {
-    // A box that was ticked for what did not happen.
-    $("resection").checked = !!(mesh && mesh.removed);
+    // A switch that was set for what did not happen goes back to where the body stands.
+    if (message.stands) take(message.stands);
+    asked = 0;
+    legend();
     return say(message.refused);
   }
   if (message.file) return save(message.file, new Blob([message.text]));
-  hello = message;
-  first = first || message;
+  take(message);
+}
+function take(told) {
+  hello = told;
   build();
+  legend();
 }
 function save(name, blob) {
   const link = document.createElement("a");
@@ -75,6 +80,7 @@ function takeFrame(bytes, words) {
     step: words[3], taken: words[4], paused: !!(words[5] & 1), still: !!(words[5] & 2), removed: !!(words[5] & 8),
     time: number[0], hz: number[1], residual: number[2], speed: number[3], maximum: number[4], energy: number[5],
     inverted: number[6], least: number[7], grip: number[8], ball: number[9], stepSeconds: number[10], recovered: number[11],
+    colour: number[13],
     at: new Float32Array(bytes, 4 * HEAD, 3 * nodes), scalar: new Float32Array(bytes, 4 * HEAD + 12 * nodes, nodes),
   };
 }

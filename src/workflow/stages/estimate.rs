@@ -155,6 +155,11 @@ impl HeldBody {
         };
         format!("supports {}{fluid}", settings.supports.name())
     }
+
+    /// Whether a body of this name ([`Self::name`]) slides.
+    pub fn slides(name: &str) -> bool {
+        name.starts_with(&format!("supports {}", Supports::Sliding.name()))
+    }
 }
 
 /// What an estimate needs of its case.
