@@ -87,13 +87,20 @@ def label_map(name: str, value: ArrayLike) -> NDArray[np.uint8]:
 def affine(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """(4, 4) voxel indices to mm, RAS+."""
     array = _array(name, value)
-    if array.shape != (4, 4) or not np.issubdtype(array.dtype, np.number):
+    if array.shape != (4, 4):
         raise InputRefused(f"{name}: shape {array.shape}: give (4, 4), voxel indices to mm (RAS+)")
+    if not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
+        raise InputRefused(f"{name}: dtype {array.dtype}: give real numbers, voxel indices to mm (RAS+)")
+    # A file keeps three rows: a transposed matrix would lose its translation without a word.
+    if array[3].tolist() != [0, 0, 0, 1]:
+        remedy = f", or its transpose {name}.T" if array[:, 3].tolist() == [0, 0, 0, 1] else ""
+        raise InputRefused(f"{name}: last row {array[3].tolist()}: give a matrix whose last row is 0 0 0 1{remedy}")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def sets(value: Any, count: int) -> tuple[dict[str, list[int]], dict[str, list[list[int]]]]:
-    """Node sets and facet sets: node numbers, truth values for every node, or (k, 3) facets."""
+    """Node sets and facet sets: node numbers, truth values for every node (also as 0 and 1, as hgm's files have them), or
+    (k, 3) facets."""
     nodes: dict[str, list[int]] = {}
     facets: dict[str, list[list[int]]] = {}
     for key, members in dict(value or {}).items():
@@ -106,7 +113,18 @@ def sets(value: Any, count: int) -> tuple[dict[str, list[int]], dict[str, list[l
                 raise InputRefused(f"{name}: shape {array.shape}: give ({count},), a truth value for every node")
             nodes[key] = np.nonzero(array)[0].tolist()
         elif array.ndim == 1:
-            nodes[key] = _whole(name, np.ascontiguousarray(array), np.uint32, "node numbers counted from 0").tolist()
+            numbers = _whole(name, np.ascontiguousarray(array), np.uint32, "node numbers counted from 0")
+            distinct, counts = np.unique(numbers, return_counts=True)
+            if len(numbers) == count and distinct[-1] <= 1:
+                # As many as nodes, and a tetrahedron has four: these are no node numbers.
+                nodes[key] = np.nonzero(numbers)[0].tolist()
+            elif len(distinct) < len(numbers):
+                twice = int(distinct[counts > 1][0])
+                raise InputRefused(
+                    f"{name}: node {twice} is named more than once: give each node once, or ({count},) truth values"
+                )
+            else:
+                nodes[key] = numbers.tolist()
         elif array.ndim == 2 and array.shape[1] == 3:
             facets[key] = _whole(name, np.ascontiguousarray(array), np.uint32, "node numbers counted from 0").tolist()
         else:

@@ -37,7 +37,7 @@ class QualityRefused(HgmError):
         ``no-operation`` or ``not-one-person`` where the two scans themselves gave that answer.
     result : dict or None
         What the command prints with ``--json``, where it came that far.
-    found : Case, Mesh, Registration or None
+    found : Case, Mesh, Registration, Segmentation or None
         What the function would have returned.
     """
 

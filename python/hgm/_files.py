@@ -29,7 +29,7 @@ class Files:
         save = getattr(value, "to_filename", None)
         if callable(save) and hasattr(value, "affine"):
             kept = self.folder / f"{name}.nii.gz"
-            save(str(kept))
+            _nifti(value).to_filename(str(kept))
             return str(kept)
         raise InputRefused(
             f"{name}: {type(value).__name__} is no file: give a path (str or pathlib.Path) or an image of nibabel's"
@@ -40,6 +40,20 @@ class Files:
         kept = self.folder / name
         kept.write_text(text, encoding="utf-8")
         return str(kept)
+
+
+def _nifti(image: Any) -> Any:
+    """An image that can be written as NIfTI: nibabel writes FreeSurfer's, MINC's and others under their own endings alone."""
+    try:
+        import nibabel
+    except ImportError:
+        return image
+    if isinstance(image, nibabel.Nifti1Image) or not isinstance(image, nibabel.spatialimages.SpatialImage):
+        return image
+    nifti = nibabel.Nifti1Image.from_image(image)  # type: ignore[no-untyped-call]
+    # All of nibabel's affines are in mm.
+    nifti.header.set_xyzt_units("mm")
+    return nifti
 
 
 @contextlib.contextmanager

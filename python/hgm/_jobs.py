@@ -310,11 +310,25 @@ def segment(
         On the 1 mm MNI grid instead: what :func:`hgm.mesh` needs for boundary sets.
     settings : dict or path, optional
         As in a settings file (tables ``segment``, ``deformable``).
+
+    Raises
+    ------
+    QualityRefused
+        The labels are not to be believed; its ``found`` is what was found.
     """
     with files() as temporary:
         output = temporary.folder / "labels.nii.gz"
         own = _given(temporary, brain_mask=brain_mask)
         words = ["segment", temporary.path("t1", t1), f"--output={output}"]
-        told = call(words + options(temporary, settings, mni=mni, **own), progress)
-        labels, affine = _hgm.read_label_map(str(output))
-        return Segmentation(labels, np.asarray(affine), told["volumes"], told["warnings"])
+
+        def found(told: dict[str, Any]) -> Segmentation:
+            labels, affine = _hgm.read_label_map(str(output))
+            return Segmentation(labels, np.asarray(affine), told["volumes"], told["warnings"])
+
+        try:
+            return found(call(words + options(temporary, settings, mni=mni, **own), progress))
+        except QualityRefused as refused:
+            # The file goes with its folder: the labels are kept here.
+            if refused.result is not None:
+                refused.found = found(refused.result)
+            raise

@@ -140,7 +140,7 @@ def simulate(
     labels : (m,) integers
         2 grey matter, 3 white matter, or other numbers that the scenario's table ``labels`` names.
     sets : dict
-        Node sets, as node numbers or (n,) truth values, and facet sets as (k, 3) node numbers.
+        Node sets, as node numbers or (n,) truth values (0 and 1 are such), and facet sets as (k, 3) node numbers.
     scenario : dict or path
         As in a scenario file: ``fixed``, ``materials`` (moduli in Pa), ``loads`` (m/s2, N, Pa), ``solver`` ...
     progress : callable, optional
