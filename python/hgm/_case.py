@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -81,14 +82,18 @@ class Case:
     def evaluation(self) -> dict[str, Any]:
         """A prediction against what was seen afterwards, as ``hgm evaluate`` has compared them."""
         found = self._json("evaluation")
-        made = hashlib.sha256((self.path / _NAMES["prediction"]).read_bytes()).hexdigest()
+        made = hashlib.sha256(self._bytes("prediction")).hexdigest()
         if found.get("prediction_sha256") != made:
             raise InputRefused(f"{_NAMES['evaluation']}: of another prediction than the case holds: run `hgm evaluate` again")
         return found
 
     @property
     def estimate(self) -> dict[str, Any]:
-        """The numbers of the estimate: moduli (Pa) with their intervals."""
+        """The numbers of the estimate, of the present outcome alone.
+
+        Read ``verdict``: it holds what is claimed, moduli (Pa) with their intervals. ``posterior.mode`` is no claim: the raw
+        posterior stands there even where nothing is claimed of a tissue.
+        """
         return self._json("estimate")
 
     @property
@@ -104,7 +109,7 @@ class Case:
     @property
     def state(self) -> str:
         """The state that is meant where none is named: the estimate, else the best sample."""
-        return _hgm.case_state(self.path)
+        return _hgm.case_state(self.path, None)
 
     @property
     def files(self) -> dict[str, dict[str, Any]]:
@@ -129,8 +134,7 @@ class Case:
             raise InputRefused(f"table: {name!r}: say 'samples'")
         import csv
 
-        with open(self._file(_NAMES[name]), newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
+        rows = list(csv.reader(io.StringIO(self._bytes(name).decode("utf-8"), newline="")))
         columns = {head: [_cell(row[n]) for row in rows[1:]] for n, head in enumerate(rows[0])}
         try:
             import pandas
@@ -201,16 +205,28 @@ class Case:
 
     def _of(self, key: str, state: Optional[str]) -> str:
         before, _, rest = _NAMES[key].partition("{")
-        return before + (state or self.state) + rest.partition("}")[2]
+        return before + _hgm.case_state(self.path, state) + rest.partition("}")[2]
 
-    def _file(self, name: str) -> Path:
+    def _there(self, name: str) -> Path:
         path = self.path / name
         if not path.is_file():
             raise InputRefused(f"{self.path}: has no {name}: case.files tells what is there")
         return path
 
+    def _file(self, name: str) -> Path:
+        """A file to be looked at: as it was written, and of the outcome where there is one."""
+        path = self._there(name)
+        # Manifests know files by their path in the folder, with slashes.
+        _hgm.case_check_file(self.path, PurePath(name).as_posix())
+        return path
+
+    def _bytes(self, key: str) -> bytes:
+        """A file of numbers: of the present outcome alone."""
+        self._there(_NAMES[key])
+        return _hgm.case_file(self.path, _NAMES[key])
+
     def _json(self, key: str) -> dict[str, Any]:
-        return dict(json.loads(self._file(_NAMES[key]).read_text(encoding="utf-8")))
+        return dict(json.loads(self._bytes(key)))
 
 
 def _cell(text: str) -> Any:

@@ -6,10 +6,10 @@ use crate::mesh::field_array;
 use hgm::cli::Failure;
 use hgm::layout;
 use hgm::overlay::PointState;
-use hgm::workflow::{Case, WarpTo, default_state, warp_points as carried};
+use hgm::workflow::{Case, WarpTo, named_state, warp_points as carried};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
 fn said<T>(py: Python<'_>, read: impl FnOnce() -> Result<T, Failure> + Send) -> PyResult<T>
@@ -37,10 +37,23 @@ pub fn case_settings(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
     said(py, || Ok(serde_json::to_string(&Case::open(folder)?.settings()?)?))
 }
 
-/// The state that is meant where none is named: the estimate, else the best sample.
+/// The state that is meant: the one named, as far as the outcome was made with it, else the estimate or the best sample.
 #[pyfunction]
-pub fn case_state(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
-    said(py, || Ok(default_state(&Case::open(folder)?)?))
+pub fn case_state(py: Python<'_>, folder: PathBuf, state: Option<&str>) -> PyResult<String> {
+    said(py, || Ok(named_state(&Case::open(folder)?, state)?))
+}
+
+/// The bytes of a file of numbers, where the outcome was made with it.
+#[pyfunction]
+pub fn case_file(py: Python<'_>, folder: PathBuf, file: &str) -> PyResult<Py<PyBytes>> {
+    let bytes = said(py, || Ok(Case::open(folder)?.present_file(file)?))?;
+    Ok(PyBytes::new(py, &bytes).unbind())
+}
+
+/// Refuses a file that was changed, or that is not of the outcome where there is one.
+#[pyfunction]
+pub fn case_check_file(py: Python<'_>, folder: PathBuf, file: &str) -> PyResult<()> {
+    said(py, || Ok(Case::open(folder)?.check_file(file)?))
 }
 
 /// An array of a state; of the best sample where none is named.

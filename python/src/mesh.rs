@@ -73,6 +73,10 @@ pub fn encode_label_map(
     affine: PyReadonlyArray2<'_, f64>,
 ) -> PyResult<Vec<u8>> {
     let affine = Matrix4::from_fn(|r, c| affine.get([r, c]).copied().unwrap_or(f64::NAN));
+    // A file keeps three rows of it.
+    if affine.row(3).iter().ne(&[0.0, 0.0, 0.0, 1.0]) {
+        return Err(refused(py, "affine: last row is not 0 0 0 1: give voxel indices to mm (RAS+), not transposed"));
+    }
     let Some(grid) = Grid::<Native>::new(dims, affine) else {
         return Err(refused(py, "affine: a number that is not finite, or no inverse: give voxel indices to mm (RAS+)"));
     };

@@ -13,7 +13,7 @@ pub struct Args {
     #[command(flatten)]
     pair: PairOptions,
     /// Stop at the registered images and masks
-    #[arg(long, conflicts_with_all = ["mesher", "cells", "edge_mm"])]
+    #[arg(long, conflicts_with_all = ["mesher", "cells", "edge_mm", "edge_in", "edge_near"])]
     no_mesh: bool,
 }
 

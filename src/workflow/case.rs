@@ -106,8 +106,9 @@ impl Case {
     /// The same of one sample, or of `estimate`.
     ///
     /// # Errors
-    /// As [`Case::field`].
+    /// As [`Case::field`]; a state that the outcome was made without.
     pub fn field_in(&self, sample: &str, name: &str) -> Result<Field, WorkflowError> {
+        self.check_state(sample)?;
         self.field_of(&layout::SAMPLE_STATE.of(sample), name)
     }
 

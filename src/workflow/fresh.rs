@@ -52,10 +52,12 @@ impl Case {
     /// # Errors
     /// [`CaseError::Stale`] with what has changed since it was gathered.
     pub fn check_outcome(&self) -> Result<(), WorkflowError> {
-        let stale = |reason: Reason| {
-            let folder = self.folder().to_path_buf();
-            Err(CaseError::Stale { folder, what: layout::OUTCOME.to_owned(), reasons: vec![reason] }.into())
-        };
+        self.present_provenance().map(|_| ())
+    }
+
+    /// What the outcome was made from, where that is what is in the folder now.
+    fn present_provenance(&self) -> Result<Provenance, WorkflowError> {
+        let stale = |reason: Reason| Err(self.stale(layout::OUTCOME, reason));
         let damaged = |_| CaseError::Damaged {
             folder: self.folder().to_path_buf(),
             file: layout::PROVENANCE.to_owned(),
@@ -77,7 +79,74 @@ impl Case {
                 Some(_) => {}
             }
         }
-        Ok(())
+        Ok(provenance)
+    }
+
+    fn stale(&self, what: &str, reason: Reason) -> WorkflowError {
+        CaseError::Stale { folder: self.folder().to_path_buf(), what: what.to_owned(), reasons: vec![reason] }.into()
+    }
+
+    /// Refuses a file of a stage that the outcome was made without: another job has left it in the folder.
+    ///
+    /// # Errors
+    /// As [`Case::check_outcome`]; [`CaseError::Stale`] of such a file.
+    pub(crate) fn check_made_with(&self, file: &str) -> Result<(), WorkflowError> {
+        match self.made_with(file)? {
+            Some(false) => Err(self.left_behind(file)),
+            Some(true) | None => Ok(()),
+        }
+    }
+
+    /// Whether the outcome was made with the stage that made a file; `None` of a file that no stage has made.
+    fn made_with(&self, file: &str) -> Result<Option<bool>, WorkflowError> {
+        let provenance = self.present_provenance()?;
+        let mut makers = self.recorded();
+        makers.retain(|manifest| manifest.outputs.contains_key(file));
+        let with = |maker: &Manifest| provenance.stages.iter().any(|record| record.stage == maker.stage);
+        Ok((!makers.is_empty()).then(|| makers.iter().any(with)))
+    }
+
+    fn left_behind(&self, file: &str) -> WorkflowError {
+        self.stale(file, Reason::Input { role: layout::OUTCOME.to_owned() })
+    }
+
+    /// Refuses a state that the outcome was made without; of one that is not there at all nothing is said.
+    ///
+    /// # Errors
+    /// As [`Case::outcome`]; [`CaseError::Stale`] of a state that another job has left in the folder.
+    pub(crate) fn check_state(&self, state: &str) -> Result<(), WorkflowError> {
+        let outcome = self.outcome()?;
+        let file = layout::SAMPLE_STATE.of(state);
+        let told = outcome.samples.iter().any(|sample| sample.id == state && sample.file.is_some());
+        // A phantom's reference and a prediction's states are no samples: they are known by their stage.
+        if told || !self.path(&file).exists() || self.made_with(&file)? == Some(true) {
+            return Ok(());
+        }
+        Err(self.left_behind(&file))
+    }
+
+    /// The bytes of a file, as its stage wrote it, where the outcome was made with it.
+    ///
+    /// # Errors
+    /// As [`Case::check_outcome`]; [`CaseError::Stale`] of a file that was changed or that another job has left.
+    pub fn present_file(&self, file: &str) -> Result<Vec<u8>, WorkflowError> {
+        self.check_made_with(file)?;
+        if file == layout::ESTIMATE_JSON && self.present_estimate()?.is_none() {
+            self.read(file)?;
+            return Err(self.left_behind(file));
+        }
+        self.read_made(file)
+    }
+
+    /// The same to be looked at: where no job has come to an outcome, nothing in the folder can be of another one.
+    ///
+    /// # Errors
+    /// As [`Case::present_file`].
+    pub fn check_file(&self, file: &str) -> Result<(), WorkflowError> {
+        if self.path(layout::PROVENANCE).exists() {
+            self.check_made_with(file)?;
+        }
+        self.read_made(file).map(|_| ())
     }
 
     /// The state of the model that the outcome was made with: the estimate's, else the best sample's. A state that another job has
@@ -169,9 +238,9 @@ impl Case {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::artefact::write_whole;
+    use crate::artefact::{Produced, Stage, write_whole};
     use crate::experiment::outcome::ExperimentOutcome;
-    use crate::workflow::default_state;
+    use crate::workflow::{default_state, named_state};
     use serde_json::json;
 
     /// A patient's folder with an outcome of these samples and the settings of today; an estimate lies beside them.
@@ -206,9 +275,37 @@ pub(super) mod tests {
         let case = answered(folder.path(), &["sample-03"]);
         assert_eq!(case.model().unwrap().as_deref(), Some("sample-03"));
         assert!(case.present_estimate().unwrap().is_none());
+        // Nor where it is named.
+        for refused in [named_state(&case, Some("estimate")).unwrap_err(), case.field_in("estimate", "u").unwrap_err()]
+        {
+            assert!(refused.to_string().contains("sim/estimate.vtu is not of the present state"), "{refused}");
+        }
+        assert_eq!(named_state(&case, Some("sample-03")).unwrap(), "sample-03");
         // Nor where there is no other: that file is there, and not of the outcome.
         let refused = default_state(&answered(&folder.path().join("prepared"), &[])).unwrap_err();
         assert!(matches!(refused, WorkflowError::Case(CaseError::Stale { .. })), "{refused}");
+    }
+
+    #[test]
+    fn a_file_of_a_stage_that_the_outcome_was_made_without_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = answered(folder.path(), &["sample-03"]);
+        let files = vec![(layout::SHIFT_JSON.to_owned(), b"{}".to_vec())];
+        let made = || Ok::<_, std::convert::Infallible>(Produced { files, ..Produced::default() });
+        Stage::new("fields", 1, folder.path(), &()).run(false, made).unwrap();
+        let refusals = [
+            case.present_file(layout::SHIFT_JSON).unwrap_err(),
+            case.check_file(layout::SHIFT_JSON).unwrap_err(),
+            named_state(&case, Some("fused")).unwrap_err(),
+        ];
+        for refused in refusals {
+            assert!(refused.to_string().contains(layout::SHIFT_JSON), "{refused}");
+        }
+        // The images' own displacement is of no model.
+        assert_eq!(named_state(&case, Some("observed")).unwrap(), "observed");
+        // Before any outcome a file may be looked at, and is no number of one.
+        std::fs::remove_file(case.path(layout::PROVENANCE)).unwrap();
+        assert!(case.check_file(layout::SHIFT_JSON).is_ok() && case.present_file(layout::SHIFT_JSON).is_err());
     }
 
     #[test]
@@ -216,7 +313,11 @@ pub(super) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let case = answered(folder.path(), &["sample-03"]);
         write_whole(&case.path(layout::SETTINGS), b"seed = 1").unwrap();
-        for refused in [case.model().unwrap_err(), case.present_estimate().unwrap_err()] {
+        let named = ["sample-03", "observed", "fused"].map(|state| named_state(&case, Some(state)).unwrap_err());
+        let read =
+            [case.present_file(layout::ESTIMATE_JSON), case.check_file(layout::ESTIMATE_JSON).map(|()| Vec::new())];
+        let refused = [case.model().unwrap_err(), case.present_estimate().unwrap_err()];
+        for refused in refused.into_iter().chain(named).chain(read.map(Result::unwrap_err)) {
             assert!(matches!(refused, WorkflowError::Case(CaseError::Stale { .. })), "{refused}");
         }
         // Nothing was estimated here, and so nothing is of other settings.

@@ -14,7 +14,7 @@ use crate::image::nifti::{self, ReadOptions, decode_displacement};
 use crate::image::{Grid, Mask, Volume};
 use crate::layout::{
     ESTIMATE_STATE, MNI_FROM_PRE_TEXT, NATIVE_RESECTED, OUTCOME, POST_FROM_PRE_FIELD, POST_NATIVE_BRAIN,
-    PRE_FROM_POST_FIELD, PRE_FROM_POST_TEXT, PRE_NATIVE_BRAIN, SHIFT, SHIFT_BACK, SHIFT_MASK, SHIFT_SD,
+    PRE_FROM_POST_FIELD, PRE_FROM_POST_TEXT, PRE_NATIVE_BRAIN, SHIFT, SHIFT_BACK, SHIFT_JSON, SHIFT_MASK, SHIFT_SD,
 };
 use crate::overlay::{Carried, PointState};
 use crate::segment::atlas;
@@ -85,7 +85,7 @@ impl Map {
             let map = Self { forward: None, rigid, grid: Some(atlas::template().grid().relabelled()), ..Self::still() };
             return Ok((map, "rigid".to_owned()));
         }
-        let state = named(case, state)?;
+        let state = named_state(case, state)?;
         let (points, images) = match to {
             WarpTo::Post => (POST_FROM_PRE_FIELD, PRE_FROM_POST_FIELD),
             WarpTo::Pre => (PRE_FROM_POST_FIELD, POST_FROM_PRE_FIELD),
@@ -197,12 +197,22 @@ impl Map {
 /// # Errors
 /// A case without any.
 pub fn default_state(case: &Case) -> Result<String, WorkflowError> {
-    named(case, None)
+    named_state(case, None)
 }
 
-/// The state that is meant: the one named, else that of the model that the outcome was made with.
-fn named(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
+/// The state that is meant: the one named, else that of the model that the outcome was made with. One that the outcome was made
+/// without is none of the case, named or not.
+///
+/// # Errors
+/// As [`Case::outcome`]; a state that another job has left in the folder, and a case without any where none is named.
+pub fn named_state(case: &Case, state: Option<&str>) -> Result<String, WorkflowError> {
     if let Some(state) = state {
+        match state {
+            // What the images alone tell is of no model.
+            OBSERVED => case.check_outcome()?,
+            FUSED => case.check_made_with(SHIFT_JSON)?,
+            model => case.check_state(model)?,
+        }
         return Ok(state.to_owned());
     }
     let (folder, file) = (case.folder().to_path_buf(), ESTIMATE_STATE.to_owned());

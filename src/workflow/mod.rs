@@ -89,7 +89,7 @@ pub use labels::{any_labels, labels_of_tool};
 pub use landmark_pairs::Landmarks;
 pub use law_fitting::{FittedLaw, LawTest, fit_laws};
 pub use layer::Layer;
-pub use maps::{WarpTo, default_state};
+pub use maps::{WarpTo, default_state, named_state};
 pub use meshing::{MeshFiles, MeshedFile, mesh_file};
 pub use paper::paper;
 pub use patient::Shard;
