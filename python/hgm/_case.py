@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import logging
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any, Optional, Union
 
@@ -37,6 +38,8 @@ class Points:
         ``tissue``, ``fluid``, ``removed`` (tissue that was taken: moved rigidly) or ``outside`` (beyond the field: the same).
     state : str
         What carried them: ``estimate``, ``fused``, ``observed``, a sample, or ``rigid``.
+    warnings : list of str
+        Why not to trust them: the case's quality gate, where it is not passed. They go to the logger ``hgm``, too.
     """
 
     points: NDArray[np.float64]
@@ -44,6 +47,7 @@ class Points:
     sd_mm: NDArray[np.float64]
     where: list[str]
     state: str
+    warnings: list[str] = field(default_factory=list)
 
 
 class Case:
@@ -263,4 +267,7 @@ def warp_points(
     folder = case.path if isinstance(case, Case) else os.fspath(case)
     given = _arrays.points("points", points)
     moved, sd, where, carried_by = _hgm.case_points(folder, given, to, state)
-    return Points(moved, moved - given, np.asarray(sd, dtype=np.float64), where, carried_by)
+    doubts = _hgm.case_doubts(folder)
+    for doubt in doubts:
+        logging.getLogger("hgm").warning("%s", doubt)
+    return Points(moved, moved - given, np.asarray(sd, dtype=np.float64), where, carried_by, doubts)

@@ -74,6 +74,12 @@ pub fn case_array<'py>(
     field_array(py, field)
 }
 
+/// What a reader of points that a case has carried must know.
+#[pyfunction]
+pub fn case_doubts(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
+    said(py, || Ok(Case::open(folder)?.gate_warnings().iter().map(ToString::to_string).collect()))
+}
+
 /// Points carried by a case: where they are now, their standard deviations (NaN where not known), where they lay, the state.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "four things of one call")]

@@ -77,6 +77,7 @@ fn _hgm(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(case::case_file, module)?)?;
     module.add_function(wrap_pyfunction!(case::case_check_file, module)?)?;
     module.add_function(wrap_pyfunction!(case::case_array, module)?)?;
+    module.add_function(wrap_pyfunction!(case::case_doubts, module)?)?;
     module.add_function(wrap_pyfunction!(case::case_points, module)?)?;
     module.add_function(wrap_pyfunction!(case::names, module)?)?;
     Ok(())

@@ -8,7 +8,7 @@ use crate::mesh::TetMesh;
 
 /// The node set of a name.
 pub(super) fn node_set<'a>(mesh: &'a TetMesh, set: &str) -> Result<&'a [u32], FemError> {
-    let nodes = mesh.node_sets.get(set).ok_or_else(|| FemError::unknown_set(mesh, set))?;
+    let nodes = mesh.node_sets.get(set).ok_or_else(|| FemError::unknown_nodes(mesh, set))?;
     if nodes.is_empty() { Err(FemError::EmptySet { set: set.to_owned() }) } else { Ok(nodes) }
 }
 

@@ -11,6 +11,8 @@ use thiserror::Error;
 pub enum FemError {
     #[error("there is no set `{set}` in the mesh; it has: {known}. Write one of these, or tag the mesh")]
     UnknownSet { set: String, known: String },
+    #[error("set `{set}` is a set of facets, and one of nodes is asked for; the mesh has of these: {known}")]
+    OfFacets { set: String, known: String },
     #[error("no node is held: the body would fall for ever. Name a node set of the mesh in `fixed`")]
     NothingHeld,
     #[error("set `{set}` is both {first} and {second}: take one of the two away")]
@@ -126,6 +128,16 @@ impl FemError {
             self,
             Self::NoEquilibrium { .. } | Self::NoMotion { .. } | Self::UnstableState | Self::NoSensitivity { .. }
         )
+    }
+
+    /// Of a set of nodes that is not there; it may be there as one of facets.
+    pub(super) fn unknown_nodes(mesh: &TetMesh, set: &str) -> Self {
+        if !mesh.facet_sets.contains_key(set) {
+            return Self::unknown_set(mesh, set);
+        }
+        let known: Vec<&str> = mesh.node_sets.keys().map(String::as_str).collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        Self::OfFacets { set: set.to_owned(), known }
     }
 
     pub(super) fn unknown_set(mesh: &TetMesh, set: &str) -> Self {

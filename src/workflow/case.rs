@@ -4,6 +4,7 @@ use super::error::{CaseError, WorkflowError};
 use super::facts::{EstimateFacts, Implausible, MeshFacts};
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
+use super::warning::Warning;
 use crate::artefact::Manifest;
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
@@ -155,6 +156,19 @@ impl Case {
         if mesh.implausible.is_empty() { Ok(()) } else { Err(WorkflowError::QualityGate(mesh.implausible)) }
     }
 
+    /// What a reader of points that it has carried must know: a warning per sentence of [`Case::quality_gate`]. A job that ended there
+    /// has kept what it computed, and that answers as any other.
+    pub fn gate_warnings(&self) -> Vec<Warning> {
+        let whose = self.folder.display().to_string();
+        match self.quality_gate() {
+            Err(WorkflowError::QualityGate(sentences)) => {
+                sentences.into_iter().map(|why| Warning::GateNotPassed { why }.of(&whose)).collect()
+            }
+            // What is not there is told by those who need it.
+            _ => Vec::new(),
+        }
+    }
+
     /// The settings it was made with, as a layer; nothing where none are kept.
     ///
     /// # Errors
@@ -226,7 +240,12 @@ mod tests {
                 let made = Produced { facts: json!({ "implausible": implausible }), ..Produced::default() };
                 Stage::new(stage, 1, folder.path(), &()).run(false, || Ok::<_, Infallible>(made)).unwrap();
             }
-            match Case::at(folder.path()).image_gate() {
+            let case = Case::at(folder.path());
+            // Whoever is given points of it hears of each.
+            let warned: Vec<String> = case.gate_warnings().iter().map(ToString::to_string).collect();
+            let sentences = [registration, anat].concat();
+            assert!(warned.len() == sentences.len() && warned.iter().zip(sentences).all(|(all, why)| all.contains(why)));
+            match case.image_gate() {
                 Err(WorkflowError::QualityGate(why)) => why,
                 ended => ended.map(|()| Vec::new()).unwrap(),
             }

@@ -53,6 +53,8 @@ pub enum Warning {
     UnbalancedDraws { head: String, supports: String, unbalanced: usize, draws: usize },
     #[error("{state}: tissue folds over at {voxels} voxels; the displacement field is smoothed there and not believed")]
     Folds { state: String, voxels: usize },
+    #[error("its quality gate is not passed ({why}): look at its page before trusting what it carries")]
+    GateNotPassed { why: String },
     #[error("the best sample is not the one nearest to the reference's moduli")]
     OtherSampleIsBest,
 }

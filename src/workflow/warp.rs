@@ -116,6 +116,10 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
             Ok((Map::of_field(field, part), "field".to_owned()))
         }
     };
+    let doubts = || match &asked.through {
+        Through::Case { folder, .. } => Ok(Case::open(folder)?.gate_warnings()),
+        Through::Field(_) => Ok::<_, WorkflowError>(Vec::new()),
+    };
     if image {
         let (volume, map) = rayon::join(|| nifti::decode_intensities(&bytes, &name, &asked.reading), map);
         let (volume, odd) = volume?;
@@ -124,7 +128,7 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
         let carried = image_through(&volume, &map, labels);
         write_whole(&asked.output, &encode_intensities(&carried))?;
         let kind = if labels { "labels" } else { "image" };
-        let warnings = all_of(&name, &odd).collect();
+        let warnings = doubts()?.into_iter().chain(all_of(&name, &odd)).collect();
         return Ok(Warped { output: asked.output.clone(), kind, state, points: None, streamlines: None, warnings });
     }
     let drawing = Drawing::decode(&bytes, &name)?;
@@ -137,7 +141,7 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
         _ => "points",
     };
     let points = Some(PointCounts::of(&carried));
-    let warnings = all_of(&name, drawing.not_carried().as_slice()).collect();
+    let warnings = doubts()?.into_iter().chain(all_of(&name, drawing.not_carried().as_slice())).collect();
     let streamlines = drawing.streamlines();
     Ok(Warped { output: asked.output.clone(), kind, state, points, streamlines, warnings })
 }
