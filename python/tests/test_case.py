@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +119,96 @@ def test_scans_of_nibabel_are_taken(scans: tuple[Path, Path]) -> None:
     assert found.matrix.shape == (4, 4) and abs(np.linalg.det(found.matrix[:3, :3]) - 1) < 1e-9
 
 
+def test_a_file_of_a_case_is_its_outcomes_or_refused(case: hgm.Case, tmp_path: Path) -> None:
+    def other(change: Callable[[Path], object]) -> hgm.Case:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        shutil.copytree(case.path, folder)
+        change(folder)
+        return hgm.Case(folder)
+
+    best = case.state
+    # Another job has left the folder with settings that the outcome is not of.
+    stale = other(lambda folder: (folder / "settings.toml").write_text("seed = 1\n"))
+    reads: list[Callable[[hgm.Case], object]] = [
+        lambda of: of.outcome,
+        lambda of: of.brain_shift,
+        lambda of: of.table(),
+        lambda of: of.mesh(best),
+        lambda of: of.array("displacement", best),
+        lambda of: of.sd(state="fused"),
+        lambda of: of.mask("cavity"),
+        lambda of: of.warp_points([[0.0, 0.0, 0.0]], state="observed"),
+    ]
+    for read in reads:
+        read(case)
+        with pytest.raises(hgm.InputRefused, match="not of the present state"):
+            read(stale)
+    # A stage that the outcome knows nothing of.
+    def left_behind(folder: Path) -> None:
+        file = folder / "provenance.json"
+        kept = json.loads(file.read_text())
+        kept["stages"] = [stage for stage in kept["stages"] if stage["stage"] != "fields"]
+        file.write_text(json.dumps(kept))
+
+    left = other(left_behind)
+    asked: list[Callable[[], object]] = [lambda: left.brain_shift, lambda: left.sd(state="fused"), lambda: left.field(state=best)]
+    for ask in asked:
+        with pytest.raises(hgm.InputRefused, match="not of the present state"):
+            ask()
+    left.mask("cavity"), left.mesh(best)
+    # A file that was changed since.
+    changed = other(lambda folder: (folder / "mesh/rest.vtu").write_text(""))
+    with pytest.raises(hgm.InputRefused, match="`mesh/rest.vtu` was changed"):
+        changed.mesh()
+    # Nothing gathered, and so nothing that a mask could be at odds with.
+    other(lambda folder: (folder / "provenance.json").unlink()).mask("cavity")
+
+
+def test_points_of_a_case_that_did_not_pass_its_gate_come_with_a_warning(
+    case: hgm.Case, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert case.warp_points([[0.0, 0.0, 0.0]]).warnings == []
+    folder = tmp_path / "case"
+    shutil.copytree(case.path, folder)
+    file = folder / ".stages/mesh.manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["facts"]["implausible"] = ["the falx is not where it should be"]
+    file.write_text(json.dumps(manifest))
+    moved = hgm.warp_points(folder, [[0.0, 0.0, 0.0]], to="mni")
+    assert len(moved.warnings) == 1 and "the falx is not where" in moved.warnings[0]
+    assert moved.warnings[0] in caplog.text
+
+
+def test_a_freesurfer_image_of_nibabel_is_taken_as_its_nifti(case: hgm.Case, tmp_path: Path) -> None:
+    nibabel = pytest.importorskip("nibabel")
+    labels = case.labels(space="mni")
+    values = np.asarray(labels.dataobj).astype(np.uint8)
+    surfer = nibabel.MGHImage(values, labels.affine)
+    options = {"cells": 3000, "engine": "lattice", "mni": False}
+    of_surfer, of_nifti = (hgm.mesh(image, **options) for image in (surfer, nibabel.Nifti1Image(values, labels.affine)))
+    np.testing.assert_array_equal(of_surfer.cells, of_nifti.cells)
+    np.testing.assert_allclose(of_surfer.points, of_nifti.points, atol=1e-4)
+
+
+def test_a_refused_segmentation_keeps_its_labels(
+    case: hgm.Case, scans: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = case.labels()
+
+    def refuses(words: list[str], progress: object) -> None:
+        """The command with labels that are not to be believed."""
+        output = next(word for word in words if word.startswith("--output=")).removeprefix("--output=")
+        shutil.copyfile(labels.get_filename(), output)
+        raise hgm.QualityRefused("not to be believed", None, {"volumes": {"brain_cc": 1.0}, "warnings": ["odd"]})
+
+    monkeypatch.setattr("hgm._jobs.call", refuses)
+    with pytest.raises(hgm.QualityRefused) as caught:
+        hgm.segment(scans[0])
+    found = caught.value.found
+    assert isinstance(found, hgm.Segmentation) and found.warnings == ["odd"]
+    np.testing.assert_array_equal(found.labels, np.asarray(labels.dataobj))
+
+
 def test_a_label_map_as_an_array_is_meshed_as_its_file(case: hgm.Case) -> None:
     labels = case.labels(space="mni")
     values = np.asarray(labels.dataobj)
@@ -139,6 +231,8 @@ def test_what_cannot_be_used_is_refused_in_the_commands_words(
 
     pre, post = scans
     out = tmp_path / "out"
+    moved = np.eye(4)
+    moved[:3, 3] = 5
     for ask, words in [
         (lambda: hgm.run(tmp_path / "none.nii.gz", post, out), ["run", tmp_path / "none.nii.gz", post, "-o", out]),
         (lambda: hgm.run(pre, pre, out), ["run", pre, pre, "-o", out]),
@@ -163,7 +257,10 @@ def test_what_cannot_be_used_is_refused_in_the_commands_words(
         (lambda: hgm.mesh(np.zeros((3, 3)), np.eye(4)), "give (i, j, k)"),
         (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8)), "needs its affine"),
         (lambda: hgm.mesh(np.full((3, 3, 3), np.nan), np.eye(4)), "whole numbers"),
-        (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8), np.zeros((4, 4))), "no inverse"),
+        (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8), np.diag([0, 0, 0, 1])), "no inverse"),
+        (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8), np.zeros((4, 4))), "last row is 0 0 0 1"),
+        (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8), moved.T), "or its transpose affine.T"),
+        (lambda: hgm.mesh(np.ones((3, 3, 3), dtype=np.uint8), moved * 1j), "give real numbers"),
     ]:
         with pytest.raises(hgm.InputRefused) as caught:
             ask()

@@ -42,6 +42,15 @@ def test_the_weight_stands_on_the_base() -> None:
     assert result.convergence["relative_residual"] <= 1e-12
 
 
+def test_zeros_and_ones_of_every_node_are_truth_values() -> None:
+    """As ``Mesh.to_meshio`` and hgm's own files have sets."""
+    truth = POINTS[:, 2] == 0
+    given = [hgm.simulate(POINTS, CELLS, LABELS, {"base": base}, scenario()) for base in (truth, truth.astype(np.uint8), BASE)]
+    for result in given[1:]:
+        np.testing.assert_array_equal(result.displacement_mm, given[0].displacement_mm)
+        np.testing.assert_array_equal(result.sets["base"], BASE)
+
+
 def test_a_small_load_moves_the_body_as_scikit_fem_says() -> None:
     """Small strains: the neo-Hookean law is Hooke's but for terms of second order, which loads up and down have alike and half of
     their difference has not. The same mesh goes to scikit-fem, which solves the linear problem (SI)."""
@@ -86,6 +95,9 @@ def test_what_cannot_be_used_is_refused_with_the_remedy() -> None:
     refused("labels from 0 to 255", labels=LABELS.astype(np.int64) + 300)
     refused("only 64 nodes", sets={"base": [0, 64]})
     refused("a truth value for every node", sets={"base": np.ones(3, dtype=bool)})
+    refused("node 7 is named more than once", sets={"base": [7, 8, 7]})
+    refused("node 0 is named more than once", sets={"base": np.zeros(len(POINTS) - 1, dtype=int)})
+    refused("`base` is a set of facets", sets={"base": CELLS[:1, :3]})
     refused("not numbers", points=[["a", None, {}]])
     refused("`base`", sets={})
     refused("scenario: unknown setting `fixd`", scenario={**scenario(), "fixd": []})

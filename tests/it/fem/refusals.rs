@@ -24,6 +24,16 @@ fn unknown_sets_are_refused_with_those_that_exist() {
 }
 
 #[test]
+fn a_set_of_facets_among_nodes_is_named_as_one() {
+    let mut mesh = cube(2, 10.0);
+    mesh.facet_sets.insert("base".to_owned(), vec![mesh.boundary_facets(|_| true)[0]]);
+    let (error, message) = refusal(&mesh, &format!("fixed = ['base']\n{GREY}"));
+    assert!(matches!(error, FemError::OfFacets { .. }));
+    assert!(message.contains("`base` is a set of facets") && message.contains("x0, x1, y0"), "{message}");
+    assert!(!message.contains("there is no set"), "{message}");
+}
+
+#[test]
 fn a_body_that_nothing_holds_is_refused() {
     assert!(matches!(refusal(&cube(1, 10.0), GREY).0, FemError::NothingHeld));
     let two = TetMesh::new(
