@@ -151,8 +151,12 @@ def test_a_file_of_a_case_is_its_outcomes_or_refused(case: hgm.Case, tmp_path: P
         file.write_text(json.dumps(kept))
 
     left = other(left_behind)
-    asked: list[Callable[[], object]] = [lambda: left.brain_shift, lambda: left.sd(state="fused"), lambda: left.field(state=best)]
-    for ask in asked:
+    shifts: list[Callable[[], object]] = [
+        lambda: left.brain_shift,
+        lambda: left.sd(state="fused"),
+        lambda: left.field(state=best),
+    ]
+    for ask in shifts:
         with pytest.raises(hgm.InputRefused, match="not of the present state"):
             ask()
     left.mask("cavity"), left.mesh(best)

@@ -244,7 +244,9 @@ mod tests {
             // Whoever is given points of it hears of each.
             let warned: Vec<String> = case.gate_warnings().iter().map(ToString::to_string).collect();
             let sentences = [registration, anat].concat();
-            assert!(warned.len() == sentences.len() && warned.iter().zip(sentences).all(|(all, why)| all.contains(why)));
+            assert!(
+                warned.len() == sentences.len() && warned.iter().zip(sentences).all(|(all, why)| all.contains(why))
+            );
             match case.image_gate() {
                 Err(WorkflowError::QualityGate(why)) => why,
                 ended => ended.map(|()| Vec::new()).unwrap(),

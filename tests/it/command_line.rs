@@ -215,6 +215,18 @@ fn a_mistyped_command_is_told_what_may_be_meant() {
 }
 
 #[test]
+fn an_option_of_the_mesh_is_refused_where_no_mesh_is_made() {
+    for option in
+        ["--cells=3000", "--edge-mm=3", "--mesher=lattice", "--edge-in=white_matter=1.5", "--edge-near=ventricle=0.5@8"]
+    {
+        let said = output(&["prep", "pre.nii.gz", "post.nii.gz", "--no-mesh", option]);
+        assert_eq!(said.status.code(), Some(2), "{said:?}");
+        let told = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert!(told.contains("--no-mesh") && told.contains(option.split('=').next().unwrap()), "{told}");
+    }
+}
+
+#[test]
 fn a_place_that_takes_no_file_is_told_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
