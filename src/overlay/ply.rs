@@ -60,6 +60,10 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         let (kind, property) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
         let size = size_of(kind).ok_or_else(|| damaged(name, "property", format!("`{kind}` is no kind of number")))?;
         if let Some(axis) = ["x", "y", "z"].iter().position(|a| *a == property) {
+            if order != Order::Text && !["float", "float32", "double", "float64"].contains(&kind) {
+                let problem = format!("`{property}` is {kind}; save x, y and z as float or double");
+                return Err(damaged(name, "property", problem));
+            }
             found[axis] = Some(if order == Order::Text { (word, size) } else { (row, size) });
         }
         normals |= ["nx", "ny", "nz"].contains(&property);
@@ -70,9 +74,6 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         return Err(damaged(name, "property", "x, y and z are not all there"));
     };
     let places = [x, y, z];
-    if order != Order::Text && places.iter().any(|(_, size)| *size < 4) {
-        return Err(damaged(name, "property", "x, y and z must be float or double"));
-    }
     let lps = says_lps(bytes);
     let mut points_mm = Vec::with_capacity(count.min(1 << 20));
     let cut = || damaged(name, "the vertices", "there are fewer than the header says: the file was cut short");

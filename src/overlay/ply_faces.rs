@@ -44,12 +44,18 @@ pub(super) fn triangles(
                 Property::One(bytes) => reader.pass(*bytes).ok_or_else(cut)?,
                 Property::List { count, number, corners } => {
                     let length = reader.whole(count).ok_or_else(cut)?;
+                    if !corners {
+                        // Places in a picture and such, whole or not.
+                        let no_kind = || damaged(name, "property", format!("`{number}` is no kind of number"));
+                        let bytes = bytes_of(number).ok_or_else(no_kind)?;
+                        for _ in 0..length {
+                            reader.pass(bytes).ok_or_else(cut)?;
+                        }
+                        continue;
+                    }
                     let mut list = Vec::new();
                     for _ in 0..length {
                         list.push(reader.whole(number).ok_or_else(cut)?);
-                    }
-                    if !corners {
-                        continue;
                     }
                     if let Some(far) = list.iter().find(|&&n| n >= points as u64) {
                         return Err(damaged(name, "the faces", format!("one names vertex {far} of {points}")));

@@ -133,6 +133,17 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         lines.push((count, kept));
         at = end;
     }
+    if at < bytes.len() {
+        let problem = format!("{} bytes are left that are no line: it was cut short; save it again", bytes.len() - at);
+        return Err(damaged(name, format!("line {}", lines.len()), problem));
+    }
+    // 0 is what a writer leaves that did not know how many there would be.
+    let declared = i32_at(bytes, 988);
+    if declared > 0 && usize::try_from(declared).ok() != Some(lines.len()) {
+        let problem =
+            format!("it says {declared} lines and the file holds {}: it was cut short; save it again", lines.len());
+        return Err(damaged(name, "n_count", problem));
+    }
     let mut head = bytes[..HEAD].to_vec();
     // Reserved words, where tools note what they like; the order of axes keeps its place.
     head[504..948].fill(0);

@@ -76,6 +76,21 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     Ok(Drawing { points_mm, names: Vec::new(), pairs_mm: Vec::new(), kept })
 }
 
+impl Points {
+    /// Whether a block of arrays (`FIELD`), where newer programs keep normals, has one of three or nine broken numbers a place.
+    fn field_has_vectors(&self) -> bool {
+        const FIELD: &[u8] = b"\nFIELD ";
+        let Some(at) = self.after.windows(FIELD.len()).position(|w| w == FIELD) else { return false };
+        // The head of an array: its name, numbers a place, places, kind.
+        let head = |line: &[u8]| {
+            let words: Vec<&str> =
+                std::str::from_utf8(line).map(|l| l.split_whitespace().collect()).unwrap_or_default();
+            matches!(words[..], [_, "3" | "9", places, "float" | "double"] if places.parse::<u64>().is_ok())
+        };
+        self.after[at..].split(|b| *b == b'\n').filter(|line| line.len() < 200).any(head)
+    }
+}
+
 impl Kept for Points {
     fn encode(&self, carried: &[Carried], _: &[String]) -> Vec<u8> {
         let points_mm = &places(carried);
@@ -98,6 +113,6 @@ impl Kept for Points {
     fn not_carried(&self) -> Option<NotCarried> {
         let begins = |key: &[u8]| self.after.windows(key.len()).any(|w| w == key);
         let any = [&b"\nNORMALS "[..], b"\nVECTORS ", b"\nTENSORS "].into_iter().any(begins);
-        any.then_some(NotCarried::Directions)
+        (any || self.field_has_vectors()).then_some(NotCarried::Directions)
     }
 }
