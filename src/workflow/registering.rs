@@ -93,6 +93,7 @@ pub fn register_files(
     if files.output.is_dir() {
         return Err(InputError::Folder { path: files.output.clone() }.into());
     }
+    check_output(files)?;
     let transform = match files.output.extension() {
         Some(e) if e != "tfm" => files.output.clone(),
         _ => files.output.with_extension("txt"),
@@ -153,6 +154,27 @@ pub fn register_files(
     Ok(Registered { transform, itk_transform, quality, warnings, refused })
 }
 
+/// Refuses to write a transform where an image is, or where its name says that one would be.
+fn check_output(files: &RegisterFiles) -> Result<(), AskedError> {
+    const IMAGES: [&str; 14] = [
+        ".nii", ".nii.gz", ".mgz", ".mgh", ".img", ".img.gz", ".hdr", ".hdr.gz", ".nrrd", ".nhdr", ".mha", ".mhd",
+        ".dcm", ".ima",
+    ];
+    let output = || files.output.clone();
+    let name = files.output.to_string_lossy().to_ascii_lowercase();
+    if IMAGES.iter().any(|ending| name.ends_with(ending)) {
+        return Err(AskedError::TransformNamedImage { output: output() });
+    }
+    let mut inputs = vec![&files.moving];
+    if let Onto::Image { fixed, moving_mask, fixed_mask } = &files.onto {
+        inputs.extend([Some(fixed), moving_mask.as_ref(), fixed_mask.as_ref()].into_iter().flatten());
+    }
+    // By way of a link as well.
+    let there = files.output.canonicalize().ok();
+    let same = |input: &&PathBuf| there.is_some() && input.canonicalize().ok() == there;
+    if inputs.iter().any(same) { Err(AskedError::TransformOverInput { output: output() }) } else { Ok(()) }
+}
+
 /// The fit without its frames: of files an image is what it is.
 fn parts<M: Frame, F: Frame>(fit: RigidFit<M, F>) -> (RigidTransform<Native, Native>, FitQuality, Vec<FitWarning>) {
     (fit.fixed_from_moving.relabelled(), fit.quality, fit.warnings)
@@ -185,5 +207,20 @@ mod tests {
         }
         let masked = Onto::named("pre.nii".into(), None, Some("m.nii".into()));
         assert!(matches!(masked, Ok(Onto::Image { fixed_mask: Some(_), .. })));
+    }
+
+    #[test]
+    fn a_transform_is_never_written_over_an_image_nor_called_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("scan"), b"a scan").unwrap();
+        let to = |output: &str| {
+            check_output(&RegisterFiles { moving: at("scan"), onto: Onto::Template, output: at(output) })
+        };
+        for name in ["new.nii.gz", "new.NII", "new.mgz", "new.hdr"] {
+            assert!(matches!(to(name), Err(AskedError::TransformNamedImage { .. })), "{name}");
+        }
+        assert!(matches!(to("scan"), Err(AskedError::TransformOverInput { .. })));
+        assert_eq!(to("new.txt"), Ok(()));
     }
 }

@@ -274,6 +274,7 @@ fn words_that_do_not_go_together_are_refused_with_the_option_to_leave_out() {
         (&["segment", &scan, "-o", &path("out")], &["out", ".nii.gz", "--write-brain-mask"]),
         (&["register", &scan, "MNI", "--moving-mask", "m.nii.gz", "-o", &out], &["template", "--moving-mask"]),
         (&["register", &scan, &scan, "-o", inside], &["is a folder", "name a file"]),
+        (&["register", &scan, &scan, "-o", &path("out.nii.gz")], &["out.nii.gz", "name of an image", ".txt", "-o"]),
     ] {
         refuses(arguments, "", words, &out);
     }

@@ -55,6 +55,9 @@ impl RigidSettings {
         if let Some(&bad) = self.levels_mm.iter().find(|&&l| !(l > 0.0 && l <= 16.0)) {
             return refuse("levels_mm", bad, "one or more resolutions between 0 and 16 mm");
         }
+        if let Some(pair) = self.levels_mm.windows(2).find(|pair| pair[1] >= pair[0]) {
+            return refuse("levels_mm", pair[1], "finer than the one before it: resolutions go from coarse to fine");
+        }
         if !(self.start_level_mm > 0.0 && self.start_level_mm <= 16.0) {
             return refuse("start_level_mm", self.start_level_mm, "between 0 and 16 mm");
         }

@@ -224,6 +224,10 @@ fn images_without_information_and_wrong_settings_are_refused() {
     assert!(try_with(&ramp, Some(&Volume::filled(grid, false)), &usual).contains("mask of the moving image is empty"));
     let none = RigidSettings { levels_mm: vec![], ..usual.clone() };
     assert!(try_with(&ramp, None, &none).contains("levels_mm"));
+    for levels_mm in [vec![1.0, 4.0], vec![4.0, 4.0]] {
+        let rising = RigidSettings { levels_mm, ..usual.clone() };
+        assert!(try_with(&ramp, None, &rising).contains("finer than the one before"));
+    }
     let few = RigidSettings { histogram_bins: 2, ..usual };
     assert!(try_with(&ramp, None, &few).contains("histogram_bins"));
 }

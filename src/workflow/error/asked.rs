@@ -24,6 +24,13 @@ pub enum AskedError {
     MeshBeforeResection { mesh: PathBuf },
     #[error("{}: label maps and masks are written as .nii.gz; end the name in .nii.gz", output.display())]
     PackedNifti { output: PathBuf },
+    #[error(
+        "{}: a transform is text, and this is the name of an image: end the name in .txt or .tfm",
+        output.display()
+    )]
+    TransformNamedImage { output: PathBuf },
+    #[error("{}: is one of the images that are given: name another file for the transform", output.display())]
+    TransformOverInput { output: PathBuf },
     #[error("masks do not go with the template: its own brain is what is compared")]
     MasksOfTemplate,
     #[error("a pose and a start for one were given: the pose is final, leave one of the two out")]
