@@ -21,7 +21,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const NAME: StageName = StageName::Registration;
 /// What the pose is called, and how what is odd about it begins.
 pub(crate) const OF_POSE: &str = "pre to MNI";
@@ -86,14 +86,17 @@ pub(crate) fn registration(
         let (text, itk) = (layout::PRE_FROM_POST_TEXT, layout::PRE_FROM_POST_ITK);
         write_transform(&mut produced, text, itk, &pre_from_post.fixed_from_moving);
         let fits = vec![outcome(&pre_from_post, &scans.post.grid), fit];
-        // Masks of one's own say that two scans are one person's, not which side is which.
-        let mirrored =
-            |warning: &&FitWarning| matches!(warning, FitWarning::MirrorFitsBetter { .. }) && warning.denies_the_fit();
-        let implausible =
-            pre_from_post.warnings.iter().filter(mirrored).map(|warning| format!("post to pre: {warning}")).collect();
+        let implausible = denied(&pre_from_post.warnings);
         produced.facts = facts(&RegistrationFacts { fits, implausible });
         Ok(produced)
     })
+}
+
+/// Why the second scan's fit is not to be believed. Masks of one's own say that two scans are one person's, not which side is which,
+/// nor that one was found to lie on the other.
+fn denied(warnings: &[FitWarning]) -> Vec<String> {
+    let denying = warnings.iter().filter(|warning| warning.denies_the_fit());
+    denying.map(|warning| format!("post to pre: {warning}")).collect()
 }
 
 /// A pose, how it was found, and what was odd about it.
@@ -195,6 +198,18 @@ fn by_hand<M: Frame, F: Frame>(transform: &RigidTransform<M, F>, moving: &Grid<M
 mod tests {
     use super::*;
     use nalgebra::Vector3;
+
+    #[test]
+    fn a_fit_that_hardly_stands_out_is_no_more_believed_than_one_of_a_mirrored_head() {
+        let low = FitWarning::LowSimilarity { normalised_information: 0.03, distinctness: 1.2 };
+        let mirrored = |mirrored_ratio| FitWarning::MirrorFitsBetter { mirrored_ratio };
+        let said = denied(&[low, mirrored(1.01), mirrored(1.4), FitWarning::LittleOverlap { overlap: 0.3 }]);
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(
+            said[0].starts_with("post to pre: the images hardly resemble") && said[1].contains("mirror"),
+            "{said:?}"
+        );
+    }
 
     #[test]
     fn a_pose_by_hand_is_held_against_the_one_found() {
