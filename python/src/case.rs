@@ -105,6 +105,8 @@ fn word(state: PointState) -> &'static str {
         PointState::Fluid => "fluid",
         PointState::Removed => "removed",
         PointState::Outside => "outside",
+        PointState::Rigid => "rigid",
+        PointState::Moved => "moved",
     }
 }
 
