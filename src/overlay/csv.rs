@@ -1,7 +1,7 @@
 //! Points as a table: columns `x`, `y`, `z` (mm, RAS+), or three columns of numbers and no others. A fourth may be a number of the
 //! row as well as a coordinate: then a header says which.
 
-use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, names_of, written};
 
 /// The table as it was, and where its coordinates stand.
 #[derive(Clone, Debug)]
@@ -17,8 +17,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         .has_headers(false)
         .flexible(false)
         .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(bytes);
+        .from_reader(below_comments(bytes));
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (n, record) in reader.records().enumerate() {
         let record = record.map_err(|e| damaged(name, format!("row {}", n + 1), in_words(&e)))?;
@@ -77,9 +76,18 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
         .as_ref()
         .and_then(|h| h.iter().position(|c| ["name", "label", "id"].contains(&c.to_lowercase().as_str())));
     let label = label.or_else(|| header.is_none().then(|| (0..first.len()).find(|c| !is_number(&first[*c]))).flatten());
-    let names =
-        rows.iter().enumerate().map(|(n, row)| label.map_or_else(|| (n + 1).to_string(), |c| row[c].clone())).collect();
+    let names = label.map_or_else(Vec::new, |c| names_of(rows.iter().map(|row| row[c].clone()).collect()));
     Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Table { header, rows, columns }) })
+}
+
+/// The table without the comments above it. Below its first row a `#` is a part of a cell, such as a name: a row is never left out.
+fn below_comments(bytes: &[u8]) -> &[u8] {
+    let mut rest = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    while rest.starts_with(b"#") || rest.starts_with(b"\n") || rest.starts_with(b"\r") {
+        let end = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).map_or(rest.len(), |n| n + 1);
+        rest = &rest[end..];
+    }
+    rest
 }
 
 /// What is wrong with a row, and what to do about it.

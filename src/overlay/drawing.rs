@@ -1,6 +1,7 @@
 //! A drawing, whatever file it came from.
 
 use crate::mesh::TriMesh;
+use crate::mesh::format::gifti::Space;
 use std::fmt;
 use thiserror::Error;
 
@@ -9,7 +10,7 @@ use thiserror::Error;
 pub struct Drawing {
     /// Every position, mm, RAS+.
     pub points_mm: Vec<[f64; 3]>,
-    /// Names of the points, where they have names.
+    /// Names of the points, where any has one; blank for those without. Numbers of rows are no names.
     pub names: Vec<String>,
     /// The same points on a second image, where the file holds pairs.
     pub pairs_mm: Vec<[f64; 3]>,
@@ -20,6 +21,16 @@ pub struct Drawing {
 pub(super) trait Kept: fmt::Debug {
     /// The file again with its points carried.
     fn encode(&self, carried: &[Carried], names: &[String]) -> Vec<u8>;
+
+    /// The same where the format says in which frame its points are.
+    fn encode_in(&self, carried: &[Carried], names: &[String], _: Space) -> Vec<u8> {
+        self.encode(carried, names)
+    }
+
+    /// The frame that the file says its points are in; `None` where it says none.
+    fn declared(&self) -> Option<Space> {
+        None
+    }
 
     /// What of it does not move with the points.
     fn not_carried(&self) -> Option<NotCarried> {
@@ -50,6 +61,9 @@ pub enum NotCarried {
         "{0} more arrays of the file, beside the points and triangles, are not written: take them from the file itself"
     )]
     Arrays(usize),
+    /// The second volume of tag points.
+    #[error("the points of its second volume are not written: carry them from a file in which they stand first")]
+    SecondVolume,
 }
 
 /// Where points are now, mm.
@@ -68,12 +82,16 @@ pub enum PointState {
     Removed,
     /// Beyond the field: not moved by any brain shift.
     Outside,
+    /// Wherever it lies: moved rigidly, as all are where there is no field.
+    Rigid,
+    /// Within a field that nobody has said is that of tissue: moved by it.
+    Moved,
 }
 
 impl PointState {
     /// Whether there is a brain shift to be held against: not for what was taken, nor for what lies beyond the brain.
     pub fn moves_with_the_brain(self) -> bool {
-        matches!(self, Self::Tissue | Self::Fluid)
+        matches!(self, Self::Tissue | Self::Fluid | Self::Moved)
     }
 }
 
@@ -84,6 +102,8 @@ impl fmt::Display for PointState {
             Self::Fluid => "fluid",
             Self::Removed => "removed",
             Self::Outside => "outside",
+            Self::Rigid => "rigid",
+            Self::Moved => "moved",
         })
     }
 }
@@ -119,8 +139,34 @@ impl Drawing {
     /// # Panics
     /// When there are not as many points as were read, a programming error.
     pub fn encode(&self, carried: &[Carried]) -> Vec<u8> {
+        self.encode_in(carried, Space::Scanner)
+    }
+
+    /// The same in a frame that the file says where its format can (GIFTI).
+    ///
+    /// # Panics
+    /// As [`Drawing::encode`].
+    pub fn encode_in(&self, carried: &[Carried], space: Space) -> Vec<u8> {
         assert_eq!(carried.len(), self.points_mm.len(), "one place for each point");
-        self.kept.encode(carried, &self.names)
+        self.kept.encode_in(carried, &self.names, space)
+    }
+
+    /// The frame that the file says its points are in (GIFTI); `None` where it says none.
+    pub fn declared(&self) -> Option<Space> {
+        self.kept.declared()
+    }
+
+    /// Refuses a file that says its points are those of MNI space.
+    ///
+    /// # Errors
+    /// [`OverlayError`] with what to do.
+    pub fn check_of_scanner(&self, name: &str) -> Result<(), OverlayError> {
+        if self.declared() != Some(Space::Mni152) {
+            return Ok(());
+        }
+        let problem = "it says MNI space (NIFTI_XFORM_MNI_152), and the scanner's frame is needed: give the surface as it was before it \
+                       was taken there; where the scan itself lies in MNI space, write NIFTI_XFORM_SCANNER_ANAT there";
+        Err(damaged(name, "DataSpace of the coordinates", problem))
     }
 
     /// The surface that the points are the nodes of (STL, GIFTI, PLY), in the file's order; `None` of a drawing that is none.
@@ -147,6 +193,11 @@ impl Drawing {
 pub(super) fn says_lps(head: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&head[..head.len().min(400)]);
     head.contains("SPACE=LPS")
+}
+
+/// Names as the points have them; none where not one has a name.
+pub(super) fn names_of(names: Vec<String>) -> Vec<String> {
+    if names.iter().all(|name| name.trim().is_empty()) { Vec::new() } else { names }
 }
 
 /// LPS to RAS and back.

@@ -1,6 +1,6 @@
 //! 3D Slicer's markups (`.mrk.json`): point lists, lines, curves.
 
-use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, turned, written};
+use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, names_of, turned, written};
 use super::fcsv::said;
 use serde_json::{Value, json};
 
@@ -52,10 +52,10 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
                 point["position"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
             let [x, y, z] = numbers[..] else { return Err(damaged(name, place(), "it does not hold three numbers")) };
             points_mm.push(turned([x, y, z], lps));
-            names.push(point["label"].as_str().map_or_else(|| (n + 1).to_string(), str::to_owned));
+            names.push(point["label"].as_str().unwrap_or_default().to_owned());
         }
     }
-    Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Markups { document }) })
+    Ok(Drawing { points_mm, names: names_of(names), pairs_mm: Vec::new(), kept: Box::new(Markups { document }) })
 }
 
 impl Kept for Markups {

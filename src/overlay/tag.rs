@@ -1,11 +1,13 @@
 //! Tag points of the MNI (`.tag`), what the ultrasound data sets keep their landmarks in: one point or a pair in a row,
 //! mm of the scanner (the first axis to the right, the second to the front, the third up).
 
-use super::drawing::{Carried, Drawing, Kept, OverlayError, damaged, written};
+use super::drawing::{Carried, Drawing, Kept, NotCarried, OverlayError, damaged, names_of, written};
 
-/// Nothing is kept but what every drawing has.
+/// Whether the points stood on two volumes.
 #[derive(Debug)]
-struct Tags;
+struct Tags {
+    pairs: bool,
+}
 
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     let text = std::str::from_utf8(bytes).map_err(|_| damaged(name, "the file", "not UTF-8 text"))?;
@@ -33,23 +35,28 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
             return Err(damaged(name, place(), format!("{} numbers, and {} are needed", read.len(), 3 * volumes)));
         }
         let label = label.trim_end_matches('"').trim();
-        names.push(if label.is_empty() { (points_mm.len() + 1).to_string() } else { label.to_owned() });
+        names.push(label.to_owned());
         points_mm.push([read[0], read[1], read[2]]);
         if volumes == 2 {
             pairs_mm.push([read[3], read[4], read[5]]);
         }
     }
-    Ok(Drawing { points_mm, names, pairs_mm, kept: Box::new(Tags) })
+    Ok(Drawing { points_mm, names: names_of(names), pairs_mm, kept: Box::new(Tags { pairs: volumes == 2 }) })
 }
 
 impl Kept for Tags {
     /// One volume of points with their names.
     fn encode(&self, carried: &[Carried], names: &[String]) -> Vec<u8> {
-        let row = |(p, name): (&Carried, &String)| {
+        let row = |(n, p): (usize, &Carried)| {
             let [x, y, z] = p.mm.map(written);
+            let name = names.get(n).map_or("", String::as_str);
             format!(" {x} {y} {z} \"{}\"", name.replace('"', "'"))
         };
-        let rows: Vec<String> = carried.iter().zip(names).map(row).collect();
+        let rows: Vec<String> = carried.iter().enumerate().map(row).collect();
         format!("MNI Tag Point File\nVolumes = 1;\n\nPoints =\n{};\n", rows.join("\n")).into_bytes()
+    }
+
+    fn not_carried(&self) -> Option<NotCarried> {
+        self.pairs.then_some(NotCarried::SecondVolume)
     }
 }

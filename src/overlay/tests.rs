@@ -58,6 +58,12 @@ fn what_does_not_move_with_the_points_is_told() {
     assert_eq!(of(vtk, "a.vtk"), None);
     let with = format!("{vtk}POINT_DATA 1\nNORMALS n float\n0 0 1\n");
     assert_eq!(of(&with, "a.vtk"), Some(NotCarried::Directions));
+    let field = |head: &str| format!("{vtk}POINT_DATA 1\nFIELD FieldData 1\n{head}\n0 0 1\n");
+    assert_eq!(of(&field("Normals 3 1 float"), "a.vtk"), Some(NotCarried::Directions));
+    assert_eq!(of(&field("fa 1 3 float"), "a.vtk"), None);
+    let tag = |volumes: usize| format!("MNI Tag Point File\nVolumes = {volumes};\n\nPoints =\n 1 2 3 4 5 6 \"a\";\n");
+    assert_eq!(of(&tag(2), "a.tag"), Some(NotCarried::SecondVolume));
+    assert_eq!(of(&tag(1), "a.tag"), None);
     let surface = TriMesh { nodes_mm: vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], triangles: vec![[0, 1, 2]] };
     let gifti = String::from_utf8(encode_surface(&surface, Space::Scanner, "made")).unwrap();
     assert_eq!(of(&gifti, "a.gii"), None);
@@ -132,6 +138,108 @@ fn a_damaged_file_is_refused_with_its_place() {
     assert!(refuse(b"mrtrix tracks\ndatatype: Float32LE\nfile: . 50\nEND\n", "a.tck").contains("a.tck"));
     assert!(refuse(b"TRACK", "a.trk").contains("TRACK"));
     assert!(refuse(&[0; 100], "a.stl").contains("cut short"));
+}
+
+#[test]
+fn a_number_sign_is_a_comment_above_the_table_and_a_name_within_it() {
+    let read = |text: &str| Drawing::decode(text.as_bytes(), "a.csv").unwrap();
+    let table = read("\u{feff}# of Monday\n\n#mm\nname,x,y,z\n#1,5,-6,7\n#2,1,2,3\nb,4,5,6\n");
+    assert_eq!((table.points_mm.len(), table.names), (3, ["#1", "#2", "b"].map(str::to_owned).to_vec()));
+    let plain = read("# x,y,z\n1,2,3\n4,5,6\n");
+    assert_eq!((plain.points_mm.len(), plain.names.len()), (2, 0));
+    let said = Drawing::decode(b"x,y,z\n1,2,3\n# 4,5\n", "a.csv").unwrap_err().to_string();
+    assert!(said.contains("row 3"), "{said}");
+}
+
+/// Points without names stay without: a number that is made up would be taken for one.
+#[test]
+fn points_without_names_are_written_without() {
+    let drawing =
+        Drawing::decode(b"MNI Tag Point File\nVolumes = 1;\nPoints =\n 1 2 3 \"\"\n 4 5 6;\n", "a.tag").unwrap();
+    assert!(drawing.names.is_empty());
+    let again = Drawing::decode(&drawing.encode(&moved(&drawing, [1.0, 0.0, 0.0])), "a.tag").unwrap();
+    assert_eq!(again.points_mm, [[2.0, 2.0, 3.0], [5.0, 5.0, 6.0]]);
+    assert!(again.names.is_empty());
+}
+
+/// A track of two points and one of one, in a grid of 2 mm that the scanner's axes are the axes of.
+fn tracks(declared: i32) -> Vec<u8> {
+    let mut bytes = vec![0u8; 1000];
+    let mut put = |at: usize, words: &[u8]| bytes[at..at + words.len()].copy_from_slice(words);
+    put(0, b"TRACK");
+    for axis in 0..3 {
+        put(6 + 2 * axis, &10i16.to_le_bytes());
+        put(12 + 4 * axis, &2f32.to_le_bytes());
+        put(440 + 4 * (5 * axis), &2f32.to_le_bytes());
+    }
+    put(440 + 60, &1f32.to_le_bytes());
+    put(948, b"RAS");
+    put(988, &declared.to_le_bytes());
+    put(996, &1000i32.to_le_bytes());
+    for points in [2i32, 1] {
+        bytes.extend(points.to_le_bytes());
+        bytes.extend((0..3 * points).flat_map(|n| (n as f32).to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn tracks_with_fewer_lines_than_they_say_or_with_bytes_left_over_were_cut_short() {
+    for declared in [0, 2] {
+        assert_eq!(Drawing::decode(&tracks(declared), "a.trk").unwrap().streamlines(), Some(2));
+    }
+    let said = |bytes: &[u8]| Drawing::decode(bytes, "a.trk").unwrap_err().to_string();
+    let few = said(&tracks(5));
+    assert!(few.contains("n_count") && few.contains("5 lines") && few.contains("cut short"), "{few}");
+    // Between two lines, and within the count of the next.
+    let whole = tracks(2);
+    assert!(said(&whole[..whole.len() - 16]).contains("n_count"));
+    assert!(said(&whole[..whole.len() - 14]).contains("2 bytes"));
+}
+
+#[test]
+fn whole_numbers_are_no_coordinates_of_a_binary_ply_and_places_in_a_picture_no_corners() {
+    let head = |kind: &str, format: &str, more: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 3\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\nelement face 1\nproperty list \
+             uchar int vertex_indices\n{more}end_header\n"
+        )
+    };
+    let said = Drawing::decode(head("int", "binary_little_endian", "").as_bytes(), "a.ply").unwrap_err().to_string();
+    assert!(said.contains("`x` is int") && said.contains("float or double"), "{said}");
+    let picture = "property list uchar float texcoord\nproperty int texnumber\n";
+    let corners = [0f32, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 9.0, 0.0];
+    let mut binary = head("float", "binary_little_endian", picture).into_bytes();
+    binary.extend(corners.iter().flat_map(|x| x.to_le_bytes()));
+    binary.push(3);
+    binary.extend([0i32, 1, 2].iter().flat_map(|n| n.to_le_bytes()));
+    binary.push(6);
+    binary.extend([0.5f32; 6].iter().flat_map(|x| x.to_le_bytes()));
+    binary.extend(4i32.to_le_bytes());
+    let text = head("int", "ascii", picture) + "0 0 0\n9 0 0\n0 9 0\n3 0 1 2 6 0.5 0.5 0.5 0.5 0.5 0.5 4\n";
+    for bytes in [&binary[..], text.as_bytes()] {
+        let surface = Drawing::decode(bytes, "a.ply").unwrap().surface("a.ply").unwrap().unwrap();
+        assert_eq!((surface.nodes_mm[1], surface.triangles), ([9.0, 0.0, 0.0], vec![[0, 1, 2]]));
+    }
+    let cut = Drawing::decode(&binary[..binary.len() - 8], "a.ply").unwrap().surface("a.ply").unwrap_err();
+    assert!(cut.to_string().contains("cut short"));
+}
+
+#[test]
+fn a_surface_that_says_mni_space_is_not_taken_for_the_scanners_and_says_the_frame_it_is_carried_to() {
+    let surface = TriMesh { nodes_mm: vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], triangles: vec![[0, 1, 2]] };
+    let read = |space: Space| Drawing::decode(&encode_surface(&surface, space, "made"), "a.surf.gii").unwrap();
+    let said = read(Space::Mni152).check_of_scanner("a.surf.gii").unwrap_err().to_string();
+    assert!(said.contains("a.surf.gii") && said.contains("MNI_152") && said.contains("SCANNER_ANAT"), "{said}");
+    for space in [Space::Scanner, Space::Talairach] {
+        let drawing = read(space);
+        assert_eq!(drawing.check_of_scanner("a.surf.gii"), Ok(()));
+        assert_eq!(drawing.declared(), Some(space));
+        let carried = moved(&drawing, [1.0, 0.0, 0.0]);
+        let again = |bytes: Vec<u8>| Drawing::decode(&bytes, "b.surf.gii").unwrap().declared();
+        assert_eq!(again(drawing.encode_in(&carried, Space::Mni152)), Some(Space::Mni152));
+        assert_eq!(again(drawing.encode(&carried)), Some(Space::Scanner));
+    }
 }
 
 #[test]

@@ -17,9 +17,11 @@ use std::path::Path;
 pub fn warped(output: &Path, kind: &str, state: &str, points: Option<[usize; 3]>) -> String {
     let text = format!("{}: {kind}, carried by {state}", output.display());
     let Some([all, removed, outside]) = points else { return text };
+    // A field of the user's own has no rigid part.
+    let how = if state == "field" { "not moved" } else { "moved rigidly alone" };
     let rigidly = |count: usize, place: &str| match count {
         0 => String::new(),
-        n => format!("; {n} of them {place}: moved rigidly alone"),
+        n => format!("; {n} of them {place}: {how}"),
     };
     text + &format!(", {all} points{}{}", rigidly(removed, "in removed tissue"), rigidly(outside, "beyond the field"))
 }

@@ -68,9 +68,9 @@ fn place(states: impl Iterator<Item = PointState>) -> (String, bool) {
     // The first of those that are farthest inside.
     let inside = |state: &PointState| match state {
         PointState::Tissue => 0,
-        PointState::Fluid => 1,
+        PointState::Fluid | PointState::Moved => 1,
         PointState::Removed => 2,
-        PointState::Outside => 3,
+        PointState::Outside | PointState::Rigid => 3,
     };
     let state = states.min_by_key(inside).unwrap_or(PointState::Tissue);
     (state.to_string(), state.moves_with_the_brain())

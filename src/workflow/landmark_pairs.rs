@@ -37,14 +37,20 @@ fn alike(name: &str) -> String {
 fn read(path: &Path) -> Result<Drawing, WorkflowError> {
     let name = shown(path);
     let drawing = Drawing::decode(&read_input(path)?, &name)?;
+    drawing.check_of_scanner(&name)?;
     if drawing.points_mm.is_empty() { Err(LandmarkError::Empty { file: name }.into()) } else { Ok(drawing) }
+}
+
+/// A point's name, or its number where it has none.
+fn numbered(names: &[String], n: usize) -> String {
+    names.get(n).filter(|name| !name.trim().is_empty()).cloned().unwrap_or_else(|| (n + 1).to_string())
 }
 
 /// Places in a list by name, and the first name that stands in it twice.
 fn by_name(names: &[String]) -> (BTreeMap<String, usize>, Option<&String>) {
     let mut places = BTreeMap::new();
     let mut twice = None;
-    for (n, name) in names.iter().enumerate() {
+    for (n, name) in names.iter().enumerate().filter(|(_, name)| !name.trim().is_empty()) {
         if places.insert(alike(name), n).is_some() {
             twice = twice.or(Some(name));
         }
@@ -59,17 +65,17 @@ impl Paired {
     /// Files that cannot be used, a name that stands twice in one of them, landmarks of which nobody knows which belong together.
     pub fn read(landmarks: &Landmarks) -> Result<Self, WorkflowError> {
         let pre = read(&landmarks.pre)?;
-        let numbered = |n: usize| pre.names.get(n).cloned().unwrap_or_else(|| (n + 1).to_string());
+        let of_pre_at = |n: usize| numbered(&pre.names, n);
         let Some(path) = &landmarks.post else {
             if pre.pairs_mm.is_empty() {
                 return Err(LandmarkError::NoPairs { file: shown(&landmarks.pre) }.into());
             }
-            let pairs = (0..pre.points_mm.len()).map(|n| (numbered(n), pre.points_mm[n], pre.pairs_mm[n]));
+            let pairs = (0..pre.points_mm.len()).map(|n| (of_pre_at(n), pre.points_mm[n], pre.pairs_mm[n]));
             return Ok(Self { pairs: pairs.collect(), left_out: Vec::new() });
         };
         let post = read(path)?;
         let (of_pre, of_post) = (pre.points_mm.len(), post.points_mm.len());
-        let in_order = || (0..of_pre).map(|n| (numbered(n), pre.points_mm[n], post.points_mm[n])).collect();
+        let in_order = || (0..of_pre).map(|n| (of_pre_at(n), pre.points_mm[n], post.points_mm[n])).collect();
         let (before, twice_before) = by_name(&pre.names);
         let (after, twice_after) = by_name(&post.names);
         let common = before.keys().any(|name| after.contains_key(name));
@@ -79,9 +85,10 @@ impl Paired {
                 return Err(LandmarkError::Twice { file: shown(file), name: name.clone() }.into());
             }
             let place = |n: usize| after.get(&alike(&pre.names[n])).copied();
-            let pairs = (0..of_pre).filter_map(|n| Some((numbered(n), pre.points_mm[n], post.points_mm[place(n)?])));
-            let alone_before = (0..of_pre).filter(|&n| place(n).is_none()).map(numbered);
-            let alone_after = post.names.iter().filter(|name| !before.contains_key(&alike(name))).cloned();
+            let pairs = (0..of_pre).filter_map(|n| Some((of_pre_at(n), pre.points_mm[n], post.points_mm[place(n)?])));
+            let alone_before = (0..of_pre).filter(|&n| place(n).is_none()).map(of_pre_at);
+            let alone = |n: &usize| !before.contains_key(&alike(&post.names[*n]));
+            let alone_after = (0..of_post).filter(alone).map(|n| numbered(&post.names, n));
             return Ok(Self { pairs: pairs.collect(), left_out: alone_before.chain(alone_after).collect() });
         }
         // Without names in common, or with the same list twice, the order counts, where there are as many.
@@ -168,6 +175,37 @@ mod tests {
         assert_eq!(found.left_out, ["only"]);
         let found = paired(&[("a", A)], &[("a", B), ("b", B)]).unwrap();
         assert_eq!((found.pairs.len(), found.left_out), (1, vec!["b".to_owned()]));
+    }
+
+    #[test]
+    fn numbers_of_rows_are_no_names_so_lists_without_names_belong_together_in_order_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let paired =
+            |pre: PathBuf, post: PathBuf| Paired::read(&Landmarks { pre, post: Some(post) }).map_err(|e| e.to_string());
+        let tag = |rows: &str| format!("MNI Tag Point File\nVolumes = 1;\nPoints =\n{rows};\n");
+        let two = [
+            file("two.csv", "x,y,z\n1,2,3\n4,5,6\n"),
+            file("two.tag", &tag(" 1 2 3 \"\"\n 4 5 6 \"\"")),
+            file(
+                "two.mrk.json",
+                r#"{"markups": [{"coordinateSystem": "RAS", "controlPoints": [{"position": [1, 2, 3]}, {"position": [4, 5, 6]}]}]}"#,
+            ),
+        ];
+        let three = file("three.csv", "x,y,z\n0,0,0\n1,2,3\n4,5,6\n");
+        for list in two {
+            assert!(paired(three.clone(), list.clone()).is_err(), "{}", list.display());
+            let found = paired(list.clone(), list).unwrap();
+            assert_eq!(found.pairs, [("1".to_owned(), A, A), ("2".to_owned(), B, B)]);
+        }
+        let some = file("some.tag", &tag(" 1 2 3 \"\"\n 4 5 6 \"tip\"\n 0 0 0 \"\""));
+        let found = paired(some, file("tip.csv", "name,x,y,z\ntip,1,2,3\n,0,0,0\n")).unwrap();
+        assert_eq!(found.pairs, [("tip".to_owned(), B, A)]);
+        assert_eq!(found.left_out, ["1", "3", "2"]);
     }
 
     #[test]

@@ -156,7 +156,7 @@ impl Map {
         let x = Position::new(x_mm[0], x_mm[1], x_mm[2]);
         let rigid: [f64; 3] = self.rigid.apply(x).mm.into();
         let Some(field) = &self.forward else {
-            return Carried { mm: rigid, sd_mm: None, state: PointState::Tissue };
+            return Carried { mm: rigid, sd_mm: None, state: PointState::Rigid };
         };
         let Some(mm) = carried(field, x_mm) else {
             return Carried { mm: rigid, sd_mm: None, state: PointState::Outside };
@@ -168,7 +168,8 @@ impl Map {
         }
         let still = (0..3).all(|a| (mm[a] - rigid[a]).abs() < 2e-3);
         let state = match is(&self.believed) {
-            Some(true) | None => PointState::Tissue,
+            Some(true) => PointState::Tissue,
+            None => PointState::Moved,
             Some(false) if still => PointState::Outside,
             Some(false) => PointState::Fluid,
         };
@@ -259,6 +260,15 @@ fn computed(case: &Case, state: &str, family: crate::layout::Family, to: WarpTo)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn where_nobody_knows_of_tissue_none_is_claimed() {
+        assert_eq!(Map::still().carry([1.0, 2.0, 3.0]).state, PointState::Rigid);
+        let grid = Grid::<Native>::axis_aligned([4, 4, 4], [1.0; 3], [0.0; 3]);
+        let map = Map::of_field(Volume::from_voxels(grid, |_| [0.5, 0.0, 0.0]), Part::Points);
+        assert_eq!(map.carry([1.0; 3]), Carried { mm: [1.5, 1.0, 1.0], sd_mm: None, state: PointState::Moved });
+        assert_eq!(map.carry([9.0; 3]).state, PointState::Outside);
+    }
 
     /// Voxels of 1 mm along x, all moved by a third of a mm: two of tissue that was taken, four of tissue, two of fluid.
     fn margin() -> Map {

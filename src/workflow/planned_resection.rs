@@ -3,7 +3,7 @@
 use super::error::{PredictError, WorkflowError};
 use super::inputs::read_mask_of;
 use super::user_file::{read_input, shown};
-use super::warning::Warning;
+use super::warning::{Warning, says_talairach};
 use crate::experiment::predict::{PlannedError, ellipsoid_mask};
 use crate::geometry::{Native, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
@@ -116,7 +116,10 @@ impl PlannedResection {
             }
             Self::Surface(path) => {
                 let file = || shown(path);
-                let surface = Drawing::decode(&read_input(path)?, &file())?.surface(&file())?;
+                let drawing = Drawing::decode(&read_input(path)?, &file())?;
+                drawing.check_of_scanner(&file())?;
+                warnings.extend(says_talairach(&drawing, &plan));
+                let surface = drawing.surface(&file())?;
                 let surface = surface.ok_or_else(|| PredictError::NoSurface { file: file() })?;
                 let refused = |source| PredictError::OpenSurface { file: file(), source };
                 (surface.enclosed(grid).map_err(refused)?, volume_mm3(&surface).map_err(refused)?)
@@ -208,7 +211,7 @@ mod tests {
     use crate::image::Volume;
     use crate::image::nifti::{encode_i16, encode_mask};
     use crate::mesh::TriMesh;
-    use crate::mesh::format::stl;
+    use crate::mesh::format::{gifti, stl};
 
     fn grid() -> Grid<Pre> {
         Grid::axis_aligned([40, 40, 40], [1.0; 3], [-20.0, -20.0, -20.0])
@@ -220,6 +223,12 @@ mod tests {
         let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).skip(usize::from(open));
         stl::encode(&TriMesh { nodes_mm: (0..8).map(node).collect(), triangles: triangles.collect() })
+    }
+
+    /// A surface that says it lies in MNI space.
+    fn of_mni() -> Vec<u8> {
+        let solid = TriMesh { nodes_mm: vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], triangles: vec![[0, 1, 2]] };
+        gifti::encode_surface(&solid, gifti::Space::Mni152, "lesion")
     }
 
     fn mask_of(plan: &PlannedResection, dseg: Option<&Path>, warnings: &mut Vec<Warning>) -> Result<Mask<Pre>, String> {
@@ -264,11 +273,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let codes = Volume::from_fn(grid(), |n| (n % 3) as i16);
-        let files: [(&str, Vec<u8>); 7] = [
+        let files: [(&str, Vec<u8>); 8] = [
             ("open.stl", block([0.0; 3], 5.5, true)),
             ("far.stl", block([500.0; 3], 5.5, false)),
             ("half.stl", block([-20.0, 0.0, -20.0], 9.0, false)),
             ("points.csv", b"x,y,z\n1,2,3\n".to_vec()),
+            ("mni.surf.gii", of_mni()),
             ("cut.stl", block([0.0; 3], 5.5, false)[..200].to_vec()),
             ("empty.nii", encode_mask(&Mask::filled(grid(), false))),
             ("dseg.nii", encode_i16(&codes)),
@@ -280,11 +290,12 @@ mod tests {
         let file = |name: &str| PlannedResection::file(at(name));
         let sphere = |centre: f64, half: f64| PlannedResection::Ellipsoid([centre, centre, centre, half, half, half]);
         let label = |number: u32| PlannedResection::Label(vec![number]);
-        let cases: [(PlannedResection, Option<&Path>, &[&str]); 11] = [
+        let cases: [(PlannedResection, Option<&Path>, &[&str]); 12] = [
             (file("open.stl"), None, &["open.stl", "open: 3 edges", "Close Holes"]),
             (file("far.stl"), None, &["far.stl", "is empty", "RAS+"]),
             (file("half.stl"), None, &["half.stl", "outside the scan", "RAS+"]),
             (file("points.csv"), None, &["points.csv", "without triangles", ".surf.gii"]),
+            (file("mni.surf.gii"), None, &["mni.surf.gii", "MNI_152", "before it was taken there"]),
             (file("cut.stl"), None, &["cut.stl", "cut short"]),
             (file("empty.nii"), None, &["empty.nii", "is empty"]),
             (file("none.stl"), None, &["none.stl"]),

@@ -28,6 +28,7 @@ impl Targets {
     pub fn read(path: &Path) -> Result<Self, WorkflowError> {
         let (file, bytes) = (shown(path), read_input(path)?);
         let drawing = Drawing::decode(&bytes, &file)?;
+        drawing.check_of_scanner(&file)?;
         if drawing.points_mm.is_empty() {
             return Err(PredictError::NoTarget { file }.into());
         }

@@ -2,7 +2,8 @@
 
 use crate::fem::FemWarning;
 use crate::image::nifti::NiftiWarning;
-use crate::overlay::NotCarried;
+use crate::mesh::format::gifti::Space;
+use crate::overlay::{Drawing, NotCarried};
 use crate::register::FitWarning;
 use crate::segment::SegmentWarning;
 use crate::tag::TagWarning;
@@ -34,6 +35,16 @@ pub enum Warning {
          brain lies before trusting the boundary sets and the direction of gravity"
     )]
     PoseFarFromFound { apart_mm: f64, turned_deg: f64 },
+    #[error(
+        "{file}: it says Talairach's space, which programs also write of surfaces in the scanner's frame, and is taken for one of those: \
+         look at where it lies"
+    )]
+    SaysTalairach { file: String },
+    #[error(
+        "{file}: {percent:.1} % of it leave the image or lie beyond the field, and are not in the result: give the image more room \
+         around it, or a larger field"
+    )]
+    LeftBehind { file: String, percent: f64 },
     #[error("both files hold the same bytes: was one image given twice?")]
     SameBytes,
     #[error("{plan}: {percent:.0} % of it lie outside the scan and count for nothing")]
@@ -65,6 +76,11 @@ impl Warning {
     pub fn of(self, whose: impl Display) -> Self {
         Self::Of { whose: whose.to_string(), warning: Box::new(self) }
     }
+}
+
+/// What to say of a drawing whose frame is in doubt.
+pub(crate) fn says_talairach(drawing: &Drawing, file: &str) -> Option<Warning> {
+    (drawing.declared() == Some(Space::Talairach)).then(|| Warning::SaysTalairach { file: file.to_owned() })
 }
 
 /// Warnings of a room, of whom they are about.

@@ -3,13 +3,16 @@
 use super::case::Case;
 use super::error::{WarpError, WorkflowError};
 use super::maps::{Map, Part, WarpTo};
+use super::stages::grid_of;
 use super::user_file::{read_input, shown};
-use super::warning::{Warning, all_of};
+use super::warning::{Warning, all_of, says_talairach};
 use crate::artefact::{check_writable, write_whole};
 use crate::experiment::field::{Between, looks_like_labels, seen_through};
-use crate::geometry::{Native, Position};
-use crate::image::Volume;
-use crate::image::nifti::{self, ReadOptions, decode_displacement, encode_intensities};
+use crate::geometry::{Mni, Native, Position};
+use crate::image::nifti::{self, NiftiWarning, ReadOptions, decode_displacement_as, encode_intensities};
+use crate::image::{Grid, Volume};
+use crate::layout::{POST_NATIVE_BRAIN, PRE_NATIVE_BRAIN};
+use crate::mesh::format::gifti::Space;
 use crate::overlay::{Carried, Drawing, PointState};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -77,8 +80,12 @@ pub struct PointCounts {
     pub fluid: usize,
     /// In tissue that was taken: not moved but rigidly.
     pub removed: usize,
-    /// Beyond the field: not moved but rigidly.
+    /// Beyond the field: not moved but rigidly, and not at all by a field of the user's own.
     pub outside: usize,
+    /// Anywhere, where all are moved rigidly.
+    pub rigid: usize,
+    /// Within a field of the user's own, which says nothing of tissue.
+    pub moved: usize,
 }
 
 impl PointCounts {
@@ -90,6 +97,8 @@ impl PointCounts {
             fluid: count(PointState::Fluid),
             removed: count(PointState::Removed),
             outside: count(PointState::Outside),
+            rigid: count(PointState::Rigid),
+            moved: count(PointState::Moved),
         }
     }
 }
@@ -109,39 +118,63 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
     check_writable(&asked.output)?;
     let bytes = read_input(&asked.file)?;
     let part = if image { Part::Images } else { Part::Points };
-    let map = || match &asked.through {
-        Through::Case { folder, to, state } => Map::of_case(&Case::open(folder)?, state.as_deref(), *to, part),
-        Through::Field(path) => {
-            let field = decode_displacement(&read_input(path)?, &shown(path))?;
-            Ok((Map::of_field(field, part), "field".to_owned()))
+    if let Through::Case { folder, to, .. } = &asked.through {
+        check_not_of_mni(&name, image.then_some(&bytes), || scan_grid(&Case::open(folder)?, *to))?;
+    }
+    let map = || -> Result<(Map, String, Vec<Warning>), WorkflowError> {
+        match &asked.through {
+            Through::Case { folder, to, state } => {
+                let case = Case::open(folder)?;
+                let (map, state) = Map::of_case(&case, state.as_deref(), *to, part)?;
+                Ok((map, state, case.gate_warnings()))
+            }
+            Through::Field(path) => {
+                let file = shown(path);
+                let (field, odd): (_, Vec<NiftiWarning>) =
+                    decode_displacement_as(&read_input(path)?, &file, &asked.reading)?;
+                Ok((Map::of_field(field, part), "field".to_owned(), all_of(&file, &odd).collect()))
+            }
         }
     };
-    let doubts = || match &asked.through {
-        Through::Case { folder, .. } => Ok(Case::open(folder)?.gate_warnings()),
-        Through::Field(_) => Ok::<_, WorkflowError>(Vec::new()),
-    };
+    let to_mni = matches!(asked.through, Through::Case { to: WarpTo::Mni, .. });
     if image {
         let (volume, map) = rayon::join(|| nifti::decode_intensities(&bytes, &name, &asked.reading), map);
         let (volume, odd) = volume?;
         let labels = asked.labels.unwrap_or_else(|| looks_like_labels(&volume));
-        let (map, state) = map?;
+        let (map, state, doubts) = map?;
         let carried = image_through(&volume, &map, labels);
-        write_whole(&asked.output, &encode_intensities(&carried))?;
+        let written =
+            if to_mni { encode_intensities(&carried.relabelled::<Mni>()) } else { encode_intensities(&carried) };
+        write_whole(&asked.output, &written)?;
         let kind = if labels { "labels" } else { "image" };
-        let warnings = doubts()?.into_iter().chain(all_of(&name, &odd)).collect();
+        let mut warnings: Vec<Warning> = all_of(&name, &odd).chain(doubts).collect();
+        if let Through::Field(_) = asked.through {
+            let percent = 100.0 * left_behind(&volume, &map, labels);
+            warnings.extend((percent >= 0.05).then(|| Warning::LeftBehind { file: name.clone(), percent }));
+        }
         return Ok(Warped { output: asked.output.clone(), kind, state, points: None, streamlines: None, warnings });
     }
     let drawing = Drawing::decode(&bytes, &name)?;
-    let (map, state) = map()?;
+    if let Through::Case { .. } = asked.through {
+        drawing.check_of_scanner(&name)?;
+    }
+    let (map, state, doubts) = map()?;
+    let space = match asked.through {
+        Through::Case { to: WarpTo::Mni, .. } => Space::Mni152,
+        Through::Case { .. } => Space::Scanner,
+        // Nobody says where a field leads: what the file has said stays.
+        Through::Field(_) => drawing.declared().unwrap_or(Space::Scanner),
+    };
     let carried: Vec<Carried> = drawing.points_mm.par_iter().map(|x| map.carry(*x)).collect();
-    write_whole(&asked.output, &drawing.encode(&carried))?;
+    write_whole(&asked.output, &drawing.encode_in(&carried, space))?;
     let kind = match (drawing.streamlines(), ending) {
         (Some(_), _) => "streamlines",
         (None, ".gii" | ".stl" | ".ply" | ".vtk") => "surface",
         _ => "points",
     };
     let points = Some(PointCounts::of(&carried));
-    let warnings = doubts()?.into_iter().chain(all_of(&name, drawing.not_carried().as_slice())).collect();
+    let in_doubt = says_talairach(&drawing, &name).filter(|_| !matches!(asked.through, Through::Field(_)));
+    let warnings = all_of(&name, drawing.not_carried().as_slice()).chain(in_doubt).chain(doubts).collect();
     let streamlines = drawing.streamlines();
     Ok(Warped { output: asked.output.clone(), kind, state, points, streamlines, warnings })
 }
@@ -161,6 +194,49 @@ pub fn warp_points(
     Ok((state, points_mm.par_iter().map(|x| map.carry(*x)).collect()))
 }
 
+/// The grid of the scan that a case carries from.
+fn scan_grid(case: &Case, to: WarpTo) -> Result<Grid<Native>, WorkflowError> {
+    grid_of(case, if to == WarpTo::Pre { POST_NATIVE_BRAIN } else { PRE_NATIVE_BRAIN })
+}
+
+/// Refuses a file that says it lies in MNI space, by its name or, of an image, its header; but for one on the scan's very grid: there
+/// the scan says so of its own frame.
+fn check_not_of_mni(
+    name: &str,
+    image: Option<&Vec<u8>>,
+    scan: impl FnOnce() -> Result<Grid<Native>, WorkflowError>,
+) -> Result<(), WorkflowError> {
+    let by_name = name.contains("space-MNI");
+    if !by_name && !image.is_some_and(|bytes| nifti::says_mni(bytes)) {
+        return Ok(());
+    }
+    if let Some(Ok(grid)) = image.map(|bytes| nifti::decode_grid(bytes, name))
+        && grid.coincides(&scan()?, 1e-3)
+    {
+        return Ok(());
+    }
+    Err(WarpError::OfMni { file: name.to_owned(), by_name }.into())
+}
+
+/// The part of what an image shows (labels; else what is brighter than its mean) that a field of the user's own moves out of the
+/// image, or does not reach.
+fn left_behind(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> f64 {
+    let mean = volume.data.iter().map(|x| f64::from(*x)).sum::<f64>() / volume.data.len().max(1) as f64;
+    let shown = |x: f32| if labels { x != 0.0 } else { f64::from(x) > mean };
+    let grid = &volume.grid;
+    let leaves = |n: usize| {
+        let to = map.carry(grid.centre(grid.voxel(n)).mm.into());
+        let v = grid.voxel_at(Position::new(to.mm[0], to.mm[1], to.mm[2]));
+        to.state == PointState::Outside || (0..3).any(|a| v[a] < -0.5 || v[a] > grid.dims[a] as f64 - 0.5)
+    };
+    let (all, left) = (0..grid.len())
+        .into_par_iter()
+        .filter(|&n| shown(volume.data[n]))
+        .map(|n| (1usize, usize::from(leaves(n))))
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    left as f64 / all.max(1) as f64
+}
+
 fn image_through(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> Volume<f32, Native> {
     let grid = map.grid.unwrap_or(volume.grid);
     let from = |v: [usize; 3]| {
@@ -172,4 +248,58 @@ fn image_through(volume: &Volume<f32, Native>, map: &Map, labels: bool) -> Volum
     // As whole as the image: between whole numbers there is nothing to be known.
     let whole = volume.data.par_iter().all(|x| *x == x.round());
     if whole { carried.map(f32::round) } else { carried }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pre;
+    use crate::image::nifti::{encode_displacement, encode_u8};
+    use crate::mesh::TriMesh;
+    use crate::mesh::format::gifti::{decode_surface_in, encode_surface};
+
+    #[test]
+    fn what_says_it_lies_in_mni_space_is_refused_unless_it_is_on_the_scans_own_grid() {
+        let grid = Grid::<Native>::axis_aligned([5, 4, 3], [1.0; 3], [0.0; 3]);
+        let other = Grid::<Native>::axis_aligned([5, 4, 3], [1.0; 3], [9.0; 3]);
+        let mut bytes = Vec::new();
+        let packed = encode_u8(&Volume::from_fn(grid, |n| n as u8));
+        std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut bytes).unwrap();
+        let plain = bytes.clone();
+        // qform_code and sform_code of NIfTI-1.
+        bytes[252..256].copy_from_slice(&[0, 0, 4, 0]);
+        let check = |name: &str, bytes: Option<&Vec<u8>>, scan: Grid<Native>| {
+            check_not_of_mni(name, bytes, || Ok(scan)).map_err(|e| e.to_string())
+        };
+        assert_eq!(check("a.nii", Some(&plain), other), Ok(()));
+        let said = check("a.nii", Some(&bytes), other).unwrap_err();
+        assert!(said.contains("a.nii: its header says") && said.contains("sform_code"), "{said}");
+        for image in [Some(&plain), None] {
+            let said = check("sub-1_space-MNI152NLin6Asym_T1w.nii", image, other).unwrap_err();
+            assert!(said.contains("its name says") && said.contains("rename it"), "{said}");
+        }
+        assert_eq!(check("a.nii", Some(&bytes), grid), Ok(()));
+    }
+
+    #[test]
+    fn a_field_of_the_users_own_tells_what_leaves_the_image_keeps_a_surfaces_frame_and_claims_no_tissue() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let grid = Grid::<Pre>::axis_aligned([10, 4, 4], [1.0; 3], [0.0; 3]);
+        std::fs::write(at("field.nii.gz"), encode_displacement(&grid, |_| [2.0, 0.0, 0.0])).unwrap();
+        std::fs::write(at("labels.nii.gz"), encode_u8(&Volume::from_fn(grid, |_| 1u8))).unwrap();
+        let nodes_mm = vec![[1.0; 3], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]];
+        let surface = TriMesh { nodes_mm, triangles: vec![[0, 1, 2]] };
+        std::fs::write(at("a.surf.gii"), encode_surface(&surface, Space::Mni152, "a")).unwrap();
+        let warped = |file: &str, output: &str| {
+            let (through, reading) = (Through::Field(at("field.nii.gz")), ReadOptions::default());
+            warp(&Warp { file: at(file), output: at(output), through, labels: Some(true), reading }).unwrap()
+        };
+        let said = warped("labels.nii.gz", "b.nii.gz").warnings;
+        assert!(matches!(said[..], [Warning::LeftBehind { percent, .. }] if (percent - 20.0).abs() < 1e-9), "{said:?}");
+        let points = warped("a.surf.gii", "b.surf.gii").points.unwrap();
+        assert_eq!((points.all, points.moved, points.tissue), (3, 3, 0));
+        let (carried, space) = decode_surface_in(&std::fs::read(at("b.surf.gii")).unwrap(), "b").unwrap();
+        assert_eq!((carried.nodes_mm[0], space), ([3.0, 1.0, 1.0], Some(Space::Mni152)));
+    }
 }

@@ -5,12 +5,16 @@ use super::encode::{DISPLACEMENT, vector_header, vectors};
 use super::error::{NiftiError, NiftiProblem};
 use super::gzip::{self, Numbers};
 use super::header::Header;
-use super::{check_extension, head_of, orientation, refused, voxels};
+use super::warning::NiftiWarning;
+use super::{ReadOptions, check_extension, head_of, orientation, refused, voxels};
 use crate::geometry::{Frame, Native};
 use crate::image::{Grid, Volume};
 
 /// `NIFTI_INTENT_VECTOR`: ITK takes the numbers as they are, in its own frame (LPS).
 const VECTOR: i16 = 1007;
+
+/// A field, and what was odd about its file.
+type Told = (Volume<[f32; 3], Native>, Vec<NiftiWarning>);
 
 /// A displacement (mm, RAS, by voxel (i, j, k)) as `.nii.gz` bytes.
 ///
@@ -36,10 +40,19 @@ pub fn encode_displacement<F: Frame>(grid: &Grid<F>, mm: impl Fn([usize; 3]) -> 
 /// # Errors
 /// [`NiftiError`], also for a file that holds no vectors of three components, or one that is not a finite number.
 pub fn decode_displacement(bytes: &[u8], name: &str) -> Result<Volume<[f32; 3], Native>, NiftiError> {
-    check_extension(name).and_then(|()| read(bytes)).map_err(|problem| refused(name, problem))
+    Ok(decode_displacement_as(bytes, name, &ReadOptions::default())?.0)
 }
 
-fn read(bytes: &[u8]) -> Result<Volume<[f32; 3], Native>, NiftiProblem> {
+/// [`decode_displacement`] of a file that another program may have written: read as chosen where it leaves a choice. Returns the
+/// warnings beside it.
+///
+/// # Errors
+/// As [`decode_displacement`].
+pub fn decode_displacement_as(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Told, NiftiError> {
+    check_extension(name).and_then(|()| read(bytes, options)).map_err(|problem| refused(name, problem))
+}
+
+fn read(bytes: &[u8], options: &ReadOptions) -> Result<Told, NiftiProblem> {
     let packed = gzip::is_gzip(bytes);
     let header = Header::parse(&head_of(bytes)?)?;
     let layout = header.layout(Some(0))?;
@@ -51,7 +64,7 @@ fn read(bytes: &[u8]) -> Result<Volume<[f32; 3], Native>, NiftiProblem> {
         });
     }
     let mut warnings = Vec::new();
-    let (grid, _) = orientation::grid(&header, layout.dims, None, &mut warnings)?;
+    let (grid, _) = orientation::grid(&header, layout.dims, options.prefer, &mut warnings)?;
     let (slope, intercept) = header.scaling()?;
     let raw = if packed {
         gzip::part(bytes, layout.first, 3 * layout.bytes, layout.end)?
@@ -76,14 +89,14 @@ fn read(bytes: &[u8]) -> Result<Volume<[f32; 3], Native>, NiftiProblem> {
             ),
         });
     }
-    Ok(Volume::from_data(grid, vectors))
+    Ok((Volume::from_data(grid, vectors), warnings))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Pre;
-    use crate::image::nifti::encode_vectors;
+    use crate::image::nifti::{Orientation, encode_vectors};
 
     #[test]
     fn what_itk_reads_and_what_the_standard_says_come_back_the_same() {
@@ -94,6 +107,24 @@ mod tests {
         let standard = decode_displacement(&encode_vectors(&shift), "a.nii.gz").unwrap();
         assert_eq!(itk.relabelled::<Pre>(), shift);
         assert_eq!(standard.relabelled::<Pre>(), shift);
+    }
+
+    #[test]
+    fn a_field_of_two_forms_is_read_by_the_one_that_is_chosen_and_that_is_told() {
+        let grid = Grid::<Pre>::axis_aligned([5, 4, 3], [1.0; 3], [0.0; 3]);
+        let mut bytes = Vec::new();
+        let packed = encode_displacement(&grid, |_| [1.0, 0.0, 0.0]);
+        std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut bytes).unwrap();
+        // qoffset_x of NIfTI-1, and the code that says the quaternion counts.
+        bytes[252..254].copy_from_slice(&1i16.to_le_bytes());
+        bytes[268..272].copy_from_slice(&7f32.to_le_bytes());
+        assert!(decode_displacement(&bytes, "a.nii").unwrap_err().to_string().contains("sform"));
+        for (prefer, x_mm) in [(Orientation::Sform, 0.0), (Orientation::Qform, 7.0)] {
+            let options = ReadOptions { prefer: Some(prefer), ..ReadOptions::default() };
+            let (field, told) = decode_displacement_as(&bytes, "a.nii", &options).unwrap();
+            assert!((field.grid.centre([0, 0, 0]).mm.x - x_mm).abs() < 1e-6, "{prefer}");
+            assert!(matches!(told[..], [NiftiWarning::OrientationsDiffer { asked: true, .. }]), "{told:?}");
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod orientation;
 mod warning;
 mod which;
 
-pub use displacement::{decode_displacement, encode_displacement};
+pub use displacement::{decode_displacement, decode_displacement_as, encode_displacement};
 pub use encode::{encode_f32, encode_i16, encode_intensities, encode_mask, encode_numbers, encode_u8, encode_vectors};
 pub use error::{NiftiError, NiftiProblem};
 pub use warning::NiftiWarning;

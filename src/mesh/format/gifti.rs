@@ -26,6 +26,8 @@ pub enum Space {
     Scanner,
     /// MNI 152.
     Mni152,
+    /// Talairach's by its word, which Connectome Workbench and FreeSurfer also write of surfaces in the scanner's frame.
+    Talairach,
 }
 
 impl Space {
@@ -33,7 +35,13 @@ impl Space {
         match self {
             Self::Scanner => "NIFTI_XFORM_SCANNER_ANAT",
             Self::Mni152 => "NIFTI_XFORM_MNI_152",
+            Self::Talairach => "NIFTI_XFORM_TALAIRACH",
         }
+    }
+
+    /// The frame by its name in a file; `None` for a word that names no known one.
+    pub(super) fn named(word: &str) -> Option<Self> {
+        [Self::Scanner, Self::Mni152, Self::Talairach].into_iter().find(|space| space.name() == word.trim())
     }
 }
 
@@ -118,6 +126,14 @@ fn data_array(xml: &mut String, intent: &str, number: &str, dims: &[usize], abou
 /// [`ReadError`] for a damaged file, arrays kept in another file, triangles that name nodes which are not there, and coordinates of
 /// which nobody knows where they lie.
 pub fn decode_surface(bytes: &[u8], name: &str) -> Result<TriMesh, ReadError> {
+    Ok(decode_surface_in(bytes, name)?.0)
+}
+
+/// [`decode_surface`] with the frame that the file says its coordinates are in; `None` where it says none.
+///
+/// # Errors
+/// As [`decode_surface`].
+pub fn decode_surface_in(bytes: &[u8], name: &str) -> Result<(TriMesh, Option<Space>), ReadError> {
     let arrays = arrays(bytes, name)?;
     let find = |intent: &str, what: &str| {
         arrays.iter().find(|a| a.intent == intent).ok_or_else(|| ReadError::Unsupported {
@@ -140,7 +156,8 @@ pub fn decode_surface(bytes: &[u8], name: &str) -> Result<TriMesh, ReadError> {
     if let Some(node) = nodes_mm.iter().position(|p: &[f64; 3]| p.iter().any(|x| !x.is_finite())) {
         return Err(damaged("coordinates", format!("node {node} has a coordinate that is not a finite number")));
     }
-    to_scanner(&mut nodes_mm, &points.transforms, &points.about).map_err(|problem| damaged("coordinates", problem))?;
+    let space = to_scanner(&mut nodes_mm, &points.transforms, &points.about);
+    let space = space.map_err(|problem| damaged("coordinates", problem))?;
     let mut triangles = Vec::new();
     let named = numbers(find("NIFTI_INTENT_TRIANGLE", "triangles")?, "triangles")?;
     for (t, triangle) in named.as_chunks::<3>().0.iter().enumerate() {
@@ -149,7 +166,7 @@ pub fn decode_surface(bytes: &[u8], name: &str) -> Result<TriMesh, ReadError> {
         }
         triangles.push(triangle.map(|n| n as u32));
     }
-    Ok(TriMesh { nodes_mm, triangles })
+    Ok((TriMesh { nodes_mm, triangles }, space))
 }
 
 /// The fields in the bytes of a `.shape.gii` (or `.func.gii`) file, in the file's order.

@@ -3,6 +3,8 @@
 //! FreeSurfer keeps its surfaces about the middle of its own volume and writes the way to the scanner's frame beside them, in newer
 //! versions as the format's matrix, in older ones in words of its own alone.
 
+use super::gifti::Space;
+
 const SCANNER: &str = "NIFTI_XFORM_SCANNER_ANAT";
 /// FreeSurfer's words for the middle of its volume in the scanner's frame, mm.
 const MIDDLE: [&str; 3] = ["VolGeomC_R", "VolGeomC_A", "VolGeomC_S"];
@@ -15,7 +17,7 @@ pub(super) struct Transform {
     pub matrix: String,
 }
 
-/// Takes coordinates to the scanner's frame.
+/// Takes coordinates to the scanner's frame where the file says the way there; returns the frame that it says they are in then.
 ///
 /// # Errors
 /// A matrix that is none; coordinates about FreeSurfer's middle with nothing but its words to say so, since other programs leave
@@ -24,9 +26,9 @@ pub(super) fn to_scanner(
     nodes_mm: &mut [[f64; 3]],
     transforms: &[Transform],
     about: &[(String, String)],
-) -> Result<(), String> {
+) -> Result<Option<Space>, String> {
     if transforms.iter().any(|t| t.data_space.trim() == SCANNER) {
-        return Ok(());
+        return Ok(Some(Space::Scanner));
     }
     if let Some(there) = transforms.iter().find(|t| t.transformed_space.trim() == SCANNER) {
         let m =
@@ -34,7 +36,7 @@ pub(super) fn to_scanner(
         for p in nodes_mm {
             *p = std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3]);
         }
-        return Ok(());
+        return Ok(Some(Space::Scanner));
     }
     let value = |key: &&str| about.iter().find(|(name, _)| name == key).and_then(|(_, v)| v.trim().parse::<f64>().ok());
     if MIDDLE.iter().filter_map(value).any(|c| c.abs() > 1e-3) {
@@ -42,7 +44,8 @@ pub(super) fn to_scanner(
                     the file does not say; write it with `mris_convert --to-scanner`"
             .to_owned());
     }
-    Ok(())
+    // Of the data alone: FreeSurfer writes the way to Talairach's space into files about the middle of its volume.
+    Ok(transforms.iter().find_map(|t| Space::named(&t.data_space)))
 }
 
 fn rows_of(matrix: &str) -> Option<[[f64; 4]; 4]> {
@@ -63,7 +66,7 @@ mod tests {
         };
         let about: Vec<_> = about.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let mut nodes = [[1.0, 2.0, 3.0]];
-        to_scanner(&mut nodes, &[transform], &about).map(|()| nodes[0])
+        to_scanner(&mut nodes, &[transform], &about).map(|_| nodes[0])
     }
 
     #[test]
@@ -74,6 +77,19 @@ mod tests {
         assert_eq!(moved(SCANNER, unknown, matrix, &[("VolGeomC_R", "4.0")]), Ok([1.0, 2.0, 3.0]));
         assert_eq!(moved(unknown, unknown, matrix, &[]), Ok([1.0, 2.0, 3.0]));
         assert!(moved(unknown, SCANNER, "1 0 0", &[]).unwrap_err().contains("sixteen"));
+    }
+
+    #[test]
+    fn the_frame_of_the_data_is_told_and_not_the_one_that_a_matrix_leads_to() {
+        let told = |data: &str, transformed: &str| {
+            let (data_space, transformed_space) = (format!("{data}\n"), transformed.to_owned());
+            to_scanner(&mut [], &[Transform { data_space, transformed_space, matrix: String::new() }], &[]).unwrap()
+        };
+        let (mni, talairach) = ("NIFTI_XFORM_MNI_152", "NIFTI_XFORM_TALAIRACH");
+        assert_eq!(told(mni, mni), Some(Space::Mni152));
+        assert_eq!(told(talairach, talairach), Some(Space::Talairach));
+        assert_eq!(told(SCANNER, talairach), Some(Space::Scanner));
+        assert_eq!(told("NIFTI_XFORM_UNKNOWN", talairach), None);
     }
 
     #[test]
