@@ -64,6 +64,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Asked(error) => of_asking(error),
         WorkflowError::Case(error) => return of_case(error),
         WorkflowError::Dataset(error) => return of_dataset(error),
+        WorkflowError::Cohort(CohortError::OthersCases { .. }) => "see --work-dir",
         WorkflowError::Cohort(CohortError::NobodyRun { .. }) => "run `hgm bids BIDS_DIR OUT participant` first",
         WorkflowError::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
         WorkflowError::Engine { source, .. } => of_engine(source),

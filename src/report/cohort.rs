@@ -49,7 +49,7 @@ pub struct Cohort {
     pub columns: Vec<String>,
     /// Subjects: those that did not end well first, then by their distance from the others.
     pub subjects: Vec<Row>,
-    /// Median of every column over the subjects that have it.
+    /// Median of every column over the subjects that ended well and have it.
     pub median: BTreeMap<String, f64>,
     /// Median absolute deviation from it (not scaled).
     pub mad: BTreeMap<String, f64>,
@@ -94,9 +94,11 @@ impl Cohort {
         let mut subjects: Vec<Row> = members.iter().map(|member| row(member, &mut columns)).collect();
         let (mut median_of, mut mad_of) = (BTreeMap::new(), BTreeMap::new());
         for name in &columns {
-            let values: Vec<f64> = subjects.iter().filter_map(|row| row.figures.get(name)).copied().collect();
+            // What a gate refused is shown, and says nothing of what is usual.
+            let well = subjects.iter().filter(|row| row.status == Status::Done);
+            let values: Vec<f64> = well.filter_map(|row| row.figures.get(name)).copied().collect();
             let Some((centre, spread)) = median_and_mad(&values) else { continue };
-            for row in &mut subjects {
+            for row in subjects.iter_mut().filter(|row| row.status == Status::Done) {
                 let Some(value) = row.figures.get(name) else { continue };
                 let distance = MAD_OF_GAUSSIAN * (value - centre).abs() / spread;
                 // Without spread (one subject, equal settings) nobody can be said to lie apart.
@@ -120,7 +122,8 @@ impl Cohort {
         if settings.len() > 1 {
             warnings.push(CohortWarning::OtherSettings { different: settings.len() });
         }
-        let outcomes: Vec<&ExperimentOutcome> = members.iter().filter_map(|m| m.outcome.as_ref()).collect();
+        let well = members.iter().filter(|member| member.status == Status::Done);
+        let outcomes: Vec<&ExperimentOutcome> = well.filter_map(|member| member.outcome.as_ref()).collect();
         let (median_samples, tasks) = (median_samples(&outcomes), compare_tasks(&outcomes));
         let program = concat!("hgm ", env!("CARGO_PKG_VERSION")).to_owned();
         Self {
@@ -291,6 +294,24 @@ mod tests {
         assert!((cohort.mad["rmse_margin_mm"] - 0.1).abs() < 1e-12);
         // Equal values have no spread, and nobody lies apart in them.
         assert_eq!((cohort.median["brain_shear_modulus_pa"], cohort.mad["brain_shear_modulus_pa"]), (500.0, 0.0));
+    }
+
+    #[test]
+    fn who_was_refused_by_the_gate_is_shown_and_moves_nobody_elses_figures() {
+        let well: Vec<Member> = [1.0, 1.1, 1.2, 9.0]
+            .into_iter()
+            .enumerate()
+            .map(|(n, rmse)| member(&format!("sub-{n}"), Status::Done, Some(rmse)))
+            .collect();
+        let refused = ["sub-x", "sub-y", "sub-z"].map(|name| member(name, Status::QualityGate, Some(50.0)));
+        let (alone, all) = (Cohort::new(&well), Cohort::new(&[&refused[..], &well].concat()));
+        assert_eq!((&alone.median, &alone.mad), (&all.median, &all.mad));
+        assert_eq!((&alone.median_samples, &alone.tasks), (&all.median_samples, &all.tasks));
+        let (shown, rest) = all.subjects.split_at(3);
+        assert_eq!(rest, alone.subjects);
+        for row in shown {
+            assert!(row.figures["rmse_margin_mm"] == 50.0 && row.outlying.is_empty() && row.distance == 0.0, "{row:?}");
+        }
     }
 
     #[test]

@@ -20,10 +20,17 @@ impl Args {
 }
 
 pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {
+    // A settings file that a run would refuse is refused before it.
+    settings(args, session)?;
     let place = session.place(args.cases());
     let plans = args.plans();
-    let planned = planned(&args.asked(dataset, &plans, &place), &|error| Failure::from(error).message());
-    session.emit(&json!({ "subjects": planned }), &planned_table(&planned))
+    let planned = planned(&args.asked(dataset, &plans, &place), &|error| Failure::from(error).message())?;
+    session.emit(&json!({ "subjects": planned }), &planned_table(&planned))?;
+    if planned.iter().all(|subject| subject.message.is_some()) {
+        let (count, scans) = (planned.len(), dataset.folder.display());
+        return Err(Failure::Rejected(anyhow!("{scans}: none of {count} subjects can be done, for the reasons above")));
+    }
+    Ok(())
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {

@@ -129,18 +129,23 @@ impl Dataset {
         }
     }
 
+    /// The scan of a session; `entities` choose among several, and are not asked of the only one.
     fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, DatasetError> {
         let folder = format!("{subject}/{session}/anat");
         let mut found = names(&self.folder.join(&folder)).unwrap_or_default();
         let begin = format!("{subject}_{session}_");
-        found.retain(|name| {
-            let stem = name.strip_suffix(".gz").unwrap_or(name).strip_suffix("_T1w.nii");
-            // `run-2` must not choose `run-21`.
-            let has = |stem: &str, entity: &String| {
-                if entity == NONE { is_plain(name) } else { stem.split('_').any(|part| part == entity) }
-            };
-            name.starts_with(&begin) && stem.is_some_and(|stem| entities.iter().all(|entity| has(stem, entity)))
-        });
+        let stem = |name: &str| name.strip_suffix(".gz").unwrap_or(name).strip_suffix("_T1w.nii").map(str::to_owned);
+        found.retain(|name| name.starts_with(&begin) && stem(name).is_some());
+        if found.len() > 1 {
+            found.retain(|name| {
+                let stem = stem(name).unwrap_or_default();
+                // `run-2` must not choose `run-21`.
+                let has = |entity: &String| {
+                    if entity == NONE { is_plain(name) } else { stem.split('_').any(|part| part == entity) }
+                };
+                entities.iter().all(has)
+            });
+        }
         match &found[..] {
             [one] => Ok(RawScan(format!("{folder}/{one}"))),
             [] => {
@@ -250,6 +255,24 @@ mod tests {
         let crossed = crossed.map(str::to_owned);
         assert_eq!(distinguishing(&crossed), "run-2");
         assert_eq!(distinguishing(&crossed[..2]), "run-1");
+    }
+
+    #[test]
+    fn an_entity_chooses_where_there_are_several_scans_and_is_not_asked_of_the_only_one() {
+        let (_folder, dataset) = dataset(&[
+            "sub-01/ses-preop/anat/sub-01_ses-preop_run-1_T1w.nii.gz",
+            "sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz",
+            "sub-01/ses-postop/anat/sub-01_ses-postop_T1w.nii.gz",
+            "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii.gz",
+            "sub-02/ses-postop/anat/sub-02_ses-postop_run-1_T1w.nii.gz",
+        ]);
+        let chosen = |subject: &str, entity: &str| dataset.pair(subject, &[entity.to_owned()]);
+        let pair = chosen("sub-01", "run-2").unwrap();
+        assert!(pair.pre.0.ends_with("preop_run-2_T1w.nii.gz") && pair.post.0.ends_with("postop_T1w.nii.gz"));
+        let alone = chosen("sub-02", "run-2").unwrap();
+        assert!(alone.pre.0.ends_with("preop_T1w.nii.gz") && alone.post.0.ends_with("postop_run-1_T1w.nii.gz"));
+        let absent = chosen("sub-01", "run-3").unwrap_err().to_string();
+        assert!(absent.contains("with run-3"), "{absent}");
     }
 
     #[test]

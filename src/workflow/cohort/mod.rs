@@ -50,12 +50,12 @@ pub struct Log {
     pub exit_code: u8,
 }
 
-/// Writes what lies once at the top of the derivatives.
+/// Writes what lies once at the top of the derivatives; `cases` is below which the case folders lie.
 ///
 /// # Errors
-/// [`CohortError`] when the folder cannot be made, or holds scans.
-pub fn begin(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
-    may_hold_derivatives(dataset, out)?;
+/// [`CohortError`] when the folder cannot be made, or one of the two holds scans or another program's files.
+pub fn begin(dataset: &Dataset, out: &Path, cases: &Path) -> Result<(), CohortError> {
+    may_hold_derivatives(dataset, out, cases)?;
     std::fs::create_dir_all(out).map_err(|source| CohortError::NoFolder { out: out.to_path_buf(), source })?;
     let absolute = |folder: &Path| {
         folder.canonicalize().map_err(|source| CohortError::Lost { folder: folder.to_path_buf(), source })

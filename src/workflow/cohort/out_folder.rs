@@ -1,4 +1,4 @@
-//! Where a cohort's derivatives may go: not over a data set of scans.
+//! Where a cohort's derivatives and cases may go: not over a data set of scans, nor over another program's files.
 
 use super::Dataset;
 use crate::workflow::error::CohortError;
@@ -7,25 +7,53 @@ use std::path::Path;
 
 const DESCRIPTION: &str = "dataset_description.json";
 
-/// Refuses a folder whose description and README would be replaced by those of the derivatives. Comes before anything is written.
+/// Refuses a folder whose description and README would be replaced by those of the derivatives, and a folder of cases among another's
+/// files. Comes before anything is written.
 ///
 /// # Errors
-/// [`CohortError::RawDataSet`] for the data set itself, by whatever path, and for any other that is not of derivatives.
-pub(super) fn may_hold_derivatives(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
-    let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
-    if same(out, &dataset.folder) || describes_scans(out) {
-        let instead = dataset.folder.join("derivatives/hgm");
-        return Err(CohortError::RawDataSet { out: out.to_path_buf(), instead });
+/// [`CohortError::RawDataSet`] for the data set itself, by whatever path, and for any other that is not of derivatives;
+/// [`CohortError::OthersDerivatives`] for those that hgm has not made; [`CohortError::OthersCases`] for either where the cases go.
+pub(super) fn may_hold_derivatives(dataset: &Dataset, out: &Path, cases: &Path) -> Result<(), CohortError> {
+    let (out_folder, instead) = (out.to_path_buf(), dataset.folder.join("derivatives/hgm"));
+    match holds(dataset, out) {
+        Holds::Scans => return Err(CohortError::RawDataSet { out: out_folder, instead }),
+        Holds::Others => return Err(CohortError::OthersDerivatives { out: out_folder, instead }),
+        Holds::Ours => {}
     }
-    Ok(())
+    match holds(dataset, cases) {
+        Holds::Scans | Holds::Others => Err(CohortError::OthersCases { cases: cases.to_path_buf() }),
+        Holds::Ours => Ok(()),
+    }
 }
 
-/// Whether a data set is described here as another thing than derivatives: where no type is named it is raw (BIDS 1.10), and what
-/// cannot be read is not of this program.
-fn describes_scans(folder: &Path) -> bool {
-    let Ok(bytes) = std::fs::read(folder.join(DESCRIPTION)) else { return false };
-    let kind = serde_json::from_slice(&bytes).ok().and_then(|said: Value| Some(said.get("DatasetType")?.clone()));
-    kind != Some(Value::from("derivative"))
+/// Whose files a folder holds.
+#[derive(Debug, PartialEq, Eq)]
+enum Holds {
+    /// A data set of scans.
+    Scans,
+    /// Another program's derivatives.
+    Others,
+    /// Those of hgm, or nobody's.
+    Ours,
+}
+
+/// By its description: where no type is named it is raw (BIDS 1.10), and what cannot be read is not of this program.
+fn holds(dataset: &Dataset, folder: &Path) -> Holds {
+    let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
+    if same(folder, &dataset.folder) {
+        return Holds::Scans;
+    }
+    let Ok(bytes) = std::fs::read(folder.join(DESCRIPTION)) else { return Holds::Ours };
+    let said: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+    if said["DatasetType"] != "derivative" {
+        return Holds::Scans;
+    }
+    let makers = said["GeneratedBy"].as_array();
+    if makers.is_some_and(|makers| makers.iter().any(|maker| maker["Name"] == "hgm")) {
+        Holds::Ours
+    } else {
+        Holds::Others
+    }
 }
 
 #[cfg(test)]
@@ -46,18 +74,43 @@ mod tests {
         for out in [raw.clone(), raw.join("sub-01/.."), other.clone()] {
             for described in ["{}", r#"{"Name": "two", "DatasetType": "raw"}"#, "not JSON"] {
                 std::fs::write(out.join(DESCRIPTION), described).unwrap();
-                let refused = WorkflowError::from(begin(&dataset, &out).unwrap_err());
+                let refused = WorkflowError::from(begin(&dataset, &out, &out).unwrap_err());
                 assert!(refused.kind() == ErrorKind::Rejected && refused.to_string().contains("derivatives/hgm"));
                 assert_eq!(std::fs::read_to_string(out.join(DESCRIPTION)).unwrap(), described);
                 assert!(!out.join("README").exists());
             }
             std::fs::remove_file(out.join(DESCRIPTION)).unwrap();
         }
-        assert!(begin(&dataset, &raw).is_err() && std::fs::read_dir(&raw).unwrap().count() == 1);
+        assert!(begin(&dataset, &raw, &raw).is_err() && std::fs::read_dir(&raw).unwrap().count() == 1);
         // A folder of nobody's, one of derivatives, and a second run.
         for out in [other, raw.join("derivatives/hgm"), raw.join("derivatives/hgm")] {
-            begin(&dataset, &out).unwrap();
+            begin(&dataset, &out, &out).unwrap();
             assert!(out.join("README").exists());
         }
+    }
+
+    #[test]
+    fn another_programs_derivatives_are_left_alone_and_cases_go_into_nobody_elses_folder() {
+        let all = tempfile::tempdir().unwrap();
+        let raw = all.path().join("study");
+        std::fs::create_dir_all(raw.join("sub-01")).unwrap();
+        let dataset = Dataset::open(&raw, &[]).unwrap();
+        let [others, out] = ["derivatives/smriprep", "derivatives/hgm"].map(|name| raw.join(name));
+        std::fs::create_dir_all(&others).unwrap();
+        for makers in ["", r#", "GeneratedBy": [{"Name": "sMRIPrep"}]"#] {
+            let described = format!(r#"{{"Name": "a", "DatasetType": "derivative"{makers}}}"#);
+            std::fs::write(others.join(DESCRIPTION), &described).unwrap();
+            let refused = begin(&dataset, &others, &others).unwrap_err();
+            assert!(matches!(&refused, CohortError::OthersDerivatives { .. }), "{refused}");
+            assert_eq!(std::fs::read_to_string(others.join(DESCRIPTION)).unwrap(), described);
+            assert!(!others.join("README").exists());
+        }
+        for cases in [&raw, &others] {
+            let refused = begin(&dataset, &out, cases).unwrap_err();
+            assert!(matches!(&refused, CohortError::OthersCases { .. }) && !out.exists(), "{refused}");
+        }
+        begin(&dataset, &out, &all.path().join("work")).unwrap();
+        // Its own of an earlier run are its own.
+        begin(&dataset, &out, &out).unwrap();
     }
 }

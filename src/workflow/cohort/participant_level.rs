@@ -1,5 +1,6 @@
 //! The participant level: each subject through the whole job, then its files under BIDS names.
 
+use super::out_folder::may_hold_derivatives;
 use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
 use crate::report::cohort::Status;
@@ -98,7 +99,7 @@ pub struct Ended {
     pub participant_id: String,
     /// In a word.
     pub status: Status,
-    /// Its page.
+    /// Its page, where there is one.
     pub page: Option<PathBuf>,
     /// Why it did not end well.
     pub message: Option<String>,
@@ -120,7 +121,7 @@ pub fn participants(
     progress: &mut dyn Progress,
     words: &mut dyn FnMut(&str, SubjectError) -> Log,
 ) -> Result<Vec<Ended>, WorkflowError> {
-    begin(asked.dataset, asked.out)?;
+    begin(asked.dataset, asked.out, &asked.cases.folder)?;
     let mut done = Vec::new();
     for name in &asked.dataset.subjects {
         progress.noted(name);
@@ -152,13 +153,18 @@ pub fn participants(
             }
         }
         let failed = end.status == Status::Failed;
-        end.page = (!failed).then(|| asked.out.join(format!("{called}.html")));
+        end.page = page_of(asked.out, &called, &end.status);
         done.push(end);
         if failed && asked.stop_on_first_crash {
             break;
         }
     }
     Ok(done)
+}
+
+/// A subject's page: one that failed shows none, and a gate may have stopped it before there was one.
+fn page_of(out: &Path, called: &str, status: &Status) -> Option<PathBuf> {
+    Some(out.join(format!("{called}.html"))).filter(|page| status.has_page() && page.exists())
 }
 
 fn one(
@@ -225,7 +231,14 @@ pub struct Planned {
 }
 
 /// What would be done with every subject; `words` says why one cannot be.
-pub fn planned(asked: &Participants<'_>, words: &dyn Fn(DatasetError) -> String) -> Vec<Planned> {
+///
+/// # Errors
+/// A folder that the derivatives or the cases may not go into.
+pub fn planned(
+    asked: &Participants<'_>,
+    words: &dyn Fn(DatasetError) -> String,
+) -> Result<Vec<Planned>, WorkflowError> {
+    may_hold_derivatives(asked.dataset, asked.out, &asked.cases.folder)?;
     let (dataset, entities) = (asked.dataset, asked.entities);
     let plan = |name: &String| {
         let found = match asked.work {
@@ -248,7 +261,7 @@ pub fn planned(asked: &Participants<'_>, words: &dyn Fn(DatasetError) -> String)
             message,
         }
     };
-    asked.dataset.subjects.iter().map(plan).collect()
+    Ok(asked.dataset.subjects.iter().map(plan).collect())
 }
 
 /// A line for each subject that would be done.
@@ -258,4 +271,52 @@ pub fn planned_table(planned: &[Planned]) -> String {
         format!("{:<16} {what}\n", p.participant_id)
     };
     planned.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workflow::Silent;
+
+    /// A data set of one subject without scans.
+    fn one_subject() -> (tempfile::TempDir, Dataset) {
+        let all = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(all.path().join("study/sub-01")).unwrap();
+        let dataset = Dataset::open(&all.path().join("study"), &[]).unwrap();
+        (all, dataset)
+    }
+
+    fn asked<'a>(dataset: &'a Dataset, out: &'a Path, cases: &'a Place) -> Participants<'a> {
+        let work = Work::Pair(Goal::Sweep);
+        Participants { dataset, entities: &[], work, out, cases, stop_on_first_crash: false }
+    }
+
+    #[test]
+    fn a_dry_run_refuses_the_folders_that_a_run_would_refuse() {
+        let (all, dataset) = one_subject();
+        let (raw, out) = (dataset.folder.clone(), all.path().join("out"));
+        let plan = |out: &Path, cases: &Path| planned(&asked(&dataset, out, &Place::from(cases)), &|e| e.to_string());
+        assert!(plan(&raw, &raw).is_err() && plan(&out, &raw).is_err());
+        assert_eq!(plan(&out, &out).unwrap()[0].participant_id, "sub-01");
+        assert!(!out.exists());
+    }
+
+    #[test]
+    fn a_subject_that_has_no_page_names_none() {
+        let (all, dataset) = one_subject();
+        let out = all.path().join("out");
+        let place = Place::from(out.as_path());
+        let mut words = |_: &str, error: SubjectError| Log {
+            kind: "input rejected".to_owned(),
+            message: error.to_string(),
+            exit_code: 3,
+        };
+        let settings = Settings::default();
+        let done = participants(&asked(&dataset, &out, &place), &settings, &mut Silent, &mut words).unwrap();
+        assert!(done[0].page.is_none() && done[0].fault == Some(ErrorKind::Rejected));
+        assert!(page_of(&out, "sub-02", &Status::QualityGate).is_none());
+        std::fs::write(out.join("sub-02.html"), "").unwrap();
+        assert!(page_of(&out, "sub-02", &Status::QualityGate).is_some());
+        assert!(page_of(&out, "sub-02", &Status::Failed).is_none());
+    }
 }

@@ -19,6 +19,17 @@ pub enum CohortError {
         out.display(), instead.display()
     )]
     RawDataSet { out: PathBuf, instead: PathBuf },
+    #[error(
+        "{}: holds derivatives that another program has made, whose dataset_description.json and README those of hgm would replace; \
+         name another folder, usually {}",
+        out.display(), instead.display()
+    )]
+    OthersDerivatives { out: PathBuf, instead: PathBuf },
+    #[error(
+        "{}: is a data set of scans or another program's derivatives, where no case folders may lie; name another folder for them",
+        cases.display()
+    )]
+    OthersCases { cases: PathBuf },
     #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
     Log { file: PathBuf },
     #[error("{}: no subject has been run to its end here", out.display())]

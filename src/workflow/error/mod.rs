@@ -225,7 +225,9 @@ impl WorkflowError {
         }
         match self {
             Self::QualityGate(_) | Self::Tag(TagError::Empty { .. }) => ErrorKind::QualityGate,
-            Self::Write(_)
+            // Another job's hold and a disk that does not read are no fault of a scan: the same command may go on later.
+            Self::Case(CaseError::Held { .. } | CaseError::Unreadable { .. })
+            | Self::Write(_)
             | Self::Cohort(CohortError::Write(_))
             | Self::Format(_)
             | Self::Outcome(OutcomeError { .. })
@@ -244,5 +246,18 @@ impl WorkflowError {
             Self::Estimate(ProblemError::Body(BodyError::Fem(fem))) if !fem.is_input() => ErrorKind::Failed,
             _ => ErrorKind::Rejected,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_another_job_holds_is_no_fault_of_the_input() {
+        let folder = std::path::PathBuf::from("case");
+        let held = CaseError::Held { folder: folder.clone(), holder: String::new() };
+        assert_eq!(WorkflowError::from(held).kind(), ErrorKind::Failed);
+        assert_eq!(WorkflowError::from(CaseError::NotACase { folder }).kind(), ErrorKind::Rejected);
     }
 }
