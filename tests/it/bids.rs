@@ -176,6 +176,26 @@ fn slow_a_data_set_becomes_valid_derivatives_and_one_table_and_a_subject_without
 }
 
 #[test]
+fn a_dry_run_refuses_what_a_run_would_and_a_cohort_of_whom_nobody_can_be_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::create_dir_all(at("study/sub-01")).unwrap();
+    std::fs::create_dir_all(at("other")).unwrap();
+    std::fs::write(at("other/dataset_description.json"), r#"{"Name": "o", "DatasetType": "derivative"}"#).unwrap();
+    let dry = |out: &str, more: &[&str]| {
+        let ended = output(&[&["bids", &at("study"), &at(out), "participant", "--dry-run"], more].concat());
+        (ended.status.code(), String::from_utf8_lossy(&[ended.stdout, ended.stderr].concat()).into_owned())
+    };
+    let (code, said) = dry("out", &[]);
+    assert!(code == Some(3) && said.contains("none of 1 subjects can be done"), "{said}");
+    let (code, said) = dry("other", &[]);
+    assert!(code == Some(3) && said.contains("another program has made"), "{said}");
+    let (code, said) = dry("out", &["-w", &at("study")]);
+    assert!(code == Some(3) && said.contains("--work-dir"), "{said}");
+    assert!(!Path::new(&at("out")).exists());
+}
+
+#[test]
 fn a_folder_without_subjects_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path().to_str().unwrap();

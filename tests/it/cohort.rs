@@ -98,3 +98,34 @@ fn slow_a_workflow_predicts_a_subject_before_its_pair_as_the_commands_do() {
     assert!(ended.wait().unwrap().success(), "{}", said());
     assert_same(&expected, &outs[1]);
 }
+
+#[test]
+fn slow_a_workflow_of_unusable_settings_begins_nothing_and_one_of_unusable_scans_is_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (raw, out, place) = (folder.path().join("study"), folder.path().join("out"), folder.path().join("local"));
+    for session in ["ses-preop", "ses-postop"] {
+        let anat = raw.join("sub-01").join(session).join("anat");
+        std::fs::create_dir_all(&anat).unwrap();
+        for run in [1, 2] {
+            std::fs::write(anat.join(format!("sub-01_{session}_run-{run}_T1w.nii.gz")), "no image").unwrap();
+        }
+    }
+    let ended = |settings: &Path| {
+        let more = ["entity=run-2", "shards=1"];
+        let mut child = workflow(&program(), &place, "local", (&raw, &out), settings, &more);
+        let well = child.wait().unwrap().success();
+        (well, std::fs::read_to_string(place.join("snakemake.log")).unwrap())
+    };
+    let misspelt = folder.path().join("misspelt.toml");
+    std::fs::write(&misspelt, "[resection]\ntissue = 1\n").unwrap();
+    let (well, said) = ended(&misspelt);
+    assert!(!well && said.contains("misspelt.toml") && said.contains("tissue"), "{said}");
+    assert!(!out.join(".cohort/sub-01").exists(), "{said}");
+    // Both calls come as far as the group, which has nobody.
+    for _ in 0..2 {
+        let (well, said) = ended(Path::new(CHEAP[1]));
+        assert!(!well && said.contains("rule prep:") && said.contains("no subject has been run"), "{said}");
+        assert!(out.join("logs/sub-01.json").exists() && !out.join(".cohort/group").exists());
+        assert_eq!(std::fs::read_to_string(out.join(".cohort/sub-01/reported")).unwrap().trim(), "3");
+    }
+}
