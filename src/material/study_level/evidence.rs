@@ -132,7 +132,7 @@ impl Grids {
 }
 
 /// The task that tells how widely a publication may differ: healthy tissue where it speaks of any.
-pub(super) fn leading(tasks: &[Task]) -> Task {
+fn leading(tasks: &[Task]) -> Task {
     let healthy = tasks.iter().find(|task| task.region != Region::Abnormal);
     *healthy.unwrap_or(&tasks[0])
 }

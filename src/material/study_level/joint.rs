@@ -1,7 +1,7 @@
 //! Several tissues of one person, or one laboratory's curves of several tissues: they go together.
 
 use super::basis::{Basis, SIZE};
-use super::evidence::{MeanPosterior, leading};
+use super::evidence::MeanPosterior;
 use super::predict::Of;
 use super::spreads::{NUGGET, Part, Spreads};
 use super::study::Coefficients;
@@ -23,8 +23,8 @@ pub struct JointPrediction {
     nugget: f64,
 }
 
-/// Predicts these tasks together: a publication's part is the same in all of them, scaled as each task has it; a curve's
-/// part is a tissue's own.
+/// Predicts these tasks together: a publication's part is the same in all of them, scaled as each task has it (abnormal tissue
+/// and linear tests have spreads of their own); a curve's part is a tissue's own. Each task alone is as [`super::predict`] has it.
 pub fn predict_jointly(
     means: &MeanPosterior,
     spreads: &Spreads,
@@ -35,13 +35,13 @@ pub fn predict_jointly(
     let n = tasks.len() * SIZE;
     let mut coefficients = DVector::zeros(n);
     let mut covariance = DMatrix::zeros(n, n);
-    let (shared, _) = spreads.deviations(Part::Publication, leading(tasks));
+    let shared: Vec<[f64; SIZE]> = tasks.iter().map(|task| spreads.deviations(Part::Publication, *task).0).collect();
     for (i, one) in tasks.iter().enumerate() {
         coefficients.rows_mut(i * SIZE, SIZE).copy_from(&means.of(*one).0);
         for (j, other) in tasks.iter().enumerate() {
             covariance.view_mut((i * SIZE, j * SIZE), (SIZE, SIZE)).copy_from(&means.between(*one, *other));
             if of.parts().contains(&Part::Publication) {
-                (0..SIZE).for_each(|f| covariance[(i * SIZE + f, j * SIZE + f)] += shared[f] * shared[f]);
+                (0..SIZE).for_each(|f| covariance[(i * SIZE + f, j * SIZE + f)] += shared[i][f] * shared[j][f]);
             }
         }
         if of.parts().contains(&Part::Curve) {

@@ -58,7 +58,8 @@ pub struct Studies {
 
 impl Studies {
     /// From literature models. Points at rest, where W is zero, say nothing and are left out; so is a point whose
-    /// energy is not positive, which no modulus explains.
+    /// energy is not positive, which no modulus explains. Studies without a citation are a publication each: nothing says that one
+    /// laboratory made them.
     pub fn from_literature(models: &[LiteratureModel], curves: Curves) -> Self {
         let mut publications: Vec<(String, Vec<StudyCurve>)> = Vec::new();
         for model in models {
@@ -67,9 +68,13 @@ impl Studies {
             let seen = points.filter(|(l, w)| (*l - 1.0).abs() > 1e-9 && **w > 0.0);
             let (strains, log_moduli) = seen.map(|(l, w)| (l.ln(), log_modulus(*l, *w))).unzip();
             let study = StudyCurve::new(model.id, model.task, strains, log_moduli);
-            match publications.iter_mut().find(|(name, _)| *name == model.citation) {
+            let publication = match model.citation.trim() {
+                "" => format!("own study {}", model.id),
+                citation => citation.to_owned(),
+            };
+            match publications.iter_mut().find(|(name, _)| *name == publication) {
                 Some((_, curves)) => curves.push(study),
-                None => publications.push((model.citation.clone(), vec![study])),
+                None => publications.push((publication, vec![study])),
             }
         }
         Self { publications }

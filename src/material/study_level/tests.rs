@@ -25,6 +25,19 @@ fn few() -> Studies {
     studies
 }
 
+#[test]
+fn studies_without_a_citation_are_a_publication_each() {
+    let mut models = table();
+    models.truncate(3);
+    for (model, citation) in models.iter_mut().zip(["", "  ", "Somebody 2026"]) {
+        model.citation = citation.to_owned();
+    }
+    let ids = [models[0].id, models[1].id];
+    let studies = Studies::from_literature(&models, Curves::Corrected);
+    let names: Vec<&str> = studies.publications.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, [&format!("own study {}", ids[0]), &format!("own study {}", ids[1]), "Somebody 2026"]);
+}
+
 /// ln N(y; mean, F_m P F_m^T + F_u R F_u^T + F_v D F_v^T + nugget^2 I), written out.
 fn dense_log_likelihood(studies: &Studies, spreads: &Spreads) -> f64 {
     use super::basis::{LEVEL, SIZE};
@@ -165,6 +178,26 @@ fn a_tissue_drawn_with_others_has_the_law_it_has_alone_and_they_go_together() {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     // One laboratory's level is in both.
     assert!(dot(&grey, &white) / (dot(&grey, &grey) * dot(&white, &white)).sqrt() > 0.3);
+}
+
+#[test]
+fn every_task_among_all_has_the_spread_it_has_alone() {
+    let spreads = Spreads::default();
+    let means = Evidence::new(&literature(), &spreads).unwrap().means;
+    let tasks: Vec<Task> = Task::all().collect();
+    for of in [Of::Laboratory, Of::Person] {
+        let joint = predict_jointly(&means, &spreads, &tasks, of, 3);
+        let draws: Vec<Vec<Vec<f64>>> = (0..3000).map(|n| joint.draw(5, n)).collect();
+        for (t, task) in tasks.iter().enumerate() {
+            let alone = predict(&means, &spreads, *task, of, &joint.stretches[t]);
+            for n in 0..3 {
+                let mean = draws.iter().map(|d| d[t][n]).sum::<f64>() / 3000.0;
+                let sd = (draws.iter().map(|d| (d[t][n] - mean).powi(2)).sum::<f64>() / 2999.0).sqrt();
+                assert!((mean - alone.mean[n]).abs() < 4.5 * alone.sd[n] / 3000f64.sqrt(), "{of:?} {task} {n}");
+                assert!((sd / alone.sd[n] - 1.0).abs() < 4.5 / 6000f64.sqrt(), "{of:?} {task} {n}: {sd} {}", alone.sd[n]);
+            }
+        }
+    }
 }
 
 #[test]
