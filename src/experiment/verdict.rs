@@ -175,6 +175,27 @@ pub enum Reason {
         /// From and to, Pa.
         pa: [f64; 2],
     },
+    /// Only one modulus was tried: that it is the best says nothing.
+    OneTried {
+        /// The tissue.
+        tissue: String,
+        /// It, Pa.
+        tried_pa: f64,
+    },
+    /// The softest sample that was tried cannot be told from the best: the lower end of the range is that of what was tried.
+    SoftestAsGood {
+        /// The tissue.
+        tissue: String,
+        /// Its modulus, Pa.
+        tried_pa: f64,
+    },
+    /// The stiffest sample that was tried cannot be told from the best: the upper end of the range is that of what was tried.
+    StiffestAsGood {
+        /// The tissue.
+        tissue: String,
+        /// Its modulus, Pa.
+        tried_pa: f64,
+    },
     /// The data add little to what was known of a parameter.
     LittleSaid {
         /// The parameter.
@@ -288,6 +309,21 @@ impl Reason {
                 "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
             ),
             Self::AsGood { tissue, pa } => format!("{}: {} cannot be told apart", words(tissue), range(*pa)),
+            Self::OneTried { tissue, tried_pa } => format!(
+                "{}: no modulus but {} Pa was tried, and nothing is claimed of it; give two levels or more",
+                words(tissue),
+                pa(*tried_pa)
+            ),
+            Self::SoftestAsGood { tissue, tried_pa } => format!(
+                "{}: the softest sample tried ({} Pa) is as good as the best: softer ones were not tried",
+                words(tissue),
+                pa(*tried_pa)
+            ),
+            Self::StiffestAsGood { tissue, tried_pa } => format!(
+                "{}: the stiffest sample tried ({} Pa) is as good as the best: stiffer ones were not tried",
+                words(tissue),
+                pa(*tried_pa)
+            ),
             Self::Phantom { best, nearest } if best == nearest => {
                 format!("{best} explains the reference best and has the moduli nearest to its own")
             }
@@ -469,14 +505,14 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
             capitalised(&intervals)
         ),
         Finding::Identified => format!("The model explains the shift{percent}: {intervals}."),
-        Finding::Better if ranges.is_empty() => "A sample explains the surfaces better than rest does.".to_owned(),
+        Finding::Better if ranges.is_empty() => {
+            format!("A sample explains the surfaces better than rest does.{}", limits_of_tried(reasons))
+        }
         Finding::Better => {
             let against = |r: &&Reason| matches!(r, Reason::Surface { .. });
             let rest = reasons.iter().find(against).map(|r| format!(" ({})", r.sentence())).unwrap_or_default();
-            let failed = reasons.iter().filter(|r| matches!(r, Reason::WithoutEquilibrium { .. }));
-            let failed: Vec<String> = failed.map(|r| format!(" {}.", capitalised(&r.sentence()))).collect();
-            let failed = failed.concat();
-            format!("Better than rest{rest}; samples as good as the best have {ranges}.{failed}")
+            let limits = limits_of_tried(reasons);
+            format!("Better than rest{rest}; samples as good as the best have {ranges}.{limits}")
         }
         Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
         Finding::Worse => format!("Every sample is further away than rest ({first}). No stiffness is claimed."),
@@ -491,6 +527,20 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         }
         Finding::Nothing => "Prepared only: nothing was simulated, and no stiffness is claimed.".to_owned(),
     }
+}
+
+/// What was not tried, or was and has failed: no range is without it.
+fn limits_of_tried(reasons: &[Reason]) -> String {
+    let limits = reasons.iter().filter(|reason| {
+        matches!(
+            reason,
+            Reason::OneTried { .. }
+                | Reason::SoftestAsGood { .. }
+                | Reason::StiffestAsGood { .. }
+                | Reason::WithoutEquilibrium { .. }
+        )
+    });
+    limits.map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect()
 }
 
 fn capitalised(text: &str) -> String {

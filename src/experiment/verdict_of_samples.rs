@@ -60,9 +60,10 @@ fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
         let finding = if found { Finding::Recovered } else { Finding::NotRecovered };
         return Verdict::new(finding, None, moduli, reasons);
     }
+    let (moduli, limits) = within_tried(outcome, moduli);
     let Some(&rest_mm) = outcome.rest_rmse_mm.get(set) else {
         // Without rest to be compared with, the samples are compared with each other.
-        return Verdict::new(Finding::Better, None, moduli, failed.into_iter().collect());
+        return Verdict::new(Finding::Better, None, moduli, limits.into_iter().chain(failed).collect());
     };
     let finding = Finding::against_rest(rest_mm, deformed_mm, floor_mm);
     let mut reasons = vec![Reason::Surface { set: set.to_owned(), rest_mm, deformed_mm, floor_mm }];
@@ -71,8 +72,9 @@ fn of_samples(outcome: &ExperimentOutcome) -> Verdict {
             reasons.push(Reason::AsGood { tissue: tissue.clone(), pa: *range_pa });
         }
     }
-    reasons.extend(failed);
     // What is no better than rest says nothing of the stiffness.
+    reasons.extend(limits.into_iter().filter(|_| finding == Finding::Better));
+    reasons.extend(failed);
     let moduli = if finding == Finding::Better { moduli } else { Vec::new() };
     Verdict::new(finding, None, moduli, reasons)
 }
@@ -90,14 +92,41 @@ pub fn nearest_to_reference(outcome: &ExperimentOutcome) -> Option<&SampleOutcom
 
 /// A phantom's moduli beyond all of its samples': of those the nearest is the best one, and finds nothing again.
 fn out_of_reach(outcome: &ExperimentOutcome) -> Vec<Reason> {
-    let tried = |tissue: &str| {
-        let samples = outcome.samples.iter().filter(|s| s.id != REFERENCE && s.converged);
-        let moduli = samples.filter_map(|s| s.shear_modulus_pa.get(tissue).copied());
-        moduli.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], m| [low.min(m), high.max(m)])
-    };
-    let own = outcome.reference_shear_modulus_pa.iter().map(|(tissue, pa)| (tissue, *pa, tried(tissue)));
+    let own = outcome.reference_shear_modulus_pa.iter().map(|(tissue, pa)| (tissue, *pa, tried(outcome, tissue)));
     let beyond = own.filter(|(_, pa, [low, high])| low <= high && !(low..=high).contains(&pa));
     beyond.map(|(tissue, own_pa, tried_pa)| Reason::OutOfReach { tissue: tissue.clone(), own_pa, tried_pa }).collect()
+}
+
+/// From the softest to the stiffest modulus of a tissue that was tried, of the samples with an equilibrium.
+fn tried(outcome: &ExperimentOutcome, tissue: &str) -> [f64; 2] {
+    let samples = outcome.samples.iter().filter(|s| s.id != REFERENCE && s.converged);
+    let moduli = samples.filter_map(|s| s.shear_modulus_pa.get(tissue).copied());
+    moduli.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], m| [low.min(m), high.max(m)])
+}
+
+/// What may be claimed of ranges, and where they end only because nothing beyond was tried: one modulus alone is the prior's,
+/// however well it does, and an end of what was tried is no bound that the scans give.
+fn within_tried(outcome: &ExperimentOutcome, moduli: Vec<(String, Claim)>) -> (Vec<(String, Claim)>, Vec<Reason>) {
+    /// Moduli that differ by less, relative to themselves, are one.
+    const SAME: f64 = 1e-9;
+    let mut limits = Vec::new();
+    let mut claim = |(tissue, claim): (String, Claim)| {
+        let Claim::Range { range_pa: [low, high] } = claim else { return (tissue, claim) };
+        let [softest, stiffest] = tried(outcome, &tissue);
+        if stiffest - softest <= SAME * stiffest {
+            limits.push(Reason::OneTried { tissue: tissue.clone(), tried_pa: softest });
+            return (tissue, Claim::Withheld);
+        }
+        if low <= softest * (1.0 + SAME) {
+            limits.push(Reason::SoftestAsGood { tissue: tissue.clone(), tried_pa: softest });
+        }
+        if high >= stiffest * (1.0 - SAME) {
+            limits.push(Reason::StiffestAsGood { tissue: tissue.clone(), tried_pa: stiffest });
+        }
+        (tissue, claim)
+    };
+    let moduli = moduli.into_iter().map(&mut claim).collect();
+    (moduli, limits)
 }
 
 /// The range of moduli of the samples whose error at `set` is not above `limit_mm`, tissue by tissue.
@@ -146,6 +175,31 @@ mod tests {
         assert_eq!(still.finding, Finding::NotDistinguishable);
         assert!(still.sentence.contains("No stiffness"), "{}", still.sentence);
         assert_eq!(of_samples(&swept(0.5, &[(300.0, 1.2), (500.0, 1.0)])).finding, Finding::Worse);
+    }
+
+    #[test]
+    fn an_end_of_what_was_tried_is_told_and_one_modulus_alone_is_no_answer() {
+        let reasons = |samples: &[(f64, f64)]| of_samples(&swept(3.0, samples)).reasons;
+        let ends = |reasons: &[Reason]| {
+            let has = |is: &dyn Fn(&Reason) -> bool| reasons.iter().any(is);
+            [
+                has(&|r| matches!(r, Reason::SoftestAsGood { .. })),
+                has(&|r| matches!(r, Reason::StiffestAsGood { .. })),
+            ]
+        };
+        assert_eq!(ends(&reasons(&[(200.0, 2.5), (500.0, 1.0), (900.0, 1.2), (2000.0, 2.5)])), [false, false]);
+        assert_eq!(ends(&reasons(&[(200.0, 1.1), (500.0, 1.0), (900.0, 1.2), (2000.0, 2.5)])), [true, false]);
+        let all = of_samples(&swept(3.0, &[(525.0, 1.1), (1000.0, 1.0), (2299.0, 1.2)]));
+        assert_eq!(ends(&all.reasons), [true, true]);
+        assert_eq!(all.moduli, [("brain".to_owned(), Claim::Range { range_pa: [525.0, 2299.0] })]);
+        assert!(all.sentence.contains("softer ones were not tried"), "{}", all.sentence);
+        assert!(all.sentence.contains("stiffer ones were not tried"), "{}", all.sentence);
+        let mut alone = swept(3.0, &[(1100.0, 1.0)]);
+        alone.best_sample = Some("sample-00".to_owned());
+        let alone = of_samples(&alone);
+        assert_eq!(alone.finding, Finding::Better);
+        assert_eq!(alone.moduli, [("brain".to_owned(), Claim::Withheld)]);
+        assert!(alone.sentence.contains("no modulus but 1,100 Pa was tried"), "{}", alone.sentence);
     }
 
     #[test]

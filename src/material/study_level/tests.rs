@@ -34,8 +34,8 @@ fn studies_without_a_citation_are_a_publication_each() {
     }
     let ids = [models[0].id, models[1].id];
     let studies = Studies::from_literature(&models, Curves::Corrected);
-    let names: Vec<&str> = studies.publications.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, [&format!("own study {}", ids[0]), &format!("own study {}", ids[1]), "Somebody 2026"]);
+    let names: Vec<String> = studies.publications.into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names, [format!("own study {}", ids[0]), format!("own study {}", ids[1]), "Somebody 2026".to_owned()]);
 }
 
 /// ln N(y; mean, F_m P F_m^T + F_u R F_u^T + F_v D F_v^T + nugget^2 I), written out.
