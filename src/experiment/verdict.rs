@@ -182,19 +182,14 @@ pub enum Reason {
         /// It, Pa.
         tried_pa: f64,
     },
-    /// The softest sample that was tried cannot be told from the best: the lower end of the range is that of what was tried.
-    SoftestAsGood {
+    /// The range of the samples as good as the best ends only where what was tried does.
+    EndOfTried {
         /// The tissue.
         tissue: String,
-        /// Its modulus, Pa.
+        /// The end, Pa.
         tried_pa: f64,
-    },
-    /// The stiffest sample that was tried cannot be told from the best: the upper end of the range is that of what was tried.
-    StiffestAsGood {
-        /// The tissue.
-        tissue: String,
-        /// Its modulus, Pa.
-        tried_pa: f64,
+        /// Whether it is the upper one.
+        stiffest: bool,
     },
     /// The data add little to what was known of a parameter.
     LittleSaid {
@@ -309,21 +304,14 @@ impl Reason {
                 "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
             ),
             Self::AsGood { tissue, pa } => format!("{}: {} cannot be told apart", words(tissue), range(*pa)),
-            Self::OneTried { tissue, tried_pa } => format!(
-                "{}: no modulus but {} Pa was tried, and nothing is claimed of it; give two levels or more",
-                words(tissue),
-                pa(*tried_pa)
-            ),
-            Self::SoftestAsGood { tissue, tried_pa } => format!(
-                "{}: the softest sample tried ({} Pa) is as good as the best: softer ones were not tried",
-                words(tissue),
-                pa(*tried_pa)
-            ),
-            Self::StiffestAsGood { tissue, tried_pa } => format!(
-                "{}: the stiffest sample tried ({} Pa) is as good as the best: stiffer ones were not tried",
-                words(tissue),
-                pa(*tried_pa)
-            ),
+            Self::OneTried { tissue, tried_pa } => {
+                let (tissue, pa) = (words(tissue), pa(*tried_pa));
+                format!("{tissue}: no modulus but {pa} Pa was tried, and nothing is claimed of it; give two levels or more")
+            }
+            Self::EndOfTried { tissue, tried_pa, stiffest } => {
+                let (tissue, pa, way) = (words(tissue), pa(*tried_pa), if *stiffest { "stiff" } else { "soft" });
+                format!("{tissue}: the {way}est sample tried ({pa} Pa) is as good as the best: {way}er ones were not tried")
+            }
             Self::Phantom { best, nearest } if best == nearest => {
                 format!("{best} explains the reference best and has the moduli nearest to its own")
             }
@@ -531,15 +519,9 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
 
 /// What was not tried, or was and has failed: no range is without it.
 fn limits_of_tried(reasons: &[Reason]) -> String {
-    let limits = reasons.iter().filter(|reason| {
-        matches!(
-            reason,
-            Reason::OneTried { .. }
-                | Reason::SoftestAsGood { .. }
-                | Reason::StiffestAsGood { .. }
-                | Reason::WithoutEquilibrium { .. }
-        )
-    });
+    use Reason::{EndOfTried, OneTried, WithoutEquilibrium};
+    let limits =
+        reasons.iter().filter(|r| matches!(r, OneTried { .. } | EndOfTried { .. } | WithoutEquilibrium { .. }));
     limits.map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect()
 }
 

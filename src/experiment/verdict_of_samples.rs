@@ -118,10 +118,10 @@ fn within_tried(outcome: &ExperimentOutcome, moduli: Vec<(String, Claim)>) -> (V
             return (tissue, Claim::Withheld);
         }
         if low <= softest * (1.0 + SAME) {
-            limits.push(Reason::SoftestAsGood { tissue: tissue.clone(), tried_pa: softest });
+            limits.push(Reason::EndOfTried { tissue: tissue.clone(), tried_pa: softest, stiffest: false });
         }
         if high >= stiffest * (1.0 - SAME) {
-            limits.push(Reason::StiffestAsGood { tissue: tissue.clone(), tried_pa: stiffest });
+            limits.push(Reason::EndOfTried { tissue: tissue.clone(), tried_pa: stiffest, stiffest: true });
         }
         (tissue, claim)
     };
@@ -181,11 +181,8 @@ mod tests {
     fn an_end_of_what_was_tried_is_told_and_one_modulus_alone_is_no_answer() {
         let reasons = |samples: &[(f64, f64)]| of_samples(&swept(3.0, samples)).reasons;
         let ends = |reasons: &[Reason]| {
-            let has = |is: &dyn Fn(&Reason) -> bool| reasons.iter().any(is);
-            [
-                has(&|r| matches!(r, Reason::SoftestAsGood { .. })),
-                has(&|r| matches!(r, Reason::StiffestAsGood { .. })),
-            ]
+            let has = |end: bool| reasons.iter().any(|r| matches!(r, Reason::EndOfTried { stiffest, .. } if *stiffest == end));
+            [has(false), has(true)]
         };
         assert_eq!(ends(&reasons(&[(200.0, 2.5), (500.0, 1.0), (900.0, 1.2), (2000.0, 2.5)])), [false, false]);
         assert_eq!(ends(&reasons(&[(200.0, 1.1), (500.0, 1.0), (900.0, 1.2), (2000.0, 2.5)])), [true, false]);

@@ -58,7 +58,7 @@ pub fn joint_posterior(
     stretches: &[f64],
 ) -> JointPosterior {
     let smoothed = smooth(parameters, data, task, stretches);
-    let noise = parameters.noise_variance[task.index()];
+    let noise = parameters.observation_variance(task.index());
     let prior = smoothed.prior(task, stretches, noise);
     let between_stops = covariances(&smoothed, parameters, data, task.index());
     let column = |stop: &usize| smoothed.passed[..*stop].iter().filter(|passed| passed.is_some()).count();

@@ -186,6 +186,6 @@ impl Smoothed {
 
 /// Posterior of one task at these stretches, in any order.
 pub fn posterior(parameters: &Hyperparameters, data: &TrainingData, task: Task, stretches: &[f64]) -> TissuePrior {
-    let noise = parameters.noise_variance[task.index()];
+    let noise = parameters.observation_variance(task.index());
     smooth(parameters, data, task, stretches).prior(task, stretches, noise)
 }

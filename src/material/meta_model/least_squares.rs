@@ -339,7 +339,8 @@ pub(super) fn minimise<const N: usize>(
         }
         let model = Model { gradient: scaled(&gradient, &d), hessian };
         let theta = (1.0 - steepness).max(0.995);
-        let finished = loop {
+        // Whether it is at an end, and met a tolerance there.
+        let (finished, met) = loop {
             let newton = model.within(reach, &mut damping, residuals.len());
             let (step, step_h, promised) = choose_step(&model, bounds, &x, &d, newton, reach, theta);
             let next = bounds.next_inside(&std::array::from_fn(|i| x[i] + step[i]));
@@ -351,7 +352,7 @@ pub(super) fn minimise<const N: usize>(
             if !new_cost.is_finite() {
                 reach = 0.25 * length_h;
                 if evaluations >= evaluations_limit || reach == 0.0 {
-                    break true;
+                    break (true, false);
                 }
                 continue;
             }
@@ -374,15 +375,15 @@ pub(super) fn minimise<const N: usize>(
                 x = next;
                 cost = new_cost;
                 std::mem::swap(&mut residuals, &mut trial);
-                break finished;
+                break (finished, finished);
             }
             if finished || evaluations >= evaluations_limit {
-                break finished;
+                break (finished, finished);
             }
         };
         radius = Some(reach);
         if finished {
-            return Solution { parameters: x, cost, residuals, evaluations, converged: true };
+            return Solution { parameters: x, cost, residuals, evaluations, converged: met };
         }
     }
 }

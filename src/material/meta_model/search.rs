@@ -109,6 +109,28 @@ pub enum FitError {
     /// All at rest.
     #[error("all stretches are 1: nothing is deformed, so no modulus can be found; give rows of a deformed sample")]
     AllAtRest,
+    /// Rows at too few stretches.
+    #[error(
+        "{found} stretches besides 1 differ, and {model} has {needed} parameters: they would not be determined; give rows at {needed} \
+         stretches or more"
+    )]
+    TooFewStretches {
+        /// Different stretches away from rest.
+        found: usize,
+        /// The law.
+        model: MetaModel,
+        /// Its parameters.
+        needed: usize,
+    },
+    /// All energies zero.
+    #[error("all energies are 0: no modulus can be found; give rows with energy")]
+    NoEnergy,
+    /// Parameters that go together.
+    #[error("the rows do not determine the parameters of {model}: give rows at more stretches, or fit a law of fewer parameters")]
+    Undetermined {
+        /// The law.
+        model: MetaModel,
+    },
     /// All stresses zero.
     #[error("all stresses are 0: no modulus can be found; give rows with load")]
     NoStress,
@@ -160,15 +182,29 @@ fn fit_quantity(problem: &Problem) -> Result<Fit, FitError> {
             return Err(FitError::Point { index, stretch: *stretch, target: *target });
         }
     }
-    if stretches.iter().all(|l| (l - 1.0).abs() < 1e-9) {
+    let mut deformed: Vec<f64> = stretches.iter().copied().filter(|l| (l - 1.0).abs() > 1e-9).collect();
+    if deformed.is_empty() {
         return Err(FitError::AllAtRest);
     }
-    match model.parameter_names().len() {
-        1 => Ok(report(problem, best_of::<1>(problem))),
-        2 => Ok(report(problem, best_of::<2>(problem))),
-        MOST_PARAMETERS => Ok(report(problem, best_of::<MOST_PARAMETERS>(problem))),
-        count => Err(FitError::TooManyParameters { model, count }),
+    if let Quantity::LogEnergy { offset_pa } = problem.quantity
+        && targets.iter().all(|target| target.exp() - offset_pa <= 1e-9 * offset_pa)
+    {
+        return Err(FitError::NoEnergy);
     }
+    deformed.sort_by(f64::total_cmp);
+    deformed.dedup_by(|a, b| (*a - *b).abs() <= 1e-9);
+    let needed = needed - 1;
+    if deformed.len() < needed {
+        return Err(FitError::TooFewStretches { found: deformed.len(), model, needed });
+    }
+    let found = match model.parameter_names().len() {
+        1 => report(problem, best_of::<1>(problem)),
+        2 => report(problem, best_of::<2>(problem)),
+        MOST_PARAMETERS => report(problem, best_of::<MOST_PARAMETERS>(problem)),
+        count => return Err(FitError::TooManyParameters { model, count }),
+    };
+    // A valley without an end has no inverse.
+    if found.covariance.iter().flatten().all(|c| c.is_finite()) { Ok(found) } else { Err(FitError::Undetermined { model }) }
 }
 
 /// What is compared with the targets.

@@ -165,6 +165,13 @@ fn points_that_determine_nothing_are_refused() {
     assert_eq!(fit(model, &[1.0; 5], &[1.0; 5], &exact()), Err(FitError::AllAtRest));
     let bad = fit(model, &[0.9, 1.0, -1.1], &[1.0, 2.0, 3.0], &exact());
     assert!(matches!(bad, Err(FitError::Point { index: 2, .. })));
+    let nothing = [OFFSET.ln(); 5];
+    let l = stretches(0.8, 1.2, 5);
+    assert_eq!(fit(MetaModel::NEO_HOOKEAN, &l, &nothing, &exact()), Err(FitError::NoEnergy));
+    let one = fit(model, &[1.1; 3], &[1.0, 1.01, 0.99], &exact());
+    assert_eq!(one, Err(FitError::TooFewStretches { found: 1, model, needed: 2 }));
+    assert!(fit(MetaModel::NEO_HOOKEAN, &[1.1; 3], &[1.0, 1.01, 0.99], &exact()).is_ok());
+    assert!(one.unwrap_err().to_string().contains("give rows at 2"));
 }
 
 #[test]
