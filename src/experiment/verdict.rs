@@ -499,8 +499,7 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         Finding::Better => {
             let against = |r: &&Reason| matches!(r, Reason::Surface { .. });
             let rest = reasons.iter().find(against).map(|r| format!(" ({})", r.sentence())).unwrap_or_default();
-            let limits = limits_of_tried(reasons);
-            format!("Better than rest{rest}; samples as good as the best have {ranges}.{limits}")
+            format!("Better than rest{rest}; samples as good as the best have {ranges}.{}", limits_of_tried(reasons))
         }
         Finding::NotDistinguishable => format!("No sample can be told from rest ({first}). No stiffness is claimed."),
         Finding::Worse => format!("Every sample is further away than rest ({first}). No stiffness is claimed."),
@@ -520,9 +519,8 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
 /// What was not tried, or was and has failed: no range is without it.
 fn limits_of_tried(reasons: &[Reason]) -> String {
     use Reason::{EndOfTried, OneTried, WithoutEquilibrium};
-    let limits =
-        reasons.iter().filter(|r| matches!(r, OneTried { .. } | EndOfTried { .. } | WithoutEquilibrium { .. }));
-    limits.map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect()
+    let limit = |r: &&Reason| matches!(r, OneTried { .. } | EndOfTried { .. } | WithoutEquilibrium { .. });
+    reasons.iter().filter(limit).map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect()
 }
 
 fn capitalised(text: &str) -> String {

@@ -19,16 +19,25 @@ pub struct Sampled {
     pub fit: Fit,
 }
 
-/// How the shear moduli of some materials are spread.
+/// How the shear moduli of some materials are spread. Levels are chosen and not drawn: they have ends, and no quantiles. A tail
+/// of draws is told only where one of them or more is expected to lie in it.
 pub fn quantiles(sampled: &[Sampled]) -> serde_json::Value {
     let mut moduli: Vec<f64> = sampled.iter().map(|s| s.fit.shear_modulus_pa).collect();
     moduli.sort_by(f64::total_cmp);
     let at = |p: f64| moduli[((moduli.len() - 1) as f64 * p).round() as usize];
-    json!({
+    let mut told = json!({
         "count": moduli.len(), "stable": sampled.iter().filter(|s| s.fit.stability.everywhere()).count(),
-        "lowest": at(0.0), "p2.5": at(0.025), "p16": at(0.16), "median": at(0.5), "p84": at(0.84), "p97.5": at(0.975),
-        "highest": at(1.0),
-    })
+        "lowest": at(0.0), "median": at(0.5), "highest": at(1.0),
+    });
+    if sampled.iter().all(|s| s.draw.is_some()) {
+        for (low, high, tail) in [("p2.5", "p97.5", 0.025), ("p16", "p84", 0.16)] {
+            if moduli.len() as f64 * tail >= 1.0 {
+                told[low] = json!(at(tail));
+                told[high] = json!(at(1.0 - tail));
+            }
+        }
+    }
+    told
 }
 
 /// A line per material.
@@ -131,4 +140,33 @@ pub fn moduli_text(rows: &[TaskModuli], tests: &[(String, Comparison)]) -> Strin
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::meta_model::{MetaModelSettings, fit};
+    use crate::material::task::stretches;
+
+    #[test]
+    fn levels_have_no_quantiles_and_draws_only_those_that_they_are_enough_for() {
+        let model = MetaModel::NEO_HOOKEAN;
+        let l = stretches(0.8, 1.2, 21);
+        let material = |n: u64| {
+            let targets: Vec<f64> = l.iter().map(|l| (model.energy_pa(&[100.0 + n as f64], *l) + 1e-3).ln()).collect();
+            fit(model, &l, &targets, &MetaModelSettings::default()).unwrap()
+        };
+        let drawn = |count: u64| {
+            let draws = (0..count).map(|n| Sampled { sd_level: None, draw: Some(n), fit: material(n) });
+            quantiles(&draws.collect::<Vec<_>>())
+        };
+        let levels = (0..9).map(|n| Sampled { sd_level: Some(n as f64), draw: None, fit: material(n) });
+        let of_levels = quantiles(&levels.collect::<Vec<_>>());
+        let told = |of: &serde_json::Value| ["p2.5", "p16", "p84", "p97.5"].map(|name| of[name].is_number());
+        assert_eq!(told(&of_levels), [false; 4]);
+        assert!(of_levels["median"].is_number() && of_levels["highest"].is_number());
+        assert_eq!(told(&drawn(3)), [false; 4]);
+        assert_eq!(told(&drawn(7)), [false, true, true, false]);
+        assert_eq!(told(&drawn(40)), [true; 4]);
+    }
 }

@@ -173,15 +173,17 @@ pub fn materials(facts: &Value) -> String {
     }
     let q = &facts["shear_modulus_pa"];
     let pa = |name: &str| number(&q[name]);
+    // A tail that too few draws were made for is not in the figures.
+    let between = |share: &str, low: &str, high: &str| {
+        let told = q[low].is_number().then(|| format!(", {share} % in {:.1} to {:.1}", pa(low), pa(high)));
+        told.unwrap_or_default()
+    };
     format!(
-        "{} draws, {} fitted by a law stable at every stretch\nshear modulus: median {:.1} Pa, 68 % in {:.1} to \
-         {:.1}, 95 % in {:.1} to {:.1}\n",
+        "{} draws, {} fitted by a law stable at every stretch\nshear modulus: median {:.1} Pa{}{}\n",
         q["count"],
         q["stable"],
         pa("median"),
-        pa("p16"),
-        pa("p84"),
-        pa("p2.5"),
-        pa("p97.5")
+        between("68", "p16", "p84"),
+        between("95", "p2.5", "p97.5")
     )
 }
