@@ -1,7 +1,8 @@
 //! A laboratory's own uniaxial test: a table of stretch against nominal stress, true stress or strain energy density.
 //!
 //! The header names the quantity and its unit, as `stretch,nominal stress (kPa)` or `stretch,energy_pa`. Stretch has no
-//! unit; `strain (%)` and `strain (-)` (engineering strain, l - 1) are taken as well. The sample is taken as
+//! unit; `strain (%)` and `strain (-)` (engineering strain, l - 1) are taken as well, and a strain without a unit is
+//! refused: per cent of a stiff sample's small strains look like parts of its length. The sample is taken as
 //! incompressible: true stress is the nominal one times the stretch.
 
 use super::csv::{self, CsvError, Row};
@@ -110,16 +111,15 @@ pub enum RheometryError {
         /// It.
         stretch: f64,
     },
-    /// A strain beyond one whose header has no unit.
+    /// A strain whose header has no unit.
     #[error(
-        "line {line}: the strain is {strain} and its column names no unit: write `strain (%)` for per cent, `strain (-)` where 1 is twice \
-         the length"
+        "line {line}: the column `{column}` names no unit: write `strain (%)` for per cent, `strain (-)` where 1 is twice the length"
     )]
     StrainUnit {
-        /// Line.
+        /// Line of the header.
         line: usize,
-        /// It.
-        strain: f64,
+        /// The column.
+        column: String,
     },
     /// An energy below zero.
     #[error(
@@ -138,8 +138,6 @@ pub enum RheometryError {
 enum Quantity {
     Stretch,
     Strain,
-    /// A strain whose column names no unit: per cent, if it is large.
-    BareStrain,
     NominalStress,
     TrueStress,
     Energy,
@@ -156,7 +154,6 @@ fn column(name: &str) -> Option<(Quantity, Option<f64>)> {
     };
     let quantity = match words.trim() {
         "stretch" | "lambda" => Quantity::Stretch,
-        "strain" | "engineering strain" if unit.is_empty() => Quantity::BareStrain,
         "strain" | "engineering strain" => Quantity::Strain,
         "stress" | "nominal stress" | "engineering stress" | "first piola-kirchhoff stress" => Quantity::NominalStress,
         "true stress" | "cauchy stress" => Quantity::TrueStress,
@@ -164,7 +161,7 @@ fn column(name: &str) -> Option<(Quantity, Option<f64>)> {
         _ => return None,
     };
     let factor = match (quantity, unit) {
-        (Quantity::BareStrain, _) | (Quantity::Stretch | Quantity::Strain, "" | "-" | "1") => Some(1.0),
+        (Quantity::Stretch, "" | "-" | "1") | (Quantity::Strain, "-" | "1") => Some(1.0),
         (Quantity::Strain, "%") => Some(0.01),
         (Quantity::Stretch | Quantity::Strain, _) => None,
         _ => factor(unit),
@@ -196,9 +193,12 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
     // Other columns (time, temperature) may stand beside.
     for (index, name) in header.cells.iter().enumerate() {
         let Some((quantity, factor)) = column(name) else { continue };
-        let factor = factor.ok_or_else(|| RheometryError::Unit { line, column: name.clone() })?;
+        let factor = factor.ok_or_else(|| match quantity {
+            Quantity::Strain => RheometryError::StrainUnit { line, column: name.clone() },
+            _ => RheometryError::Unit { line, column: name.clone() },
+        })?;
         let slot = match quantity {
-            Quantity::Stretch | Quantity::Strain | Quantity::BareStrain => &mut deformation,
+            Quantity::Stretch | Quantity::Strain => &mut deformation,
             _ => &mut measured,
         };
         if slot.replace((index, quantity, factor)).is_some() {
@@ -217,9 +217,6 @@ pub fn read_rheometry(bytes: &[u8]) -> Result<Rheometry, RheometryError> {
             return Err(RheometryError::Cells { line, found: row.cells.len(), expected: header.cells.len() });
         }
         let extension = number(row, header, deformation.0)? * deformation.2;
-        if deformation.1 == Quantity::BareStrain && extension.abs() > 1.0 {
-            return Err(RheometryError::StrainUnit { line, strain: extension });
-        }
         let stretch = if deformation.1 == Quantity::Stretch { extension } else { 1.0 + extension };
         if !(stretch > 0.0 && stretch <= 10.0) {
             return Err(RheometryError::Stretch { line, stretch });
@@ -290,7 +287,7 @@ mod tests {
             table("stretch,nominal stress (Pa)", |l| (l, stress(l))),
             table("stretch,stress_kpa", |l| (l, stress(l) / 1e3)),
             table("Strain [%],Engineering stress [kPa]", |l| ((l - 1.0) * 100.0, stress(l) / 1e3)),
-            table("strain,true stress (kPa)", |l| (l - 1.0, stress(l) * l / 1e3)),
+            table("strain (-),true stress (kPa)", |l| (l - 1.0, stress(l) * l / 1e3)),
             table("lambda [-],energy (Pa)", |l| (l, energy(l))),
             table("stretch,strain_energy_density_kPa", |l| (l, energy(l) / 1e3)),
         ];
@@ -310,10 +307,11 @@ mod tests {
 
     #[test]
     fn malformed_tables_are_refused_with_line_and_remedy() {
-        let cases: [(&[u8], &str); 15] = [
+        let cases: [(&[u8], &str); 16] = [
             (b"stretch,stress (Pa)\n1.0,0\n0.9,100\n0.8,300\n", "tension as positive"),
             (b"stretch,stress (Pa)\n0.9,90\n0.95,40\n1.1,120\n1.2,300\n", "tension as positive"),
-            (b"strain,stress (Pa)\n0,0\n8,70\n", "line 3: the strain is 8"),
+            (b"strain,stress (Pa)\n0,0\n8,70\n", "line 1: the column `strain` names no unit: write `strain (%)`"),
+            (b"strain,stress (Pa)\n0,0\n0.8,70\n", "line 1: the column `strain` names no unit: write `strain (%)`"),
             (b"", "no rows"),
             (b"stretch,stress (kPa)\n", "no rows"),
             (b"stretch,stress\n1,2\n", "line 1: the column `stress` names no unit"),
