@@ -101,6 +101,12 @@ impl GenerativeFiles {
         text.as_ref().and_then(Value::as_str).unwrap_or_default().to_owned()
     }
 
+    /// What the facts warn of.
+    pub fn warnings(&self) -> Vec<String> {
+        let warnings = self.facts["warnings"].as_array().map_or(&[][..], Vec::as_slice);
+        warnings.iter().filter_map(Value::as_str).map(str::to_owned).collect()
+    }
+
     /// The files' names.
     pub fn names(&self) -> Vec<String> {
         self.files.iter().map(|file| file.display().to_string()).collect()
@@ -123,19 +129,22 @@ pub fn fit_gp(
     let outcome = studies.input(stage).run(force, || {
         let data = TrainingData::from_literature(&studies.models, studies.curves);
         let fit = fit_hyperparameters(&data, settings)?;
+        let published = negative_log_likelihood(&Hyperparameters::published(), &data);
+        let warnings: Vec<String> =
+            fit.warnings(settings, &data, published).iter().map(ToString::to_string).collect();
         let facts = json!({
             "negative_log_likelihood": fit.negative_log_likelihood,
-            "negative_log_likelihood_of_published_hyperparameters":
-                negative_log_likelihood(&Hyperparameters::published(), &data),
+            "negative_log_likelihood_of_published_hyperparameters": published,
             "gradient_norm": fit.gradient_norm,
             "lengthscale": fit.hyperparameters.lengthscale,
             "studies": studies.models.len(),
             "observations": data.observations(),
             "unique_inputs": data.inputs().len(),
             "starts": fit.starts,
+            "warnings": warnings,
         });
         let files = vec![("hyperparameters.toml".to_owned(), fit.hyperparameters.to_toml().into_bytes())];
-        Ok::<_, FitRefusal>(Produced { files, facts, ..Produced::default() })
+        Ok::<_, FitRefusal>(Produced { files, facts, warnings, ..Produced::default() })
     });
     let files = vec![folder.join("hyperparameters.toml")];
     Ok(GenerativeFiles { files, settings: json!(settings), facts: facts(outcome)? })

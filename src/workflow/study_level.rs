@@ -71,6 +71,7 @@ pub fn fit_study_level(
     let outcome = studies.input(stage).run(force, || {
         let publications = publications(studies);
         let fit = fit(&publications, &Spreads::default(), seed)?;
+        let warnings: Vec<String> = fit.warning(&publications).iter().map(ToString::to_string).collect();
         let evidence = Evidence::new(&publications, &fit.spreads).ok_or(FitError::NotFinite)?;
         let moduli = person_moduli(&evidence, &fit.spreads, seed, studies.curves)?;
         let intervals = intervals(&publications, &fit).unwrap_or([[0.0, f64::MAX]; SPREADS]);
@@ -80,10 +81,10 @@ pub fn fit_study_level(
             "log_likelihood": log_likelihood, "log_evidence": log_evidence, "gradient_norm": gradient_norm,
             "publications": publications.publications.len(), "studies": studies.models.len(),
             "points": publications.points(), "spreads": file.spreads, "intervals_90": file.intervals_90,
-            "moduli": file.moduli, "text": fit_text(&file),
+            "moduli": file.moduli, "warnings": warnings, "text": fit_text(&file),
         });
         let files = vec![("study-level.toml".to_owned(), file.to_toml().into_bytes())];
-        Ok::<_, FitError>(Produced { files, facts, ..Produced::default() })
+        Ok::<_, FitError>(Produced { files, facts, warnings, ..Produced::default() })
     });
     let files = vec![folder.join("study-level.toml")];
     Ok(GenerativeFiles { files, settings, facts: facts(outcome)? })

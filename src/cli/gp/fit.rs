@@ -1,7 +1,7 @@
 //! `hgm gp fit`: hyperparameters of greatest likelihood.
 
 use super::options::{ModelOption, StudyOptions, only_with};
-use crate::cli::{Failure, Session};
+use crate::cli::{Failure, Session, session::warn};
 use crate::material::generative::GenerativeModel;
 use crate::workflow::{Layer, fit_gp, fit_study_level, results_in_words};
 use serde_json::json;
@@ -40,6 +40,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = session.settings(flags)?.gp;
     let studies = args.studies.read()?;
     let made = fit_gp(&studies, &settings, &args.output, session.options.force)?;
+    warn(&made.warnings());
     let (facts, file) = (made.facts, made.files[0].display().to_string());
     let text = results_in_words::fitted_process(&facts, settings.rank) + &file;
     session.emit(&json!({ "hyperparameters": file, "settings": made.settings, "fit": facts }), &text)
@@ -51,6 +52,7 @@ fn study_level(args: &Args, session: &Session) -> Result<(), Failure> {
     let place = (args.output.as_path(), session.options.force);
     let mut made = fit_study_level(&args.studies.read()?, session.options.seed.unwrap_or(0), place)?;
     let text = made.take_text();
+    warn(&made.warnings());
     let (facts, file) = (made.facts, made.files[0].display().to_string());
     let text = format!("{} points of {} publications\n{text}\n{file}", facts["points"], facts["publications"]);
     session.emit(&json!({ "study_level": file, "settings": made.settings, "fit": facts }), &text)

@@ -95,6 +95,49 @@ pub struct HyperparameterFit {
     pub starts: Vec<StartRecord>,
 }
 
+/// Why hyperparameters may not be those of greatest likelihood.
+#[derive(Clone, Copy, Debug, PartialEq, ThisError)]
+pub enum FitWarning {
+    /// The search has ended on a slope.
+    #[error(
+        "the search of the hyperparameters ended before the likelihood was greatest: its slope is {slope:.1e} for each observation, \
+         where {STEEP:.0e} and less is flat; raise `iterations` (it is {iterations}) and `starts` in the table [gp] of the settings file"
+    )]
+    Unfinished {
+        /// Norm of the gradient over the observations.
+        slope: f64,
+        /// Iterations of a finalist at most.
+        iterations: usize,
+    },
+    /// The built-in hyperparameters explain the same data better.
+    #[error(
+        "the hyperparameters found explain the studies worse than the published ones do (negative log likelihood {found:.3} against \
+         {published:.3}): raise `starts` and `iterations` in the table [gp] of the settings file"
+    )]
+    WorseThanPublished {
+        /// Negative log likelihood found.
+        found: f64,
+        /// That of the published ones.
+        published: f64,
+    },
+}
+
+/// A gradient below this for each observation is flat: a step of one in all logarithms gains no more.
+const STEEP: f64 = 1e-5;
+
+impl HyperparameterFit {
+    /// What is to be told of it beside the negative log likelihood of the published hyperparameters on the same data.
+    pub fn warnings(&self, settings: &FitSettings, data: &TrainingData, published: f64) -> Vec<FitWarning> {
+        let slope = self.gradient_norm / data.observations().max(1) as f64;
+        let unfinished = FitWarning::Unfinished { slope, iterations: settings.iterations };
+        let found = self.negative_log_likelihood;
+        // Less than a hundredth is no other explanation. A slope that is no number is no flat one.
+        let worse = FitWarning::WorseThanPublished { found, published };
+        let told = [(slope.is_nan() || slope > STEEP, unfinished), (found > published + 0.01, worse)];
+        told.into_iter().filter(|(holds, _)| *holds).map(|(_, warning)| warning).collect()
+    }
+}
+
 /// Weights are searched in units of this, ln Pa, so that all variables are of like size.
 const WEIGHT_UNIT: f64 = 20.0;
 /// Pairs of steps kept: as many as there are variables at rank 1, since valleys are long and narrow.

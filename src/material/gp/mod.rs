@@ -13,7 +13,7 @@ mod smoother;
 pub use dense::{dense_negative_log_likelihood, dense_posterior};
 pub use draws::{JointPosterior, Spread, joint_posterior};
 pub use filter::negative_log_likelihood;
-pub use fit::{FitRefusal, FitSettings, HyperparameterFit, StartRecord, fit_hyperparameters};
+pub use fit::{FitRefusal, FitSettings, FitWarning, HyperparameterFit, StartRecord, fit_hyperparameters};
 pub use gradient::{LikelihoodGradient, negative_log_likelihood_and_gradient};
 pub use hyperparameters::{Hyperparameters, HyperparametersError, TaskMatrix};
 pub use smoother::{TissuePrior, posterior};

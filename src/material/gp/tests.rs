@@ -102,6 +102,18 @@ fn a_second_rank_explains_the_data_better_than_one() {
 }
 
 #[test]
+fn a_search_that_ended_too_early_says_so_and_that_the_published_ones_are_better() {
+    let (data, short) = (data(), FitSettings { starts: 1, first_iterations: 1, iterations: 1, ..FitSettings::default() });
+    let published = negative_log_likelihood(&Hyperparameters::published(), &data);
+    let fit = fit_hyperparameters(&data, &short).unwrap();
+    let told = fit.warnings(&short, &data, published);
+    assert!(matches!(told[..], [FitWarning::Unfinished { .. }, FitWarning::WorseThanPublished { .. }]), "{told:?}");
+    assert!(told[0].to_string().contains("`iterations` (it is 1)"), "{}", told[0]);
+    let flat = HyperparameterFit { gradient_norm: 0.0, negative_log_likelihood: published, ..fit };
+    assert_eq!(flat.warnings(&short, &data, published), []);
+}
+
+#[test]
 fn settings_that_cannot_be_are_refused_by_name() {
     let refused = |settings: FitSettings| fit_hyperparameters(&data(), &settings).unwrap_err().to_string();
     assert!(refused(FitSettings { rank: 0, ..FitSettings::default() }).contains("`rank` is 0"));

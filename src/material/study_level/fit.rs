@@ -34,6 +34,28 @@ pub enum FitError {
     Law(#[from] meta_model::FitError),
 }
 
+/// The search has ended on a slope.
+#[derive(Clone, Copy, Debug, PartialEq, ThisError)]
+#[error(
+    "the search of the spreads ended before their probability was greatest: its slope is {slope:.1e} for each point, where \
+     {STEEP:.0e} and less is flat; look for a study with absurd moduli, or try another --seed"
+)]
+pub struct Unfinished {
+    /// Norm of the gradient over the points.
+    pub slope: f64,
+}
+
+/// A gradient below this for each point is flat.
+const STEEP: f64 = 1e-5;
+
+impl StudyLevelFit {
+    /// Whether the search came to where the probability is greatest of these studies.
+    pub fn warning(&self, studies: &Studies) -> Option<Unfinished> {
+        let slope = self.gradient_norm / studies.points().max(1) as f64;
+        (slope.is_nan() || slope > STEEP).then_some(Unfinished { slope })
+    }
+}
+
 /// The fitted model.
 #[derive(Clone, Debug)]
 pub struct StudyLevelFit {

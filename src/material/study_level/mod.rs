@@ -36,7 +36,7 @@ mod study;
 
 pub use basis::Basis;
 pub use evidence::{Evidence, MeanPosterior};
-pub use fit::{FitError, StudyLevelFit, fit, refit};
+pub use fit::{FitError, StudyLevelFit, Unfinished, fit, refit};
 pub use intervals::intervals;
 pub use joint::{JointPrediction, predict_jointly};
 pub use leave_one_out::{LeftOut, LeftOutCurve, leave_one_publication_out, published_log_density, uniform_probability};

@@ -111,6 +111,8 @@ fn the_fit_ends_where_the_posterior_is_flat_and_is_the_same_again() {
     let first = fit(&studies, &Spreads::default(), 3).unwrap();
     assert!(first.gradient_norm < 1e-2, "{}", first.gradient_norm);
     assert!(first.log_sds.iter().all(|sd| *sd > 0.0 && sd.is_finite()), "{:?}", first.log_sds);
+    let on_a_slope = StudyLevelFit { gradient_norm: studies.points() as f64, ..first.clone() };
+    assert!(on_a_slope.warning(&studies).unwrap().to_string().contains("ended before"));
     let again = fit(&studies, &Spreads::default(), 3).unwrap();
     assert_eq!(first.spreads, again.spreads);
 }
