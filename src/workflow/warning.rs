@@ -62,6 +62,12 @@ pub enum Warning {
          read from lighter ones, and how far the brain may move at most is less sure"
     )]
     UnbalancedDraws { head: String, supports: String, unbalanced: usize, draws: usize },
+    #[error(
+        "{draws} draws are few: of so few of Halton's points some unknowns go together that should not, and intervals of 95 % have next \
+         to no draws beyond their ends; give {} or more (`draws` of the table [predict], --draws)",
+        crate::experiment::predict::ENOUGH_DRAWS
+    )]
+    FewDraws { draws: usize },
     #[error("{state}: tissue folds over at {voxels} voxels; the displacement field is smoothed there and not believed")]
     Folds { state: String, voxels: usize },
     #[error("its quality gate is not passed ({why}): look at its page before trusting what it carries")]

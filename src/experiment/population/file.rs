@@ -4,6 +4,7 @@ use super::hierarchy::{Inferred, MEAN_SD, Population, SPREAD_SCALE, TooMany};
 use super::kind::Kind;
 use super::learnt::{LearntPrior, PopulationPrior};
 use super::moments::Moments;
+use crate::experiment::verdict::Finding;
 use crate::material::meta_model::MetaModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,7 +81,8 @@ pub struct Taught {
     pub literature_log_mean: f64,
     /// Its standard deviation.
     pub literature_log_sd: f64,
-    /// Whether the next patient's prior is this one; else the cohort is one study's worth and the literature's prior stands.
+    /// Whether the next patient's prior is this one; else the cohort is one study's worth, or most of its patients showed no shift or
+    /// contradicted what is known, and the literature's prior stands.
     pub moves_prior: bool,
 }
 
@@ -103,6 +105,13 @@ impl Taught {
         let ends = intervals.into_iter().flat_map(|(key, ends)| ends.map(|end| (key, end)));
         one.into_iter().chain(ends).collect()
     }
+}
+
+/// Whether more patients are left out for what their stiffness came out as than teach. Stiff brains move least, so such a cohort's
+/// mean is that of its softer ones.
+fn outnumbered(teachers: usize, left_out: &BTreeMap<String, usize>) -> bool {
+    let silent = [Finding::NoShift, Finding::Conflict].map(|finding| left_out.get(finding.short()).copied().unwrap_or(0));
+    silent.iter().sum::<usize>() > teachers
 }
 
 /// Why a population's file is refused.
@@ -151,6 +160,7 @@ impl PopulationFile {
         moments.sort_by(Moments::by_value);
         let names: Vec<String> = parameters.iter().map(|(name, _)| name.clone()).collect();
         let found = Population::infer(&names, &moments)?;
+        let heard = !outnumbered(moments.len(), &left_out);
         let taught = |(n, (name, literature)): (usize, &(String, Literature))| {
             let patients = moments.iter().filter(|m| m.tells_of(n)).count();
             let [mean, spread, next]: [Inferred; 3] = [found.mean(n), found.spread(n), found.next(n)];
@@ -168,7 +178,7 @@ impl PopulationFile {
                 next_95: next.interval_95.map(f64::exp),
                 literature_log_mean: literature.0,
                 literature_log_sd: literature.1,
-                moves_prior: patients >= LEAST_PATIENTS && mean.sd <= LEAST_KNOWN * literature.1,
+                moves_prior: heard && patients >= LEAST_PATIENTS && mean.sd <= LEAST_KNOWN * literature.1,
             }
         };
         Ok(Self {
@@ -228,7 +238,9 @@ impl PopulationFile {
              # A patient's logarithms are normal about the population's mean, independent between parameters. Priors: means normal about\n\
              # ln 1000 (a density's: ln 100) with standard deviation {MEAN_SD}, spreads half normal of scale {SPREAD_SCALE}.\n\
              # `moves_prior = false`: fewer than {LEAST_PATIENTS} patients, or a mean known no better than {LEAST_KNOWN} of the literature's\n\
-             # spread. That is one study's worth, and the literature's prior stands.\n\n"
+             # spread. That is one study's worth, and the literature's prior stands. So it does where more patients had no shift to be\n\
+             # seen or contradicted what is known than teach: the mean is of those whose stiffness was identified, who may be the softer\n\
+             # ones of all.\n\n"
         );
         head + &toml::to_string(self).expect("figures are plain data")
     }
@@ -253,7 +265,7 @@ impl PopulationFile {
         let known = |t: &Taught| (t.name.clone(), (t.literature_log_mean, t.literature_log_sd));
         let parameters: Vec<(String, Literature)> = self.parameters.iter().map(known).collect();
         let again =
-            Self::new(self.kind(), &parameters, self.moments.clone(), BTreeMap::new()).map_err(|e| e.to_string())?;
+            Self::new(self.kind(), &parameters, self.moments.clone(), self.left_out.clone()).map_err(|e| e.to_string())?;
         for (read, follows) in self.parameters.iter().zip(&again.parameters) {
             let name = &read.name;
             if (read.patients, read.moves_prior) != (follows.patients, follows.moves_prior) {

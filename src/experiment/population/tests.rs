@@ -206,6 +206,23 @@ fn a_small_cohort_is_one_studys_worth_and_a_large_one_moves_the_prior() {
 }
 
 #[test]
+fn a_cohort_whose_silent_patients_outnumber_its_teachers_moves_no_prior() {
+    let all = moments(&cohort(40, 9));
+    let parameters = file(all.clone()).parameters.into_iter();
+    let known: Vec<(String, Literature)> =
+        parameters.map(|t| (t.name, (t.literature_log_mean, t.literature_log_sd))).collect();
+    let beside = |no_shift: usize, conflict: usize| {
+        let short = |finding: Finding, count| (finding.short().to_owned(), count);
+        let left_out = BTreeMap::from([short(Finding::NoShift, no_shift), short(Finding::Conflict, conflict)]);
+        PopulationFile::new(KIND, &known, all.clone(), left_out).unwrap()
+    };
+    assert!(beside(20, 20).parameters.iter().all(|taught| taught.moves_prior));
+    let silent = beside(21, 20);
+    assert!(silent.parameters.iter().all(|taught| !taught.moves_prior) && silent.prior().parameters.is_empty());
+    assert_eq!(PopulationFile::from_toml(&silent.to_toml(), "p.toml").unwrap(), silent);
+}
+
+#[test]
 fn a_file_reads_back_and_a_slip_in_it_is_refused_by_name() {
     let written = file(moments(&cohort(6, 1)));
     let text = written.to_toml();

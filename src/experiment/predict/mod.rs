@@ -52,7 +52,7 @@ pub use planned::{PREDICTED, assumptions};
 pub use plans::{PlanComparison, PlanDraws, PlanFigures, PlanOfHead, PlansOfHead, compared_plans};
 pub use response::{Beside, Coordinates, Response, SolvedState};
 pub use score::{Compared, Coverage, PlaceScore, Scores, crps, energy_score, score_place, scores};
-pub use settings::PredictSettings;
+pub use settings::{ENOUGH_DRAWS, PredictSettings};
 pub use shares::{Shares, variance_shares};
 pub use spread::{Spread, farthest, spread};
 pub use support::SupportWeight;

@@ -56,6 +56,10 @@ pub struct PredictSettings {
     pub fluid_level: Option<KnownLevel>,
 }
 
+/// Draws from which on Halton's points of the higher bases no longer lie on a line: of the first 16, those of bases 19 and 23 are
+/// multiples of each other.
+pub const ENOUGH_DRAWS: usize = 64;
+
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands it so")]
 fn is_first(seed: &u64) -> bool {
     *seed == 0
@@ -84,6 +88,11 @@ impl Default for PredictSettings {
 }
 
 impl PredictSettings {
+    /// Draws that are too few for what is read from them.
+    pub fn few_draws(&self) -> Option<usize> {
+        Some(self.draws).filter(|draws| *draws < ENOUGH_DRAWS)
+    }
+
     /// Refuses what no prediction can be made with.
     ///
     /// # Errors
@@ -201,6 +210,12 @@ mod tests {
         for (name, change) in cases {
             assert!(of(change).unwrap_err().contains(name), "{name}");
         }
+    }
+
+    #[test]
+    fn fewer_draws_than_the_points_are_even_for_are_told_and_taken() {
+        let of = |draws| PredictSettings { draws, ..PredictSettings::default() };
+        assert_eq!((of(16).check(), of(16).few_draws(), of(64).few_draws()), (Ok(()), Some(16), None));
     }
 
     #[test]

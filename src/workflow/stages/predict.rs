@@ -62,6 +62,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
     work.run(made, &NAME, &stage, || {
         let patient = Patient::read(work, input)?;
         let mut produced = Produced::default();
+        produced.warn(settings.predict.few_draws().map(|draws| Warning::FewDraws { draws }));
         let weights = settings.predict.weights(&settings.resection);
         let weighed = |(s, weight): &(Supports, f64)| SupportWeight { supports: s.name().to_owned(), weight: *weight };
         let mut prediction = Prediction {
