@@ -181,7 +181,9 @@ mod tests {
     fn an_end_of_what_was_tried_is_told_and_one_modulus_alone_is_no_answer() {
         let reasons = |samples: &[(f64, f64)]| of_samples(&swept(3.0, samples)).reasons;
         let ends = |reasons: &[Reason]| {
-            let has = |end: bool| reasons.iter().any(|r| matches!(r, Reason::EndOfTried { stiffest, .. } if *stiffest == end));
+            let has = |end: bool| {
+                reasons.iter().any(|r| matches!(r, Reason::EndOfTried { stiffest, .. } if *stiffest == end))
+            };
             [has(false), has(true)]
         };
         assert_eq!(ends(&reasons(&[(200.0, 2.5), (500.0, 1.0), (900.0, 1.2), (2000.0, 2.5)])), [false, false]);

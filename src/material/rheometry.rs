@@ -310,8 +310,14 @@ mod tests {
         let cases: [(&[u8], &str); 16] = [
             (b"stretch,stress (Pa)\n1.0,0\n0.9,100\n0.8,300\n", "tension as positive"),
             (b"stretch,stress (Pa)\n0.9,90\n0.95,40\n1.1,120\n1.2,300\n", "tension as positive"),
-            (b"strain,stress (Pa)\n0,0\n8,70\n", "line 1: the column `strain` names no unit that is known: write `strain (%)`"),
-            (b"strain,stress (Pa)\n0,0\n0.8,70\n", "line 1: the column `strain` names no unit that is known: write `strain (%)`"),
+            (
+                b"strain,stress (Pa)\n0,0\n8,70\n",
+                "line 1: the column `strain` names no unit that is known: write `strain (%)`",
+            ),
+            (
+                b"strain,stress (Pa)\n0,0\n0.8,70\n",
+                "line 1: the column `strain` names no unit that is known: write `strain (%)`",
+            ),
             (b"", "no rows"),
             (b"stretch,stress (kPa)\n", "no rows"),
             (b"stretch,stress\n1,2\n", "line 1: the column `stress` names no unit"),

@@ -130,8 +130,7 @@ pub fn fit_gp(
         let data = TrainingData::from_literature(&studies.models, studies.curves);
         let fit = fit_hyperparameters(&data, settings)?;
         let published = negative_log_likelihood(&Hyperparameters::published(), &data);
-        let warnings: Vec<String> =
-            fit.warnings(settings, &data, published).iter().map(ToString::to_string).collect();
+        let warnings: Vec<String> = fit.warnings(settings, &data, published).iter().map(ToString::to_string).collect();
         let facts = json!({
             "negative_log_likelihood": fit.negative_log_likelihood,
             "negative_log_likelihood_of_published_hyperparameters": published,

@@ -110,7 +110,8 @@ impl Taught {
 /// Whether more patients are left out for what their stiffness came out as than teach. Stiff brains move least, so such a cohort's
 /// mean is that of its softer ones.
 fn outnumbered(teachers: usize, left_out: &BTreeMap<String, usize>) -> bool {
-    let silent = [Finding::NoShift, Finding::Conflict].map(|finding| left_out.get(finding.short()).copied().unwrap_or(0));
+    let silent =
+        [Finding::NoShift, Finding::Conflict].map(|finding| left_out.get(finding.short()).copied().unwrap_or(0));
     silent.iter().sum::<usize>() > teachers
 }
 
@@ -264,8 +265,8 @@ impl PopulationFile {
     fn check_figures(&self) -> Result<(), String> {
         let known = |t: &Taught| (t.name.clone(), (t.literature_log_mean, t.literature_log_sd));
         let parameters: Vec<(String, Literature)> = self.parameters.iter().map(known).collect();
-        let again =
-            Self::new(self.kind(), &parameters, self.moments.clone(), self.left_out.clone()).map_err(|e| e.to_string())?;
+        let again = Self::new(self.kind(), &parameters, self.moments.clone(), self.left_out.clone())
+            .map_err(|e| e.to_string())?;
         for (read, follows) in self.parameters.iter().zip(&again.parameters) {
             let name = &read.name;
             if (read.patients, read.moves_prior) != (follows.patients, follows.moves_prior) {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::experiment::estimate::EstimateOutcome;
+use crate::experiment::verdict::Finding;
 use crate::material::meta_model::MetaModel;
 use crate::material::random::CounterRng;
 use nalgebra::{DMatrix, DVector};
@@ -208,13 +209,10 @@ fn a_small_cohort_is_one_studys_worth_and_a_large_one_moves_the_prior() {
 #[test]
 fn a_cohort_whose_silent_patients_outnumber_its_teachers_moves_no_prior() {
     let all = moments(&cohort(40, 9));
-    let parameters = file(all.clone()).parameters.into_iter();
-    let known: Vec<(String, Literature)> =
-        parameters.map(|t| (t.name, (t.literature_log_mean, t.literature_log_sd))).collect();
     let beside = |no_shift: usize, conflict: usize| {
         let short = |finding: Finding, count| (finding.short().to_owned(), count);
         let left_out = BTreeMap::from([short(Finding::NoShift, no_shift), short(Finding::Conflict, conflict)]);
-        PopulationFile::new(KIND, &known, all.clone(), left_out).unwrap()
+        PopulationFile::new(KIND, &parameters(), all.clone(), left_out).unwrap()
     };
     assert!(beside(20, 20).parameters.iter().all(|taught| taught.moves_prior));
     let silent = beside(21, 20);

@@ -65,7 +65,9 @@ pub fn dense_posterior(
         stretches: stretches.to_vec(),
         mean: (0..stretches.len()).map(|i| mean[(i, 0)]).collect(),
         latent_sd: (0..stretches.len()).map(|i| variance(i).sqrt()).collect(),
-        observation_sd: (0..stretches.len()).map(|i| (variance(i) + parameters.observation_variance(t)).sqrt()).collect(),
+        observation_sd: (0..stretches.len())
+            .map(|i| (variance(i) + parameters.observation_variance(t)).sqrt())
+            .collect(),
     };
     Some((prior, covariance))
 }

@@ -103,7 +103,8 @@ fn a_second_rank_explains_the_data_better_than_one() {
 
 #[test]
 fn a_search_that_ended_too_early_says_so_and_that_the_published_ones_are_better() {
-    let (data, short) = (data(), FitSettings { starts: 1, first_iterations: 1, iterations: 1, ..FitSettings::default() });
+    let (data, short) =
+        (data(), FitSettings { starts: 1, first_iterations: 1, iterations: 1, ..FitSettings::default() });
     let published = negative_log_likelihood(&Hyperparameters::published(), &data);
     let fit = fit_hyperparameters(&data, &short).unwrap();
     let told = fit.warnings(&short, &data, published);

@@ -126,7 +126,9 @@ pub enum FitError {
     #[error("all energies are 0: no modulus can be found; give rows with energy")]
     NoEnergy,
     /// Parameters that go together.
-    #[error("the rows do not determine the parameters of {model}: give rows at more stretches, or fit a law of fewer parameters")]
+    #[error(
+        "the rows do not determine the parameters of {model}: give rows at more stretches, or fit a law of fewer parameters"
+    )]
     Undetermined {
         /// The law.
         model: MetaModel,
@@ -204,7 +206,11 @@ fn fit_quantity(problem: &Problem) -> Result<Fit, FitError> {
         count => return Err(FitError::TooManyParameters { model, count }),
     };
     // A valley without an end has no inverse.
-    if found.covariance.iter().flatten().all(|c| c.is_finite()) { Ok(found) } else { Err(FitError::Undetermined { model }) }
+    if found.covariance.iter().flatten().all(|c| c.is_finite()) {
+        Ok(found)
+    } else {
+        Err(FitError::Undetermined { model })
+    }
 }
 
 /// What is compared with the targets.

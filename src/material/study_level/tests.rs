@@ -196,7 +196,11 @@ fn every_task_among_all_has_the_spread_it_has_alone() {
                 let mean = draws.iter().map(|d| d[t][n]).sum::<f64>() / 3000.0;
                 let sd = (draws.iter().map(|d| (d[t][n] - mean).powi(2)).sum::<f64>() / 2999.0).sqrt();
                 assert!((mean - alone.mean[n]).abs() < 4.5 * alone.sd[n] / 3000f64.sqrt(), "{of:?} {task} {n}");
-                assert!((sd / alone.sd[n] - 1.0).abs() < 4.5 / 6000f64.sqrt(), "{of:?} {task} {n}: {sd} {}", alone.sd[n]);
+                assert!(
+                    (sd / alone.sd[n] - 1.0).abs() < 4.5 / 6000f64.sqrt(),
+                    "{of:?} {task} {n}: {sd} {}",
+                    alone.sd[n]
+                );
             }
         }
     }
