@@ -271,6 +271,14 @@ mod tests {
     }
 
     #[test]
+    fn an_array_of_strings_among_the_others_hides_none_of_them() {
+        let words = "<Array type=\"String\" Name=\"who\" format=\"ascii\">72 105 0</Array>";
+        let text = ascii(CELLS, &format!("{words}{LABEL}")).replace("<PointData>", &format!("<PointData>{words}"));
+        let read = decode(text.as_bytes(), "a.vtu").unwrap();
+        assert_eq!((read.mesh.labels(), read.point_field("w").unwrap().values[1]), ([3].as_slice(), 0.5));
+    }
+
+    #[test]
     fn every_refusal_names_file_and_field() {
         let refuse = |text: String| decode(text.as_bytes(), "bad.vtu").unwrap_err().to_string();
         let says = |text: String, words: &[&str]| {

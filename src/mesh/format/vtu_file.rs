@@ -12,6 +12,9 @@ pub(super) const MARKED: &str = "hgm_sets";
 /// Attribute of an array that is a set, and what it is a set of.
 pub(super) const SET: (&str, &str) = ("hgm_set", "nodes");
 
+/// The elements of a piece that hold its arrays. What else may stand among them (`Array` of strings, `InformationKey`) is none.
+const SECTIONS: [&str; 5] = ["Points", "Cells", "PointData", "CellData", "FieldData"];
+
 /// A `DataArray` as it stands in the file.
 #[derive(Debug, Default)]
 pub(super) struct RawArray {
@@ -80,7 +83,8 @@ impl<'a> File<'a> {
                     }
                     "DataArray" => open = Some(file.raw_array(&element, &section)?),
                     _ if open.is_some() => inside += 1,
-                    other => other.clone_into(&mut section),
+                    other if SECTIONS.contains(&other) => other.clone_into(&mut section),
+                    _ => {}
                 },
                 Event::Text(text) => {
                     // VTK nests `InformationKey` into arrays; its text is not the array's.
@@ -92,6 +96,7 @@ impl<'a> File<'a> {
                     "DataArray" => file.arrays.extend(open.take()),
                     "VTKFile" => closed = true,
                     _ if open.is_some() => inside = inside.saturating_sub(1),
+                    other if SECTIONS.contains(&other) => section.clear(),
                     _ => {}
                 },
                 Event::Eof => break,
