@@ -93,14 +93,18 @@ pub(crate) fn run(command: &Command, input: Vec<u8>, limits: &Limits) -> Result<
 }
 
 /// A script for the shell in a folder of its own, which goes when the script ends; the program is `$0`, and `run` in front of
-/// it stops it in time, with its children, which killing the shell would not.
+/// it stops it in time, with its children, which killing the shell would not. A shell that is interrupted itself stops the
+/// program and clears the folder, too: a patient's surface lies in it. For that it waits for the program beside it (a signal
+/// is not seen while a program runs in front), so the program has no stdin.
 pub(crate) fn scratch_command(program: &std::path::Path, script: &str, limits: &Limits) -> Command {
     let mut shell = Command::new("/bin/sh");
     // A little before the shell itself would be killed, so that it can clean up.
     let seconds = 0.95 * limits.time_s;
     shell.arg("-c").arg(format!(
-        "d=$(mktemp -d) || exit 1; trap 'rm -rf \"$d\"' EXIT; cd \"$d\" || exit 1; \
-         run() {{ timeout -k 1 {seconds:.3} \"$@\" || {{ s=$?; [ $s = 124 ] && echo '{TIMED_OUT}' >&2; exit $s; }}; }}; {script}"
+        "p=; d=$(mktemp -d) || exit 1; trap 'rm -rf \"$d\"' EXIT; \
+         trap '[ -z \"$p\" ] || {{ kill \"$p\"; wait \"$p\"; }} 2>/dev/null; exit 130' INT TERM HUP; cd \"$d\" || exit 1; \
+         run() {{ timeout -k 1 {seconds:.3} \"$@\" & p=$!; wait \"$p\"; s=$?; p=; \
+         [ $s = 124 ] && echo '{TIMED_OUT}' >&2; [ $s = 0 ] || exit $s; }}; {script}"
     ));
     shell.arg(program);
     shell
@@ -162,6 +166,41 @@ mod tests {
         let said = String::from_utf8(run(&script, b"here ".to_vec(), &limits).unwrap()).unwrap();
         let folder = said.strip_prefix("here ").unwrap().trim();
         assert!(folder.starts_with('/') && !std::path::Path::new(folder).exists(), "{folder}");
+    }
+
+    #[test]
+    fn a_script_that_is_interrupted_stops_its_program_and_leaves_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        // The program writes where it is and which process it is, and then hangs.
+        let told = place.path().join("told");
+        let program = place.path().join("hangs");
+        std::fs::write(
+            &program,
+            format!("echo $$ > {0}.part; pwd >> {0}.part; mv {0}.part {0}; exec sleep 60", told.display()),
+        )
+        .unwrap();
+        let script = format!("run \"$0\" {}", program.display());
+        for signal in ["-INT", "-TERM", "-HUP"] {
+            let _ = std::fs::remove_file(&told);
+            let mut shell =
+                scratch_command(std::path::Path::new("/bin/sh"), &script, &Limits::default()).spawn().unwrap();
+            let until = Instant::now() + Duration::from_secs(20);
+            let wait_for = |there: &dyn Fn() -> bool| {
+                while !there() && Instant::now() < until {
+                    std::thread::sleep(Duration::from_millis(10));
+                }
+                there()
+            };
+            assert!(wait_for(&|| told.exists()));
+            let said = std::fs::read_to_string(&told).unwrap();
+            let (pid, folder) = said.trim().split_once('\n').unwrap();
+            assert!(std::path::Path::new(folder).exists());
+            assert!(Command::new("kill").args([signal, &shell.id().to_string()]).status().unwrap().success());
+            assert_eq!(shell.wait().unwrap().code(), Some(130), "{signal}");
+            assert!(!std::path::Path::new(folder).exists(), "{signal}");
+            let alive = || Command::new("kill").args(["-0", pid]).stderr(Stdio::null()).status().unwrap().success();
+            assert!(wait_for(&|| !alive()), "{signal}");
+        }
     }
 
     #[test]

@@ -75,7 +75,12 @@ impl MeshSettings {
             size,
             ("smoothing_voxels", self.smoothing_voxels, (0.0..=5.0).contains(&self.smoothing_voxels), "0 to 5"),
             ("smallest_part", self.smallest_part, (0.0..1.0).contains(&self.smallest_part), "at least 0 and below 1"),
-            ("limits.time_s", self.limits.time_s, (0.0..=1e9).contains(&self.limits.time_s), "0 or more seconds"),
+            (
+                "limits.time_s",
+                self.limits.time_s,
+                self.limits.time_s > 0.0 && self.limits.time_s <= 1e9,
+                "seconds above 0",
+            ),
             ("limits.memory_mb", self.limits.memory_mb as f64, self.limits.memory_mb >= 1, "1 or more"),
         ];
         match rules.into_iter().find(|(_, _, holds, _)| !holds) {
