@@ -135,6 +135,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Mesh(MeshFileError::Output { .. } | MeshFileError::Fractions { .. })
         | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o",
         WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out",
+        WorkflowError::Mesh(MeshFileError::NameOrHeader { .. }) => "--sets mni or --sets none says it",
         WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => {
             "run again with --force"
         }

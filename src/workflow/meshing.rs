@@ -93,7 +93,10 @@ pub fn mesh_file(
     let refused = |source| WorkflowError::Engine { labels: name.clone(), source };
     programs.check(posed.engine).map_err(refused)?;
     let labels = any_labels(&bytes, &name, files.numbers.as_deref(), &settings.image, progress)?;
-    let in_mni = files.in_mni.unwrap_or_else(|| name.contains("space-MNI") || nifti::says_mni(&bytes));
+    let in_mni = match files.in_mni {
+        Some(said) => said,
+        None => in_mni_by_itself(&files.labels, &bytes)?,
+    };
     if in_mni && tags.falx && posed.split.is_none() {
         posed.split = Some(falx_sheet());
     }
@@ -126,6 +129,15 @@ pub fn mesh_file(
         StageError::Write(error) => WorkflowError::Write(error),
     })?;
     Ok(outcome.manifest.figures().map_err(|_| MeshFileError::Noted { file })?)
+}
+
+/// Whether a file says that it is in MNI space. By its own name, not by a folder's, which may hold files of every space.
+fn in_mni_by_itself(labels: &Path, bytes: &[u8]) -> Result<bool, MeshFileError> {
+    let named = labels.file_name().is_some_and(|name| name.to_string_lossy().contains("space-MNI"));
+    if named && nifti::says_scanner(bytes) {
+        return Err(MeshFileError::NameOrHeader { labels: labels.to_path_buf() });
+    }
+    Ok(named || nifti::says_mni(bytes))
 }
 
 /// Meshes and, with `tags`, tags.
@@ -204,4 +216,25 @@ fn write_surfaces(mesh: &TetMesh, folder: &Path, space: gifti::Space) -> Result<
         write_whole(&folder.join(format!("{name}.ply")), &ply::encode(&surface, &[])?)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Frame, Mni};
+    use crate::image::{Grid, Volume};
+
+    #[test]
+    fn the_name_of_the_file_and_its_header_say_the_space_and_where_they_differ_the_user_is_asked() {
+        fn bytes<F: Frame>() -> Vec<u8> {
+            nifti::encode_u8(&Volume::<u8, F>::from_fn(Grid::axis_aligned([4; 3], [1.0; 3], [0.0; 3]), |_| 2))
+        }
+        let (scanner, mni) = (bytes::<Native>(), bytes::<Mni>());
+        let of = |name: &str, bytes: &[u8]| in_mni_by_itself(Path::new(name), bytes);
+        assert!(matches!(of("a/dseg.nii.gz", &mni), Ok(true)));
+        assert!(matches!(of("a/space-MNI_dseg.nii.gz", &mni), Ok(true)));
+        assert!(matches!(of("space-MNI/dseg.nii.gz", &scanner), Ok(false)), "a folder says nothing of a file");
+        let asked = of("a/pre_space-MNI_dseg.nii.gz", &scanner).unwrap_err().to_string();
+        assert!(asked.contains("a/pre_space-MNI_dseg.nii.gz") && asked.contains("code 1"), "{asked}");
+    }
 }

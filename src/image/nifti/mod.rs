@@ -201,8 +201,19 @@ pub fn decode_grid(bytes: &[u8], name: &str) -> Result<Grid<Native>, NiftiError>
 /// Whether the header says that the coordinates are those of the MNI template (code 4 for the affine that is believed).
 /// False for what is no NIfTI.
 pub fn says_mni(bytes: &[u8]) -> bool {
-    let Some(header) = head_of(bytes).ok().and_then(|head| Header::parse(&head).ok()) else { return false };
-    (if header.sform_code > 0 { header.sform_code } else { header.qform_code }) == 4
+    code_of(bytes) == Some(4)
+}
+
+/// Whether the header says that the coordinates are the scanner's (code 1 for the affine that is believed). False for what
+/// is no NIfTI.
+pub fn says_scanner(bytes: &[u8]) -> bool {
+    code_of(bytes) == Some(1)
+}
+
+/// The code of the affine that is believed.
+fn code_of(bytes: &[u8]) -> Option<i32> {
+    let header = Header::parse(&head_of(bytes).ok()?).ok()?;
+    Some(if header.sform_code > 0 { header.sform_code } else { header.qform_code })
 }
 
 fn refused(name: &str, problem: NiftiProblem) -> NiftiError {

@@ -16,6 +16,12 @@ pub enum MeshFileError {
         output.display()
     )]
     Fractions { output: PathBuf },
+    #[error(
+        "{}: its name says `space-MNI`, its header says coordinates of the scanner (code 1): boundary sets are to be made in MNI \
+         space alone; say which of the two is right, or correct the name or the header",
+        labels.display()
+    )]
+    NameOrHeader { labels: PathBuf },
     #[error("{file}: {source}")]
     Format { file: String, source: WriteError },
     #[error("{file}: what another version of hgm noted about it cannot be read; make it again")]
