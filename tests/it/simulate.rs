@@ -91,6 +91,29 @@ fn a_result_is_a_start_and_a_reference_and_gmsh_meshes_give_the_same() {
 }
 
 #[test]
+fn nodes_of_no_tetrahedron_thin_no_mean_out() {
+    let folder = folder();
+    let mut nodes = bar().nodes_mm().to_vec();
+    nodes.extend((0..300).map(|n| [200.0 + f64::from(n), 0.0, 0.0]));
+    let mut with_more = TetMesh::new(nodes, bar().tets().to_vec(), bar().labels().to_vec()).unwrap();
+    with_more.node_sets = bar().node_sets.clone();
+    std::fs::write(folder.path().join("more.vtu"), vtu::encode(&with_more, &[], &[]).unwrap()).unwrap();
+    let light = SCENARIO.replace("-9.81", "-8.81");
+    std::fs::write(folder.path().join("light.toml"), light).unwrap();
+    let figures = |mesh: &str| {
+        let reference = format!("light-{mesh}");
+        let done = simulate(folder.path(), &[mesh, "light.toml", "-o", &reference]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let out = format!("out-{mesh}");
+        let done = simulate(folder.path(), &[mesh, "s.toml", "-o", &out, "--reference", &reference, "--json"]);
+        let json: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        ["displacement_rms_mm", "rmse_mm"].map(|figure| json[figure].as_f64().unwrap())
+    };
+    let (alone, more) = (figures("bar.vtu"), figures("more.vtu"));
+    assert!(alone.iter().zip(&more).all(|(a, b)| *a > 0.01 && (a - b).abs() < 1e-4 * a), "{alone:?} {more:?}");
+}
+
+#[test]
 fn a_motion_gets_a_series() {
     let folder = folder();
     let motion = "[solver]\nmethod = 'backward-euler'\n[dynamics]\nsteps = 6\nkeep_every = 2\n";
