@@ -9,6 +9,7 @@ use super::resection::Resection;
 use super::sag::{gravity, grid};
 use super::settings::{SynthError, SynthSettings};
 use crate::experiment::nodal_field::on_grid;
+use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::supports::{SkullSettings, with_sliding_sets};
 use crate::fem::{ElementKind, Loads, Scenario, SolverSettings, Support, simulate};
@@ -19,6 +20,7 @@ use crate::mesh::engine::{EnginePrograms, MeshSettings, MeshSize, mesh_labels};
 use crate::segment::{SULCUS_MM, label, with_closed_sulci};
 use crate::tag::{BASE, FALX, Midline, TagSettings, falx_sheet, tag_boundary_sets_with, with_closed_fissure};
 use nalgebra::Point3;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Standard gravity.
@@ -42,20 +44,21 @@ pub fn by_finite_elements(
     let straight = with_closed_fissure(&midline.straightened(&map), |p| template(midline.bent(p)));
     let (mut mesh, _) =
         mesh_labels(&straight, &mesh_settings, &EnginePrograms::default()).map_err(|e| failed(e.to_string()))?;
-    tag_boundary_sets_with(&mut mesh, &TagSettings::default(), |p| template(midline.bent(p)))
+    let tags = tag_boundary_sets_with(&mut mesh, &TagSettings::default(), |p| template(midline.bent(p)))
         .map_err(|e| failed(e.to_string()))?;
+    // What holds the truth is to be believed as what holds a patient is.
+    if let Some(warning) = tags.warnings.first() {
+        return Err(failed(warning.to_string()));
+    }
     let mesh = mesh.moved(|p| midline.bent(p)).map_err(|e| failed(e.to_string()))?;
     let (tissue, _) = mesh
-        .restricted(|l| l == label::GREY_MATTER || l == label::WHITE_MATTER)
+        .restricted(label::is_tissue)
         .and_then(|(tissue, _)| tissue.largest_face_connected_part())
         .ok_or_else(|| failed("no tissue is left".to_owned()))?;
     let skull = SkullSettings { gap_mm: settings.room_mm, ..SkullSettings::default() };
-    let material = |pa| Material::neo_hookean(pa, settings.poisson_ratio);
     let mut scenario = Scenario {
         fixed: vec![BASE.to_owned(), FALX.to_owned()],
-        materials: [("grey_matter", settings.grey_pa), ("white_matter", settings.white_pa)]
-            .map(|(name, pa)| (name.to_owned(), material(pa)))
-            .into(),
+        materials: materials(tissue.labels(), settings)?,
         loads: Loads {
             gravity_m_per_s2: (gravity(settings.seed) * GRAVITY_M_PER_S2).into(),
             density_kg_per_m3: settings.effective_density_kg_per_m3,
@@ -75,13 +78,38 @@ pub fn by_finite_elements(
     Ok(Field::of(volume))
 }
 
+/// What the tissues of these labels are made of. A lesion is held at the mean of its prior, as a patient's is: the settings say
+/// nothing of it.
+fn materials(labels: &[u8], settings: &SynthSettings) -> Result<BTreeMap<String, Material>, SynthError> {
+    let known = [("grey_matter", settings.grey_pa), ("white_matter", settings.white_pa)];
+    let mut materials: BTreeMap<String, Material> =
+        known.map(|(name, pa)| (name.to_owned(), Material::neo_hookean(pa, settings.poisson_ratio))).into();
+    let lesions = [label::TUMOUR, label::OEDEMA].into_iter().filter(|lesion| labels.contains(lesion));
+    for name in lesions.filter_map(label::name) {
+        let held = held_material(name, settings.poisson_ratio, &PriorSettings::default());
+        materials.insert(name.to_owned(), held.map_err(|e| SynthError::Sag(e.to_string()))?.material);
+    }
+    Ok(materials)
+}
+
 #[cfg(test)]
 mod tests {
+    use super::materials;
+    use crate::anatomy::label;
     use crate::experiment::synth::{SagKind, SynthSettings, synthesize};
     use crate::fem::Support;
     use crate::geometry::Position;
     use crate::image::distance::signed_distance_mm;
     use nalgebra::Vector3;
+
+    #[test]
+    fn every_tissue_of_a_head_with_a_lesion_has_a_material() {
+        let settings = SynthSettings::default();
+        let labels: Vec<u8> = (0..=u8::MAX).filter(|l| label::is_tissue(*l)).collect();
+        let found = materials(&labels, &settings).unwrap();
+        assert!(labels.iter().all(|l| found.contains_key(label::name(*l).unwrap())), "{found:?}");
+        assert_eq!(materials(&[label::GREY_MATTER], &settings).unwrap().len(), 2, "no lesion, no material of one");
+    }
 
     #[test]
     fn slow_a_brain_that_slides_moves_where_one_that_is_held_does_not_and_stays_in_its_skull() {
