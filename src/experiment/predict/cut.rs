@@ -55,7 +55,7 @@ pub enum PlannedError {
 
 /// More of a mask than this outside the brain: it belongs to another scan.
 const MOST_OUTSIDE: f64 = 0.5;
-/// A part that comes loose and is larger than this is half a brain; smaller ones are specks at the border, cc.
+/// Parts that come loose and are more than this together are half a brain; less is specks at the border, cc.
 const LARGEST_SPECK_CC: f64 = 10.0;
 
 /// Looks at a plan before anything is computed from it; `plan` is its name for messages, `drawn_mm3` its volume as it was drawn.
@@ -92,18 +92,17 @@ pub fn planned<F: Frame>(
         return Err(PlannedError::MoreThanHalf { plan: plan(), resected_cc, tissue_cc });
     }
     let left = Mask::from_fn(labels.grid, |n| tissue.data[n] && !mask.data[n]);
-    let apart_cc = (second_largest(&left) as f64 - second_largest(&tissue) as f64) * voxel_cc;
+    let apart_cc = (apart(&left) as f64 - apart(&tissue) as f64) * voxel_cc;
     if apart_cc > LARGEST_SPECK_CC {
         return Err(PlannedError::InTwo { plan: plan(), apart_cc });
     }
     Ok(found)
 }
 
-/// Voxels of the second largest part.
-fn second_largest<F: Frame>(mask: &Mask<F>) -> usize {
-    let mut voxels = components(mask, Connectivity::Faces).voxels;
-    voxels.sort_unstable_by(|a, b| b.cmp(a));
-    voxels.get(1).copied().unwrap_or(0)
+/// Voxels that are not of the largest part: a mesh holds that one alone, however many pieces the others are.
+fn apart<F: Frame>(mask: &Mask<F>) -> usize {
+    let voxels = components(mask, Connectivity::Faces).voxels;
+    voxels.iter().sum::<usize>() - voxels.iter().copied().max().unwrap_or(0)
 }
 
 /// The voxels of a grid whose centre lies in an ellipsoid along the axes of its frame, mm.
@@ -138,6 +137,29 @@ mod tests {
         let labels = labels();
         let volume_mm3 = 4.0 / 3.0 * std::f64::consts::PI * half_axes.iter().product::<f64>();
         planned("plan.nii", volume_mm3, &ellipsoid_mask(&labels.grid, centre, half_axes), &labels)
+    }
+
+    #[test]
+    fn parts_that_come_loose_count_together() {
+        // A block with four arms of 8 cc each, and plans that cut the first ones off.
+        let grid = Grid::<Mni>::axis_aligned([80, 80, 40], [1.0; 3], [0.0; 3]);
+        let of = |arms: usize| {
+            let at = |n: usize| [0, 1].map(|a| grid.voxel(n)[a] as i32 - 40);
+            let within = |n: usize| {
+                let [far, near] = [at(n)[0].abs().max(at(n)[1].abs()), at(n)[0].abs().min(at(n)[1].abs())];
+                (far < 16 || far < 36 && near < 8) && (4..36).contains(&grid.voxel(n)[2])
+            };
+            let labels = LabelMap::from_fn(grid, |n| if within(n) { label::WHITE_MATTER } else { label::BACKGROUND });
+            let cut = Mask::from_fn(grid, |n| {
+                let [x, y] = at(n);
+                let along = [x, -x, y, -y];
+                within(n) && along[..arms].iter().any(|far| (16..19).contains(far))
+            });
+            planned("plan.nii", cut.count() as f64, &cut, &labels)
+        };
+        assert!(of(1).is_ok(), "{:?}", of(1));
+        let said = of(4).unwrap_err().to_string();
+        assert!(said.contains("in two: 33 cc"), "{said}");
     }
 
     #[test]
