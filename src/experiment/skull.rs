@@ -5,7 +5,7 @@ use crate::geometry::{Frame, Position, SmoothField};
 use crate::image::distance::signed_distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::{LabelMap, Mask};
-use crate::segment::{label, with_closed_sulci};
+use crate::segment::{inside_of_cortex, label};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,7 @@ impl SkullSettings {
     /// What lies inside the skull, by the labels of the pre-operative scan.
     pub fn inside<F: Frame>(&self, labels: &LabelMap<F>) -> Mask<F> {
         match self.from {
-            SkullFrom::Cortex => with_closed_sulci(labels, self.closing_mm).map(|l| l != label::BACKGROUND),
+            SkullFrom::Cortex => inside_of_cortex(labels, self.closing_mm),
             SkullFrom::Scan => labels.map(|l| l != label::BACKGROUND),
         }
     }

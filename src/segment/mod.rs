@@ -50,6 +50,6 @@ pub use scan_quality::{Air, RegionQuality, ScanQualities, ScanQuality, scan_qual
 pub use segmentation::{
     SegmentError, SegmentOverrides, SegmentSettings, Segmentation, TissueVolumes, segment_t1, segment_with_priors,
 };
-pub use sulci::{SULCUS_MM, with_closed_sulci};
+pub use sulci::{SULCUS_MM, closed_sulci, inside_of_cortex, with_closed_sulci};
 pub use ventricle::VentricleSettings;
 pub use warning::SegmentWarning;
