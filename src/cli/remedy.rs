@@ -126,6 +126,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
         WorkflowError::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
         WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
+        WorkflowError::Lost { .. } => "see --cells and --edge-mm",
         WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
         WorkflowError::SampleMissing { .. } => {

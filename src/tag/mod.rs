@@ -142,6 +142,22 @@ impl TagReport {
     pub fn set(&self, name: &str) -> Option<&SetReport> {
         self.sets.iter().find(|set| set.name == name)
     }
+
+    /// The same of a part of the mesh: sets that have lost nodes or facets with the rest are measured again. (What a slab of
+    /// nodes is the area of goes with the tissue: it stays.)
+    #[must_use]
+    pub fn of_part(mut self, part: &TetMesh, settings: &TagSettings) -> Self {
+        for set in &mut self.sets {
+            let facets = part.facet_sets.get(&set.name).map_or(&[][..], Vec::as_slice);
+            set.nodes = part.node_sets.get(&set.name).map_or(0, Vec::len);
+            if facets.len() < set.facets {
+                let moment = Moment::of(part, facets);
+                (set.facets, set.area_mm2, set.centroid_mm) = (facets.len(), moment.area_mm2, moment.centroid_mm());
+            }
+        }
+        self.warnings = implausible(&mut self.sets, settings);
+        self
+    }
 }
 
 /// Why a set is not to be believed.
@@ -223,8 +239,14 @@ pub fn tag_boundary_sets_with(
 
     let mut sets = tagger.sets;
     sets.sort_by(|a, b| a.name.cmp(&b.name));
+    let warnings = implausible(&mut sets, settings);
+    Ok(TagReport { sets, median_edge_mm, warnings })
+}
+
+/// Marks the sets whose area is not to be believed, and says so of each.
+fn implausible(sets: &mut [SetReport], settings: &TagSettings) -> Vec<TagWarning> {
     let mut warnings = Vec::new();
-    for set in &mut sets {
+    for set in sets {
         let Some(&[low, high]) = settings.plausible_area_mm2.get(&set.name) else { continue };
         set.plausible = (low..=high).contains(&set.area_mm2);
         if !set.plausible {
@@ -232,7 +254,7 @@ pub fn tag_boundary_sets_with(
             warnings.push(TagWarning::Area { set, area_mm2, low_mm2: low, high_mm2: high });
         }
     }
-    Ok(TagReport { sets, median_edge_mm, warnings })
+    warnings
 }
 
 fn is_midsagittal(mesh: &TetMesh, facet: &[u32; 3]) -> bool {
@@ -358,12 +380,7 @@ impl<T: Fn([f64; 3]) -> [f64; 3]> Tagger<'_, T> {
     }
 
     fn moment(&self, facets: &[[u32; 3]]) -> Moment {
-        let mut moment = Moment::default();
-        for &facet in facets {
-            let area_mm2 = self.mesh.area_vector_mm2(facet).norm();
-            moment.add(area_mm2, Vector3::from(self.mesh.facet_centroid_mm(facet)));
-        }
-        moment
+        Moment::of(self.mesh, facets)
     }
 
     fn add_surface(&mut self, name: &str, facets: Vec<[u32; 3]>, reason: &'static str) -> Result<(), TagError> {
@@ -498,6 +515,14 @@ struct Moment {
 }
 
 impl Moment {
+    fn of(mesh: &TetMesh, facets: &[[u32; 3]]) -> Self {
+        let mut moment = Self::default();
+        for &facet in facets {
+            moment.add(mesh.area_vector_mm2(facet).norm(), Vector3::from(mesh.facet_centroid_mm(facet)));
+        }
+        moment
+    }
+
     fn add(&mut self, area_mm2: f64, centroid: Vector3<f64>) {
         self.area_mm2 += area_mm2;
         self.first_mm3 += centroid * area_mm2;

@@ -2,6 +2,7 @@
 
 use super::error::{MeshFileError, WorkflowError};
 use super::labels::any_labels;
+use super::lost_label::lost_labels;
 use super::programs::Programs;
 use super::progress::Progress;
 use super::settings::Settings;
@@ -23,7 +24,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
@@ -156,7 +157,7 @@ fn make(
             Err(error) => refused.push(error.to_string()),
         }
     }
-    refused.extend(lost_labels(labels, &mesh, settings, record.edge_mm));
+    refused.extend(lost_labels(labels, &mesh, &settings.without, record.edge_mm).iter().map(ToString::to_string));
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let mut left_out_mm3 = BTreeMap::new();
     for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > LARGE_ISLAND_MM3) {
@@ -169,24 +170,6 @@ fn make(
 /// What a label is called.
 pub(super) fn name_of_label(number: u8) -> String {
     label::name(number).map_or_else(|| format!("label {number}"), str::to_owned)
-}
-
-/// Labels of the map of which the mesh has nothing.
-fn lost_labels(map: &LabelMap<Native>, mesh: &TetMesh, settings: &MeshSettings, edge_mm: f64) -> Vec<String> {
-    let mut voxels = [0usize; 256];
-    map.data.iter().for_each(|&l| voxels[usize::from(l)] += 1);
-    let lost = (1..=255u8).filter(|l| !settings.without.contains(l) && !mesh.labels().contains(l));
-    let lost = lost.map(|l| (l, voxels[usize::from(l)] as f64 * map.grid.voxel_volume_mm3()));
-    lost.filter(|&(_, mm3)| mm3 >= LARGE_ISLAND_MM3)
-        .map(|(l, mm3)| {
-            format!(
-                "the mesh has nothing of {}: all its {:.1} cc lie apart from the rest or in pieces too small for tetrahedra of \
-                 {edge_mm:.1} mm; look at the label map",
-                name_of_label(l),
-                mm3 / 1000.0
-            )
-        })
-        .collect()
 }
 
 fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {

@@ -7,6 +7,7 @@ use crate::overlay::{Drawing, NotCarried};
 use crate::register::FitWarning;
 use crate::segment::SegmentWarning;
 use crate::tag::TagWarning;
+use crate::workflow::lost_label::LostLabel;
 use serde::{Serialize, Serializer};
 use std::fmt::Display;
 use thiserror::Error;
@@ -53,6 +54,18 @@ pub enum Warning {
     PlanOutsideBrain { plan: String, percent: f64 },
     #[error("a part of {tissue} of {:.2} cc lay apart and was left out of the mesh", volume_mm3 / 1000.0)]
     Island { tissue: &'static str, volume_mm3: f64 },
+    #[error(
+        "{cc:.1} cc of tissue ({parts}) are cut off from the rest of the brain and left out of the mesh, as if they were not there: \
+         check what is taken and the labels around it; what a resection cuts off belongs to it"
+    )]
+    CutOff { cc: f64, parts: String },
+    #[error(
+        "{cc:.1} cc of fluid within the brain (an old stroke, a cyst) are a hole of the body: nothing presses on its wall; look at \
+         the labels where there is none"
+    )]
+    EnclosedFluid { cc: f64 },
+    #[error(transparent)]
+    Lost(#[from] LostLabel),
     #[error("{sample} is left out: its body finds no equilibrium under this load")]
     SampleLeftOut { sample: String },
     #[error("{model}: left out: {reason}")]

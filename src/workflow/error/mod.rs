@@ -27,6 +27,7 @@ pub use taken_up::TakenUpError;
 pub use warp::WarpError;
 
 use super::cohort::DatasetError;
+use super::lost_label::LostLabel;
 use super::settings::SettingsError;
 use crate::artefact::WriteError;
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
@@ -98,6 +99,8 @@ pub enum WorkflowError {
     Engine { labels: String, source: EngineError },
     #[error("{labels}: the mesh of these labels holds no grey or white matter; look at the labels")]
     NoTissue { labels: &'static str },
+    #[error("{labels}: {lost}")]
+    Lost { labels: &'static str, lost: LostLabel },
     #[error(transparent)]
     Tag(#[from] TagError),
     #[error(transparent)]

@@ -13,11 +13,12 @@ use crate::mesh::format::{msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
-use crate::segment::{SULCUS_MM, label, with_closed_sulci};
+use crate::segment::{SULCUS_MM, closed_sulci, label, with_closed_sulci};
 use crate::tag::{Midline, TagReport, falx_sheet, tag_boundary_sets_with, with_closed_fissure};
 use crate::workflow::case::Case;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::facts::MeshFacts;
+use crate::workflow::lost_label::{LostLabel, lost_labels};
 use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::{StageName, Subject};
 use crate::workflow::warning::Warning;
@@ -25,10 +26,12 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const NAME: StageName = StageName::Mesh;
 /// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
 pub(crate) const LARGE_ISLAND_MM3: f64 = 500.0;
+/// Tissue that is cut off and is more than this is a part of the brain that a simulation must not do without, mm3.
+const LARGEST_CUT_OFF_MM3: f64 = 10_000.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
@@ -62,8 +65,15 @@ pub(crate) fn mesh(
             work.tell(|p| p.noted("the mesh is the prediction's: what was taken is what was planned, voxel for voxel"));
             return Ok(mesh);
         }
-        let body = with_closed_sulci(labels, SULCUS_MM);
-        let Tagged { rest, whole, record, tags } = tagged(work, &body, &settings, template_from_labels)?;
+        let (body, holes_mm3) = closed_sulci(labels, SULCUS_MM);
+        let Tagged { rest, whole, record, tags, cut_off_mm3 } = tagged(work, &body, &settings, template_from_labels)?;
+        let lost = lost_labels(&body, &whole, &settings.without, record.edge_mm);
+        if let Some(lost) = lost.iter().find(|lost| lost.label == label::RESECTED) {
+            // Nothing would be taken out, and a whole brain pass for the operated one.
+            return Err(WorkflowError::Lost { labels: PRE_LABELS, lost: lost.clone() });
+        }
+        // Of a part that was cut off a set has nothing.
+        let tags = tags.of_part(&rest, &work.settings.tag);
         let mut produced = Produced::default();
         produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
         produced.files.push((REST_GMSH.to_owned(), msh::encode(&rest)?));
@@ -76,7 +86,17 @@ pub(crate) fn mesh(
             let tissue = label::name(island.label).unwrap_or("unknown");
             Warning::Island { tissue, volume_mm3: island.volume_mm3 }
         }));
+        let cut_off = cut_off(&cut_off_mm3);
+        if holes_mm3 > 0.0 {
+            produced.warn([Warning::EnclosedFluid { cc: holes_mm3 / 1000.0 }]);
+        }
+        produced.warn(cut_off.as_ref().map(|(warning, _)| warning));
+        produced.warn(&lost);
         produced.warn(&tags.warnings);
+        let gated = |lost: &&LostLabel| lost.label == label::VENTRICLE;
+        let implausible = tags.warnings.iter().map(ToString::to_string);
+        let implausible = implausible.chain(lost.iter().filter(gated).map(ToString::to_string));
+        let much = cut_off.iter().filter(|(_, much)| *much).map(|(warning, _)| warning.to_string());
         let sets = tags.sets.iter().map(|set| SetOutcome {
             name: set.name.clone(),
             nodes: set.nodes,
@@ -86,7 +106,7 @@ pub(crate) fn mesh(
         let facts_of_mesh = MeshFacts {
             mesh: mesh_outcome(&rest, &whole, &body, &settings),
             sets: sets.collect(),
-            implausible: tags.warnings.iter().map(ToString::to_string).collect(),
+            implausible: implausible.chain(much).collect(),
         };
         produced.facts = facts(&facts_of_mesh);
         Ok(produced)
@@ -99,6 +119,35 @@ struct Tagged {
     whole: TetMesh,
     record: MeshingRecord,
     tags: TagReport,
+    /// Tissue of `whole` that hangs on the rest by no face and is not in it, by label.
+    cut_off_mm3: BTreeMap<u8, f64>,
+}
+
+/// What is cut off in a sentence, from half a cubic centimetre on, and whether it is too much to do without.
+fn cut_off(mm3: &BTreeMap<u8, f64>) -> Option<(Warning, bool)> {
+    let all_mm3: f64 = mm3.values().sum();
+    let part = |(l, mm3): (&u8, &f64)| format!("{:.1} of {}", mm3 / 1000.0, label::name(*l).unwrap_or("unknown"));
+    let parts: Vec<String> = mm3.iter().map(part).collect();
+    let warning = Warning::CutOff { cc: all_mm3 / 1000.0, parts: parts.join(", ") };
+    (all_mm3 >= LARGE_ISLAND_MM3).then_some((warning, all_mm3 > LARGEST_CUT_OFF_MM3))
+}
+
+/// Volume of every label, mm3.
+fn volumes_mm3(mesh: &TetMesh) -> BTreeMap<u8, f64> {
+    let mut volumes = BTreeMap::new();
+    for (t, &l) in mesh.labels().iter().enumerate() {
+        *volumes.entry(l).or_insert(0.0) += mesh.volume_mm3(t);
+    }
+    volumes
+}
+
+/// What a part of a mesh has less than the whole, by label; less than this is rounding, mm3.
+fn missing_mm3(whole: &TetMesh, part: &TetMesh) -> BTreeMap<u8, f64> {
+    const ROUNDING_MM3: f64 = 1e-3;
+    let (mut missing, kept) = (volumes_mm3(whole), volumes_mm3(part));
+    missing.iter_mut().for_each(|(l, mm3)| *mm3 -= kept.get(l).unwrap_or(&0.0));
+    missing.retain(|_, mm3| *mm3 > ROUNDING_MM3);
+    missing
 }
 
 /// Meshes labels whose sulci are closed, and tags the sets.
@@ -124,9 +173,11 @@ fn tagged(
     let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, |p| in_template(bent(p)))?;
     let engine = record.engine.name();
     let whole = whole.moved(bent).map_err(|source| failed(EngineError::Invalid { engine, source }))?;
-    let tissue_of = whole.restricted(label::is_tissue).and_then(|(rest, _)| rest.largest_face_connected_part());
-    let (rest, _) = tissue_of.ok_or(WorkflowError::NoTissue { labels })?;
-    Ok(Tagged { rest, whole, record, tags })
+    let none = || WorkflowError::NoTissue { labels };
+    let (tissue, _) = whole.restricted(label::is_tissue).ok_or_else(none)?;
+    let (rest, _) = tissue.largest_face_connected_part().ok_or_else(none)?;
+    let cut_off_mm3 = missing_mm3(&tissue, &rest);
+    Ok(Tagged { rest, whole, record, tags, cut_off_mm3 })
 }
 
 /// The same body in a quarter of the tetrahedra: what a mesh does to an estimate shows in the difference.
@@ -182,5 +233,28 @@ pub fn mesh_outcome<F: Frame>(
         dice: fit.labels.iter().map(|l| (named(l.label), l.dice)).collect(),
         surface_distance_mean_mm: border.map(|d| d.mean_mm),
         surface_distance_95_mm: border.map(|d| d.percentile_95_mm),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tissue_that_hangs_on_nothing_is_told_from_half_a_cc_and_refused_from_ten() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
+        let apart = |size: f64| {
+            let far = corners[..4].iter().map(|p| [100.0 + size * p[0], size * p[1], size * p[2]]);
+            let nodes = corners.iter().copied().chain(far).collect();
+            let labels = vec![label::GREY_MATTER, label::WHITE_MATTER, label::WHITE_MATTER];
+            let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3], [1, 2, 3, 4], [5, 6, 7, 8]], labels).unwrap();
+            cut_off(&missing_mm3(&mesh, &mesh.largest_face_connected_part().unwrap().0))
+        };
+        // A corner of a cube holds a sixth of it.
+        let size_of = |cc: f64| (6000.0 * cc).cbrt();
+        assert_eq!(apart(size_of(0.4)), None);
+        let (warning, much) = apart(size_of(0.6)).unwrap();
+        assert!(!much && warning.to_string().contains("0.6 cc of tissue (0.6 of white_matter)"), "{warning}");
+        assert!(apart(size_of(11.0)).unwrap().1);
     }
 }
