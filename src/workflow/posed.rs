@@ -6,7 +6,7 @@ use super::facts::EstimateFacts;
 use super::progress::Progress;
 use super::settings::{Settings, in_words};
 use super::sights::Sights;
-use super::simulation::mesh_in;
+use super::simulation::{called_otherwise, mesh_in};
 use super::stage_name::Subject;
 use super::stages::{self, HeldBody};
 use super::user_file::{read_input, read_text, shown};
@@ -184,7 +184,8 @@ fn notes(verdict: &Verdict, compared: Option<&Comparison>, supports: Supports) -
 /// # Errors
 /// [`SimulationError`] for files that do not fit.
 pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> Result<Posed, WorkflowError> {
-    let mesh = mesh_in(file, &read_input(file)?)?;
+    let bytes = read_input(file)?;
+    let mesh = mesh_in(file, &bytes)?;
     let scenario = if let Some(path) = scenario {
         let name = path.display().to_string();
         let refused =
@@ -198,7 +199,8 @@ pub fn posed_mesh(file: &Path, scenario: Option<&Path>, settings: &Settings) -> 
         add_materials(&mesh, &mut scenario, own.poisson_ratio, &settings.prior)?;
         scenario
     };
-    Ok(Posed { name: shown(file), mesh, scenario, estimate: None, sights: Sights::default(), notes: Vec::new() })
+    let notes = called_otherwise(file, &bytes, &mesh, &scenario).iter().map(ToString::to_string).collect();
+    Ok(Posed { name: shown(file), mesh, scenario, estimate: None, sights: Sights::default(), notes })
 }
 
 /// The mean of the prior for every tissue of the mesh that the scenario has no material for.
@@ -255,6 +257,23 @@ mod tests {
         let said = of(Finding::CannotTell, &both, Supports::Evidence);
         assert!(said.contains("average") && said.contains("slides"), "an average has something of both: {said}");
         assert!(!of(Finding::CannotTell, &["supports fixed"], Supports::Evidence).contains("slides"));
+    }
+
+    #[test]
+    fn a_mesh_whose_volumes_are_called_otherwise_than_they_are_taken_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3]], vec![label::GREY_MATTER]).unwrap();
+        let text = String::from_utf8(crate::mesh::format::msh::encode(&mesh).unwrap()).unwrap();
+        std::fs::write(at("right.msh"), &text).unwrap();
+        std::fs::write(at("wrong.msh"), text.replace("\"grey_matter\"", "\"white_matter\"")).unwrap();
+        let material = "law = 'neo-hookean'\nshear_modulus_pa = 1370.0\npoisson_ratio = 0.45\n";
+        std::fs::write(at("s.toml"), format!("fixed = ['base']\n[materials.grey_matter]\n{material}")).unwrap();
+        let notes = |mesh: &str| posed_mesh(&at(mesh), Some(&at("s.toml")), &Settings::default()).unwrap().notes;
+        assert_eq!(notes("right.msh"), [""; 0]);
+        let said = notes("wrong.msh").join("; ");
+        assert!(said.contains("called `white_matter`") && said.contains("taken for `grey_matter`"), "{said}");
     }
 
     #[test]

@@ -180,7 +180,7 @@ pub(super) fn mesh_in(path: &Path, bytes: &[u8]) -> Result<TetMesh, SimulationEr
 }
 
 /// Volumes of a gmsh file that are called otherwise than the tissue that the scenario takes their numbers for.
-fn called_otherwise(path: &Path, bytes: &[u8], mesh: &TetMesh, scenario: &Scenario) -> Vec<FemWarning> {
+pub(super) fn called_otherwise(path: &Path, bytes: &[u8], mesh: &TetMesh, scenario: &Scenario) -> Vec<FemWarning> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) {
         return Vec::new();
     }
