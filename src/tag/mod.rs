@@ -9,6 +9,7 @@ mod fissure;
 mod landmark;
 mod midline;
 mod section;
+mod void;
 
 use crate::mesh::TetMesh;
 use crate::mesh::engine::MidplaneSplit;
@@ -22,6 +23,7 @@ use section::midsagittal_cut;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
+use void::without_voids;
 
 /// Held: where the brain rests on the skull, and the cut brainstem.
 pub const BASE: &str = "base";
@@ -268,6 +270,8 @@ fn is_tissue(label: u8) -> bool {
 /// The facets around and between tissue, pointing out of it.
 struct Surfaces {
     pial: Vec<[u32; 3]>,
+    /// The same without the walls of holes within.
+    outer: Vec<[u32; 3]>,
     ventricle: Vec<[u32; 3]>,
     margin: Vec<[u32; 3]>,
     /// Facets between two tissue cells with all nodes in the midsagittal plane.
@@ -283,6 +287,7 @@ impl Surfaces {
         let nodes = mesh.nodes_mm();
         let mut surfaces = Self {
             pial: Vec::new(),
+            outer: Vec::new(),
             ventricle: Vec::new(),
             margin: Vec::new(),
             in_plane: Vec::new(),
@@ -320,6 +325,7 @@ impl Surfaces {
                 (_, None) => {}
             }
         }
+        surfaces.outer = without_voids(mesh, &surfaces.pial);
         Ok(surfaces)
     }
 
@@ -474,7 +480,7 @@ impl<T: Fn([f64; 3]) -> [f64; 3]> Tagger<'_, T> {
                 self.normal_z(facet) < self.settings.base_normal_z && below_base_line(self.template_mm(centroid_mm));
             rests || centroid_mm[2] <= cut_z_mm
         };
-        let facets: Vec<[u32; 3]> = self.surfaces.pial.iter().copied().filter(on_base).collect();
+        let facets: Vec<[u32; 3]> = self.surfaces.outer.iter().copied().filter(on_base).collect();
         if facets.is_empty() {
             return Err(self.empty(BASE, "no pial facet looks down below the line of the skull base"));
         }
@@ -495,7 +501,7 @@ impl<T: Fn([f64; 3]) -> [f64; 3]> Tagger<'_, T> {
                 // A facet with one free corner still carries load; dropping it would make the area depend on the edge length.
                 && !facet.iter().all(in_falx)
         };
-        let facets: Vec<[u32; 3]> = self.surfaces.pial.iter().copied().filter(on_top).collect();
+        let facets: Vec<[u32; 3]> = self.surfaces.outer.iter().copied().filter(on_top).collect();
         let mut nodes = facets.as_flattened().to_vec();
         nodes.retain(|n| !in_falx(n));
         if nodes.is_empty() {

@@ -100,6 +100,50 @@ fn sets_survive_the_removal_of_ventricle_and_resected_tissue() {
 }
 
 #[test]
+fn sets_of_a_part_are_what_the_part_has_and_of_the_whole_what_was_tagged() {
+    let mut mesh = ellipsoid_brain(8.0, 0.0, false);
+    let tags = settings();
+    let report = tag_boundary_sets(&mut mesh, &tags).unwrap();
+    assert_eq!(report.clone().of_part(&mesh, &tags), report);
+    // The left half.
+    let of_left = |tet: &[u32; 4]| tet.iter().map(|&n| mesh.nodes_mm()[n as usize][0]).sum::<f64>() < 0.0;
+    let labels = mesh.tets().iter().map(|tet| u8::from(of_left(tet))).collect();
+    let mut halves = TetMesh::new(mesh.nodes_mm().to_vec(), mesh.tets().to_vec(), labels).unwrap();
+    (halves.node_sets, halves.facet_sets) = (mesh.node_sets.clone(), mesh.facet_sets.clone());
+    let (left, _) = halves.restricted(|l| l == 1).unwrap();
+    let ranges = TagSettings { plausible_area_mm2: Map::from([(BASE.to_owned(), [0.0, 1.0])]), ..settings() };
+    let of_left = report.clone().of_part(&left, &ranges);
+    let (whole, half) = (report.set(BASE).unwrap(), of_left.set(BASE).unwrap());
+    assert!((0.4..0.6).contains(&(half.area_mm2 / whole.area_mm2)), "{} {}", half.area_mm2, whole.area_mm2);
+    assert_eq!((half.nodes, half.facets), (left.node_sets[BASE].len(), left.facet_sets[BASE].len()));
+    assert!(half.centroid_mm[0] < -5.0 && !half.plausible && of_left.warnings.len() == 1);
+}
+
+#[test]
+fn a_hole_within_the_brain_is_neither_base_nor_top() {
+    let solid = ellipsoid_brain(8.0, 0.0, false);
+    // Deep enough for the floor of a hole to lie within the top.
+    let tags = TagSettings { superior_depth_mm: 60.0, ..settings() };
+    let hollow = |centre: [f64; 3]| {
+        let apart = |tet: &[u32; 4]| {
+            let middle = tet.iter().map(|&n| Vector3::from(solid.nodes_mm()[n as usize])).sum::<Vector3<f64>>() / 4.0;
+            (middle - Vector3::from(centre)).norm() > 12.0
+        };
+        let kept: Vec<usize> = (0..solid.tets().len()).filter(|&t| apart(&solid.tets()[t])).collect();
+        let (tets, labels) = kept.iter().map(|&t| (solid.tets()[t], solid.labels()[t])).unzip();
+        let mut mesh = TetMesh::new(solid.nodes_mm().to_vec(), tets, labels).unwrap();
+        let report = tag_boundary_sets(&mut mesh, &tags).unwrap();
+        [BASE, SUPERIOR].map(|set| report.set(set).unwrap().facets)
+    };
+    let mut whole = solid.clone();
+    let report = tag_boundary_sets(&mut whole, &tags).unwrap();
+    let facets = [BASE, SUPERIOR].map(|set| report.set(set).unwrap().facets);
+    // Low in the back, and high.
+    assert_eq!(hollow([-20.0, -40.0, -40.0]), facets);
+    assert_eq!(hollow([-20.0, -20.0, 50.0]), facets);
+}
+
+#[test]
 fn a_lattice_with_nodes_in_the_plane_gets_a_sheet_and_any_other_a_slab() {
     let mut conforming = ellipsoid_brain(8.0, 0.0, false);
     let mut shifted = ellipsoid_brain(8.0, 3.0, false);
