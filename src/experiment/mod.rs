@@ -6,6 +6,7 @@ pub mod estimate;
 pub mod field;
 pub mod landmarks;
 mod law_outcome;
+mod moduli_in_words;
 mod moments;
 pub mod nodal_field;
 pub mod observed;
