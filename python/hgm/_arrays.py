@@ -92,10 +92,12 @@ def affine(name: str, value: ArrayLike) -> NDArray[np.float64]:
     if not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
         raise InputRefused(f"{name}: dtype {array.dtype}: give real numbers, voxel indices to mm (RAS+)")
     # A file keeps three rows: a transposed matrix would lose its translation without a word.
-    if array[3].tolist() != [0, 0, 0, 1]:
-        remedy = f", or its transpose {name}.T" if array[:, 3].tolist() == [0, 0, 0, 1] else ""
+    last = [0, 0, 0, 1]
+    if not np.allclose(array[3], last, rtol=0, atol=1e-9):
+        remedy = f", or its transpose {name}.T" if np.allclose(array[:, 3], last, rtol=0, atol=1e-9) else ""
         raise InputRefused(f"{name}: last row {array[3].tolist()}: give a matrix whose last row is 0 0 0 1{remedy}")
-    return np.ascontiguousarray(array, dtype=np.float64)
+    # What products and inverses of matrices leave in it is rounding.
+    return np.vstack([np.asarray(array[:3], dtype=np.float64), np.asarray([last], dtype=np.float64)])
 
 
 def sets(value: Any, count: int) -> tuple[dict[str, list[int]], dict[str, list[list[int]]]]:

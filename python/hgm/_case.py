@@ -35,7 +35,8 @@ class Points:
     sd_mm : (n,) float64
         Standard deviation of the brain shift (root of the trace of its covariance); NaN where it is not known.
     where : list of str
-        ``tissue``, ``fluid``, ``removed`` (tissue that was taken: moved rigidly) or ``outside`` (beyond the field: the same).
+        ``tissue``, ``fluid``, ``removed`` (tissue that was taken: moved rigidly), ``outside`` (beyond the field: the same) or
+        ``rigid`` (all points, with ``to="mni"``).
     state : str
         What carried them: ``estimate``, ``fused``, ``observed``, a sample, or ``rigid``.
     warnings : list of str

@@ -112,7 +112,10 @@ impl PopulationOption {
         let literature = path.as_os_str() == "none";
         let prior = if literature { PopulationPrior::none() } else { population_prior(path)? };
         if prior.parameters.is_empty() && !literature {
-            tracing::warn!("{}: one study's worth: the literature's priors stand", path.display());
+            tracing::warn!(
+                "{}: the literature's priors stand (one study's worth, or more patients are silent than teach)",
+                path.display()
+            );
         }
         flags.set("prior.population", Some(prior));
         Ok(())

@@ -11,6 +11,7 @@ pub mod published;
 pub mod random;
 pub mod rank_test;
 pub mod rheometry;
+mod slope;
 pub mod statistics;
 pub mod study_level;
 pub mod task;

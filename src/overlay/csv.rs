@@ -13,11 +13,9 @@ pub(super) struct Table {
 
 pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> {
     refuse_other_separator(bytes, name)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(false)
-        .trim(csv::Trim::All)
-        .from_reader(below_comments(bytes));
+    let table = without_comments(bytes);
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(false).trim(csv::Trim::All).from_reader(table.as_slice());
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (n, record) in reader.records().enumerate() {
         let record = record.map_err(|e| damaged(name, format!("row {}", n + 1), in_words(&e)))?;
@@ -80,14 +78,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     Ok(Drawing { points_mm, names, pairs_mm: Vec::new(), kept: Box::new(Table { header, rows, columns }) })
 }
 
-/// The table without the comments above it. Below its first row a `#` is a part of a cell, such as a name: a row is never left out.
-fn below_comments(bytes: &[u8]) -> &[u8] {
-    let mut rest = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
-    while rest.starts_with(b"#") || rest.starts_with(b"\n") || rest.starts_with(b"\r") {
-        let end = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).map_or(rest.len(), |n| n + 1);
-        rest = &rest[end..];
-    }
-    rest
+/// The table without its comments. A line that begins with `#` and has a point's three numbers is a row: the `#` is a part of its name.
+fn without_comments(bytes: &[u8]) -> Vec<u8> {
+    let rest = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    let is_number = |cell: &[u8]| str::from_utf8(cell).is_ok_and(|cell| cell.trim().parse::<f64>().is_ok());
+    let is_row =
+        |line: &[u8]| !line.starts_with(b"#") || line.split(|b| *b == b',').filter(|c| is_number(c)).count() >= 3;
+    rest.split_inclusive(|b| *b == b'\n').filter(|line| is_row(line)).collect::<Vec<_>>().concat()
 }
 
 /// What is wrong with a row, and what to do about it.

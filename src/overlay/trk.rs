@@ -140,8 +140,8 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Drawing, OverlayError> 
     // 0 is what a writer leaves that did not know how many there would be.
     let declared = i32_at(bytes, 988);
     if declared > 0 && usize::try_from(declared).ok() != Some(lines.len()) {
-        let problem =
-            format!("it says {declared} lines and the file holds {}: it was cut short; save it again", lines.len());
+        let why = if declared as usize > lines.len() { "it was cut short" } else { "lines were added behind its head" };
+        let problem = format!("it says {declared} lines and the file holds {}: {why}; save it again", lines.len());
         return Err(damaged(name, "n_count", problem));
     }
     let mut head = bytes[..HEAD].to_vec();

@@ -8,7 +8,7 @@ use super::look_first::{LookFirst, scan_measures};
 use super::median_samples::{MedianSample, median_samples};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::experiment::rmse::median_and_mad;
-use crate::experiment::verdict::Claim;
+use crate::experiment::verdict::{Claim, Reason};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
@@ -184,10 +184,16 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         let (best, judged) = (outcome.best(), outcome.judged());
         // A stiffness that is not claimed takes no part in a cohort's.
         let claimed = outcome.verdict.finding.has_stiffness();
-        for tissue in &outcome.tissues {
+        for (tissue, _) in outcome.verdict.moduli.iter().filter(|(_, claim)| *claim != Claim::Withheld) {
             let level = best.and_then(|sample| sample.sd_levels.get(tissue).copied());
             add(format!("{tissue}_sd_level"), level.filter(|_| claimed));
         }
+        // Where only the levels end, nothing is said of the modulus.
+        let open = |of: &String, side: bool| {
+            outcome.verdict.reasons.iter().any(|reason| {
+                matches!(reason, Reason::EndOfTried { tissue, stiffest, .. } if tissue == of && *stiffest == side)
+            })
+        };
         for (tissue, claim) in &outcome.verdict.moduli {
             match claim {
                 Claim::Interval { mode_pa, .. } => add(format!("{tissue}_shear_modulus_pa"), Some(*mode_pa)),
@@ -196,8 +202,8 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
                     add(format!("{tissue}_shear_modulus_pa"), Some(*low));
                 }
                 Claim::Range { range_pa: [low, high] } => {
-                    add(format!("{tissue}_shear_modulus_low_pa"), Some(*low));
-                    add(format!("{tissue}_shear_modulus_high_pa"), Some(*high));
+                    add(format!("{tissue}_shear_modulus_low_pa"), Some(*low).filter(|_| !open(tissue, false)));
+                    add(format!("{tissue}_shear_modulus_high_pa"), Some(*high).filter(|_| !open(tissue, true)));
                 }
                 Claim::Withheld => {}
             }
@@ -250,14 +256,20 @@ mod tests {
     use crate::experiment::outcome::SampleOutcome;
 
     fn member(name: &str, status: Status, rmse_mm: Option<f64>) -> Member {
+        let sample = |id: &str, pa: f64, rmse: f64| SampleOutcome {
+            id: id.to_owned(),
+            shear_modulus_pa: BTreeMap::from([("brain".to_owned(), pa)]),
+            rmse_mm: BTreeMap::from([("margin".to_owned(), rmse)]),
+            converged: true,
+            ..SampleOutcome::default()
+        };
         let outcome = rmse_mm.map(|rmse| ExperimentOutcome {
             tissues: vec!["brain".to_owned()],
-            samples: vec![SampleOutcome {
-                id: "sample-00".to_owned(),
-                shear_modulus_pa: BTreeMap::from([("brain".to_owned(), 500.0)]),
-                rmse_mm: BTreeMap::from([("margin".to_owned(), rmse)]),
-                ..SampleOutcome::default()
-            }],
+            samples: vec![
+                sample("softest", 250.0, rmse + 9.0),
+                sample("sample-00", 500.0, rmse),
+                sample("stiffest", 1000.0, rmse + 9.0),
+            ],
             best_sample: Some("sample-00".to_owned()),
             rest_rmse_mm: BTreeMap::from([("margin".to_owned(), 3.0)]),
             ..ExperimentOutcome::default()
@@ -312,6 +324,21 @@ mod tests {
         for row in shown {
             assert!(row.figures["rmse_margin_mm"] == 50.0 && row.outlying.is_empty() && row.distance == 0.0, "{row:?}");
         }
+    }
+
+    #[test]
+    fn an_end_of_what_was_tried_is_no_column_of_the_modulus() {
+        let columns = |tried: std::ops::Range<usize>| {
+            let mut outcome = member("sub-1", Status::Done, Some(1.0)).outcome.unwrap();
+            outcome.samples = outcome.samples[tried].to_vec();
+            // As good as the best are the two of them that are kept.
+            outcome.samples.iter_mut().for_each(|s| _ = s.rmse_mm.insert("margin".to_owned(), 1.0));
+            let outcome = Some(outcome.with_verdict());
+            let cohort = Cohort::new(&[Member { outcome, ..member("sub-1", Status::Done, None) }]);
+            cohort.columns.into_iter().filter(|name| name.starts_with("brain_")).collect::<Vec<_>>()
+        };
+        assert_eq!(columns(0..2), [""; 0], "softest and stiffest of what was tried");
+        assert_eq!(columns(1..2), [""; 0], "of one modulus nothing is claimed");
     }
 
     #[test]

@@ -71,7 +71,8 @@ pub fn in_words(taught: &Taught) -> String {
         taught.patients
     );
     if !taught.moves_prior {
-        let _ = write!(text, ": one study's worth, the literature's prior stands");
+        let _ =
+            write!(text, ": the literature's prior stands (one study's worth, or more patients are silent than teach)");
     }
     text
 }

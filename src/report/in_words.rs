@@ -8,6 +8,7 @@ use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, TargetPlace};
 use crate::experiment::resection::improvement;
+use crate::experiment::verdict::Claim;
 use crate::experiment::verdict_of_samples::nearest_to_reference;
 use crate::material::law::StabilityRange;
 use crate::material::meta_model::Fit;
@@ -116,7 +117,8 @@ pub fn summary(outcome: &ExperimentOutcome) -> String {
             let alone = || format!("{state} {deformed:.3} mm");
             text += &format!("RMSE at {set}: {}\n", if against.is_empty() { alone() } else { against });
         }
-        if outcome.estimate.is_none() && outcome.verdict.finding.has_stiffness() {
+        let claimed = outcome.verdict.moduli.iter().any(|(_, claim)| *claim != Claim::Withheld);
+        if outcome.estimate.is_none() && outcome.verdict.finding.has_stiffness() && claimed {
             text += &format!("best sample {}\n", judged.id);
         }
     }

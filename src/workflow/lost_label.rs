@@ -1,10 +1,15 @@
 //! Labels of a map of which its mesh has nothing.
 
-use super::meshing::name_of_label;
+use crate::anatomy::label;
 use crate::geometry::Frame;
 use crate::image::LabelMap;
 use crate::mesh::TetMesh;
 use thiserror::Error;
+
+/// What a label is called.
+pub(super) fn name_of_label(number: u8) -> String {
+    label::name(number).map_or_else(|| format!("label {number}"), str::to_owned)
+}
 
 /// A label of a map of which its mesh has nothing.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -37,7 +42,6 @@ pub(crate) fn lost_labels<F: Frame>(map: &LabelMap<F>, mesh: &TetMesh, without: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::anatomy::label;
     use crate::geometry::Mni;
     use crate::image::Grid;
 

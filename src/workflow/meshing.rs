@@ -167,11 +167,6 @@ fn make(
     Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, refused }))
 }
 
-/// What a label is called.
-pub(super) fn name_of_label(number: u8) -> String {
-    label::name(number).map_or_else(|| format!("label {number}"), str::to_owned)
-}
-
 fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
     Ok(match extension {
         "msh" => msh::encode(mesh)?,

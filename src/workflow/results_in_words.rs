@@ -1,7 +1,8 @@
 //! What single steps have found in a few lines of text. (Of a case, a prediction and their kin: `report`.)
 
 use super::law_fitting::{FittedLaw, LawTest};
-use super::meshing::{MeshedFile, name_of_label};
+use super::lost_label::name_of_label;
+use super::meshing::MeshedFile;
 use super::programs::Finding;
 use super::segmenting::Segmented;
 use super::settings::Settings;

@@ -51,7 +51,7 @@ impl Targets {
 fn name_of(drawing: &Drawing, number: usize) -> Option<String> {
     let name = drawing.names.get(number)?.replace(char::is_control, " ");
     let name = name.trim();
-    (!name.is_empty() && name != (number + 1).to_string()).then(|| name.to_owned())
+    (!name.is_empty()).then(|| name.to_owned())
 }
 
 /// Whether the brain has a voxel near a point.
@@ -77,7 +77,7 @@ mod tests {
     use crate::image::Grid;
 
     #[test]
-    fn a_target_has_the_name_of_its_file_in_one_line_and_a_number_is_none() {
+    fn a_target_has_the_name_of_its_file_in_one_line() {
         let of = |text: &str, file: &str| {
             let drawing = Drawing::decode(text.as_bytes(), file).unwrap();
             (0..drawing.points_mm.len()).map(|n| name_of(&drawing, n)).collect::<Vec<_>>()

@@ -271,7 +271,7 @@ impl PopulationFile {
             let name = &read.name;
             if (read.patients, read.moves_prior) != (follows.patients, follows.moves_prior) {
                 let of = |t: &Taught| format!("`patients` {} and `moves_prior` {}", t.patients, t.moves_prior);
-                return Err(format!("`{name}` has {}, its moments {}", of(read), of(follows)));
+                return Err(format!("`{name}` has {}, its moments and `left_out` give {}", of(read), of(follows)));
             }
             let mut figures = read.figures().into_iter().zip(follows.figures());
             if let Some(((key, is), (_, should))) =

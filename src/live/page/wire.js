@@ -32,9 +32,10 @@ socket.onmessage = (event) => {
 function heard(message) {
   if (message.refused) {
     // A switch that was set for what did not happen goes back to where the body stands.
-    if (message.stands) take(message.stands);
-    asked = 0;
-    legend();
+    if (message.stands) {
+      asked = 0;
+      take(message.stands);
+    }
     return say(message.refused);
   }
   if (message.file) return save(message.file, new Blob([message.text]));

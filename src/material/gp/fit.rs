@@ -6,6 +6,7 @@
 use super::gradient::negative_log_likelihood_and_gradient;
 use super::hyperparameters::Hyperparameters;
 use crate::material::random::CounterRng;
+use crate::material::slope::{STEEP, left_over};
 use crate::material::task::TASKS;
 use crate::material::training::TrainingData;
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
@@ -122,19 +123,15 @@ pub enum FitWarning {
     },
 }
 
-/// A gradient below this for each observation is flat: a step of one in all logarithms gains no more.
-const STEEP: f64 = 1e-5;
-
 impl HyperparameterFit {
     /// What is to be told of it beside the negative log likelihood of the published hyperparameters on the same data.
     pub fn warnings(&self, settings: &FitSettings, data: &TrainingData, published: f64) -> Vec<FitWarning> {
-        let slope = self.gradient_norm / data.observations().max(1) as f64;
-        let unfinished = FitWarning::Unfinished { slope, iterations: settings.iterations };
+        let slope = left_over(self.gradient_norm, data.observations());
+        let unfinished = slope.map(|slope| FitWarning::Unfinished { slope, iterations: settings.iterations });
         let found = self.negative_log_likelihood;
-        // Less than a hundredth is no other explanation. A slope that is no number is no flat one.
-        let worse = FitWarning::WorseThanPublished { found, published };
-        let told = [(slope.is_nan() || slope > STEEP, unfinished), (found > published + 0.01, worse)];
-        told.into_iter().filter(|(holds, _)| *holds).map(|(_, warning)| warning).collect()
+        // Less than a hundredth is no other explanation.
+        let worse = (found > published + 0.01).then_some(FitWarning::WorseThanPublished { found, published });
+        unfinished.into_iter().chain(worse).collect()
     }
 }
 

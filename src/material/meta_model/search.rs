@@ -112,7 +112,7 @@ pub enum FitError {
     /// Rows at too few stretches.
     #[error(
         "{found} stretches besides 1 differ, and {model} has {needed} parameters: they would not be determined; give rows at {needed} \
-         stretches or more"
+         stretches or more, or name a law of fewer parameters (`--law neo-hookean`)"
     )]
     TooFewStretches {
         /// Different stretches away from rest.

@@ -5,6 +5,7 @@ use super::spreads::{SPREADS, Spreads};
 use super::study::Studies;
 use crate::material::meta_model;
 use crate::material::random::CounterRng;
+use crate::material::slope::{STEEP, left_over};
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
@@ -45,14 +46,10 @@ pub struct Unfinished {
     pub slope: f64,
 }
 
-/// A gradient below this for each point is flat.
-const STEEP: f64 = 1e-5;
-
 impl StudyLevelFit {
     /// Whether the search came to where the probability is greatest of these studies.
     pub fn warning(&self, studies: &Studies) -> Option<Unfinished> {
-        let slope = self.gradient_norm / studies.points().max(1) as f64;
-        (slope.is_nan() || slope > STEEP).then_some(Unfinished { slope })
+        left_over(self.gradient_norm, studies.points()).map(|slope| Unfinished { slope })
     }
 }
 

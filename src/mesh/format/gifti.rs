@@ -4,6 +4,7 @@
 //! Coordinates are single precision as the format demands: good to 4e-6 mm within 128 mm of the origin.
 //! Source: GIFTI Surface Data Format 1.0 (2011), <https://www.nitrc.org/projects/gifti/>.
 
+pub use super::gifti_space::Space;
 use super::gifti_space::{Transform, to_scanner};
 use super::{Field, ReadError, WriteError, check_fields, line};
 use crate::mesh::TriMesh;
@@ -18,32 +19,6 @@ const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
      <!DOCTYPE GIFTI SYSTEM \"http://www.nitrc.org/frs/download.php/115/gifti.dtd\">\n";
 /// Rows on lines of their own: nibabel reads the matrix by lines.
 const IDENTITY: &str = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1";
-
-/// Which frame a surface's coordinates are in, in GIFTI's words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Space {
-    /// A scan's own frame.
-    Scanner,
-    /// MNI 152.
-    Mni152,
-    /// Talairach's by its word, which Connectome Workbench and FreeSurfer also write of surfaces in the scanner's frame.
-    Talairach,
-}
-
-impl Space {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Scanner => "NIFTI_XFORM_SCANNER_ANAT",
-            Self::Mni152 => "NIFTI_XFORM_MNI_152",
-            Self::Talairach => "NIFTI_XFORM_TALAIRACH",
-        }
-    }
-
-    /// The frame by its name in a file; `None` for a word that names no known one.
-    pub(super) fn named(word: &str) -> Option<Self> {
-        [Self::Scanner, Self::Mni152, Self::Talairach].into_iter().find(|space| space.name() == word.trim())
-    }
-}
 
 /// The bytes of a `.surf.gii` file; `name` says what the surface is (`ventricle`).
 ///

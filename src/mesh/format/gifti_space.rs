@@ -3,11 +3,35 @@
 //! FreeSurfer keeps its surfaces about the middle of its own volume and writes the way to the scanner's frame beside them, in newer
 //! versions as the format's matrix, in older ones in words of its own alone.
 
-use super::gifti::Space;
-
 const SCANNER: &str = "NIFTI_XFORM_SCANNER_ANAT";
 /// FreeSurfer's words for the middle of its volume in the scanner's frame, mm.
 const MIDDLE: [&str; 3] = ["VolGeomC_R", "VolGeomC_A", "VolGeomC_S"];
+
+/// Which frame a surface's coordinates are in, in GIFTI's words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// A scan's own frame.
+    Scanner,
+    /// MNI 152.
+    Mni152,
+    /// Talairach's by its word, which Connectome Workbench and FreeSurfer also write of surfaces in the scanner's frame.
+    Talairach,
+}
+
+impl Space {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Scanner => "NIFTI_XFORM_SCANNER_ANAT",
+            Self::Mni152 => "NIFTI_XFORM_MNI_152",
+            Self::Talairach => "NIFTI_XFORM_TALAIRACH",
+        }
+    }
+
+    /// The frame by its name in a file; `None` for a word that names no known one.
+    fn named(word: &str) -> Option<Self> {
+        [Self::Scanner, Self::Mni152, Self::Talairach].into_iter().find(|space| space.name() == word.trim())
+    }
+}
 
 /// A `CoordinateSystemTransformMatrix` as it stands in the file.
 #[derive(Default)]
