@@ -6,10 +6,12 @@
 
 mod manifest;
 mod reason;
+mod signal;
 mod stage;
 mod write;
 
 pub use manifest::{Manifest, OutputRecord, Provenance};
 pub use reason::Reason;
+pub use signal::{at_signal, end_between_files};
 pub use stage::{Produced, Stage, StageError, StageOutcome};
-pub use write::{WriteError, check_writable, no_more_writes, sha256_hex, write_whole};
+pub use write::{WriteError, check_writable, sha256_hex, write_whole};

@@ -3,7 +3,7 @@
 use super::{Failure, Session, session::warn};
 use crate::report::forecast_in_words::evaluation_table;
 use crate::report::in_words::landmark_table;
-use crate::workflow::{Case, Evaluated, Landmarks, SeenAfterwards, evaluate_case};
+use crate::workflow::{Evaluated, Landmarks, SeenAfterwards, evaluate_case};
 use std::path::PathBuf;
 
 /// Landmarks against a case (target registration error), or a prediction against the later case (coverage, scores)
@@ -39,9 +39,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         pre_from_post: args.post_to_pre.clone(),
     };
     let found = evaluate_case(&args.case, &seen)?;
-    for folder in [&args.case].into_iter().chain(&args.against) {
-        warn(&Case::open(folder)?.gate_warnings());
-    }
+    warn(&seen.doubts(&args.case)?);
     match found {
         Evaluated::Landmarks(found) => session.emit(&found, &landmark_table(&found)),
         Evaluated::Prediction(found) => session.emit(&found, &evaluation_table(&found)),

@@ -1,8 +1,7 @@
 //! `hgm live CASE|MESH [SCENARIO]`: a body to pull at in the browser, or a recorded session again.
 
-use super::session::at_signal;
 use super::{Failure, Session};
-use crate::artefact::{check_writable, write_whole};
+use crate::artefact::{at_signal, check_writable, write_whole};
 use crate::live::{LiveBody, replay_to_files, serve};
 use crate::workflow::{BodySource, Layer, Resection, posed_case, posed_mesh};
 use anyhow::anyhow;

@@ -60,87 +60,60 @@ fn of_engine(error: &EngineError) -> &'static str {
 }
 
 fn of_workflow(error: &WorkflowError) -> Option<String> {
+    use WorkflowError as Job;
     let said = match error {
-        WorkflowError::Asked(error) => of_asking(error),
-        WorkflowError::Case(error) => return of_case(error),
-        WorkflowError::Dataset(error) => return of_dataset(error),
-        WorkflowError::Cohort(CohortError::OthersCases { .. }) => "see --work-dir",
-        WorkflowError::Cohort(CohortError::NobodyRun { .. }) => "run `hgm bids BIDS_DIR OUT participant` first",
-        WorkflowError::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
-        WorkflowError::Engine { source, .. } => of_engine(source),
-        WorkflowError::Labels(LabelMapError::Import {
-            source: ImportError::Numbers(LabelError::Mask { .. }), ..
-        }) => "see --brain-mask",
-        WorkflowError::Registration { source: RegisterError::OtherSize { .. }, .. }
-        | WorkflowError::Rigid { source: RegisterError::OtherSize { .. }, .. } => {
+        Job::Asked(error) => of_asking(error),
+        Job::Case(error) => return of_case(error),
+        Job::Dataset(error) => return of_dataset(error),
+        Job::Cohort(CohortError::OthersCases { .. }) => "see --work-dir",
+        Job::Cohort(CohortError::NobodyRun { .. }) => "run `hgm bids BIDS_DIR OUT participant` first",
+        Job::Image(NiftiError { problem, .. }) => return of_image(problem).map(str::to_owned),
+        Job::Engine { source, .. } => of_engine(source),
+        Job::Labels(LabelMapError::Import { source: ImportError::Numbers(LabelError::Mask { .. }), .. }) => {
+            "see --brain-mask"
+        }
+        Job::Registration { source: RegisterError::OtherSize { .. }, .. }
+        | Job::Rigid { source: RegisterError::OtherSize { .. }, .. } => {
             "where both are right `[register] largest_size_difference_percent` in a settings file (--config) takes more"
         }
-        WorkflowError::Registration { .. } => {
+        Job::Registration { .. } => {
             "--pose-start FILE says where to look for it, --pose FILE gives it by hand, --dseg FILE a label map that says it"
         }
-        WorkflowError::Rigid { .. } | WorkflowError::Head { .. } => {
+        Job::Rigid { .. } | Job::Head { .. } => {
             "`hgm prep` takes a pose (--pose), a label map (--dseg) and masks of your own"
         }
-        WorkflowError::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
-        WorkflowError::Synth(SynthError::NoRoomForLesion { .. }) => "see --old-lesion-cc, --resection-cc and --lobe",
-        WorkflowError::Labels(_) => "see --labels",
+        Job::Synth(SynthError::LobeTooSmall { .. }) => "see --resection-cc",
+        Job::Synth(SynthError::NoRoomForLesion { .. }) => "see --old-lesion-cc, --resection-cc and --lobe",
+        Job::Labels(_) => "see --labels",
         // A scan alone may have been given.
-        WorkflowError::Pair(PairError::Head { .. }) => {
-            "--brain-mask takes a mask of your own, --dseg a label map, --pose a pose"
-        }
-        WorkflowError::Pair(_) => {
+        Job::Pair(PairError::Head { .. }) => "--brain-mask takes a mask of your own, --dseg a label map, --pose a pose",
+        Job::Pair(_) => {
             "--cavity-mask, --resected-mask and --brain-mask take masks of your own, --dseg a label map, --pose a pose"
         }
-        WorkflowError::Predict(
-            PredictError::Plan(_)
-            | PredictError::NoPlan
-            | PredictError::Ellipsoid { .. }
-            | PredictError::NoSurface { .. }
-            | PredictError::OtherSurface { .. }
-            | PredictError::OpenSurface { .. }
-            | PredictError::NoVoxel { .. }
-            | PredictError::BesideScan { .. },
-        ) => "see --resection and --resection-ellipsoid",
-        WorkflowError::OtherCohort { .. }
-        | WorkflowError::Predict(PredictError::Taught(TaughtError::OtherTissues { .. })) => {
-            "see --tissues and --population"
-        }
-        WorkflowError::Predict(PredictError::Taught(_)) => "see --population, --drained and --fluid-below",
-        WorkflowError::Predict(PredictError::Level(LevelError::BelowBrain { .. })) => "see --fluid-below and --drained",
-        WorkflowError::Predict(PredictError::Level(LevelError::NoBrain)) => "--dseg takes labels of your own",
-        WorkflowError::Predict(PredictError::OneHead { .. }) => "see --head",
-        WorkflowError::Predict(PredictError::OnePlan { .. } | PredictError::SeveralPlans { .. }) => {
-            "name another folder (-o)"
-        }
-        WorkflowError::Predict(PredictError::Twice { .. }) => "give it once, and another beside it",
-        WorkflowError::Predict(PredictError::NoLabelMap { .. }) => "see --dseg",
-        WorkflowError::Predict(PredictError::Label { .. } | PredictError::NoSuchLabel { .. }) => {
-            "see --resection-label"
-        }
-        WorkflowError::Predict(PredictError::NoTarget { .. } | PredictError::TargetOutside { .. }) => "see --targets",
-        WorkflowError::Predict(PredictError::NoDraws { .. }) => "run `hgm predict` on it again",
-        WorkflowError::Evaluate(error) => of_evaluation(error)?,
-        WorkflowError::TakenUp(error) => return Some(of_taking_up(error)),
-        WorkflowError::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
-        WorkflowError::Input(InputError::MaskGrid { role, .. }) => option(*role),
-        WorkflowError::NoSuchModel { .. } => "`hgm gp studies` lists them",
-        WorkflowError::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
-        WorkflowError::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
-        WorkflowError::Lost { .. } => "see --cells and --edge-mm",
-        WorkflowError::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
-        WorkflowError::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
-        WorkflowError::SampleMissing { .. } => {
+        Job::OtherCohort { .. } => TISSUES_OF_POPULATION,
+        Job::Predict(error) => of_predicting(error)?,
+        Job::Evaluate(error) => of_evaluation(error)?,
+        Job::TakenUp(error) => return Some(of_taking_up(error)),
+        Job::Tag(TagError::Empty { .. }) => "`hgm mesh --sets none` does without",
+        Job::Input(InputError::MaskGrid { role, .. }) => option(*role),
+        Job::NoSuchModel { .. } => "`hgm gp studies` lists them",
+        Job::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
+        Job::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
+        Job::Lost { .. } => "see --cells and --edge-mm",
+        Job::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
+        Job::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
+        Job::SampleMissing { .. } => {
             "run `hgm sweep CASE` on the shard it belongs to with the settings of the other shards (`hgm why CASE` tells \
              what differs)"
         }
-        WorkflowError::Mesh(MeshFileError::Output { .. } | MeshFileError::Fractions { .. })
-        | WorkflowError::Simulation(SimulationError::Output { .. }) => "correct -o",
-        WorkflowError::Simulation(SimulationError::StartOfMotion) => "leave --start out",
-        WorkflowError::Mesh(MeshFileError::NameOrHeader { .. }) => "--sets mni or --sets none says it",
-        WorkflowError::Mesh(MeshFileError::Noted { .. }) | WorkflowError::Simulation(SimulationError::Noted { .. }) => {
+        Job::Mesh(MeshFileError::Output { .. } | MeshFileError::Fractions { .. })
+        | Job::Simulation(SimulationError::Output { .. }) => "correct -o",
+        Job::Simulation(SimulationError::StartOfMotion) => "leave --start out",
+        Job::Mesh(MeshFileError::NameOrHeader { .. }) => "--sets mni or --sets none says it",
+        Job::Mesh(MeshFileError::Noted { .. }) | Job::Simulation(SimulationError::Noted { .. }) => {
             "run again with --force"
         }
-        WorkflowError::Settings(error) => return of_settings(error),
+        Job::Settings(error) => return of_settings(error),
         _ => return None,
     };
     Some(said.to_owned())
@@ -160,21 +133,45 @@ fn of_asking(error: &AskedError) -> &'static str {
     }
 }
 
-fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
+const TISSUES_OF_POPULATION: &str = "see --tissues and --population";
+
+fn of_predicting(error: &PredictError) -> Option<&'static str> {
+    use PredictError::{BesideScan, Ellipsoid, NoPlan, NoSurface, NoVoxel, OpenSurface, OtherSurface, Plan};
+    use PredictError::{Label, Level, NoSuchLabel, NoTarget, OnePlan, SeveralPlans, TargetOutside, Taught};
     Some(match error {
-        EvaluateError::NothingSeen { .. } => {
+        Plan(_) | NoPlan | Ellipsoid { .. } | NoSurface { .. } => "see --resection and --resection-ellipsoid",
+        OtherSurface { .. } | OpenSurface { .. } | NoVoxel { .. } | BesideScan { .. } => of_predicting(&NoPlan)?,
+        Taught(TaughtError::OtherTissues { .. }) => TISSUES_OF_POPULATION,
+        Taught(_) => "see --population, --drained and --fluid-below",
+        Level(LevelError::BelowBrain { .. }) => "see --fluid-below and --drained",
+        Level(LevelError::NoBrain) => "--dseg takes labels of your own",
+        PredictError::OneHead { .. } => "see --head",
+        OnePlan { .. } | SeveralPlans { .. } => "name another folder (-o)",
+        PredictError::Twice { .. } => "give it once, and another beside it",
+        PredictError::NoLabelMap { .. } => "see --dseg",
+        Label { .. } | NoSuchLabel { .. } => "see --resection-label",
+        NoTarget { .. } | TargetOutside { .. } => "see --targets",
+        PredictError::NoDraws { .. } => "run `hgm predict` on it again",
+        _ => return None,
+    })
+}
+
+fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
+    use EvaluateError as Seen;
+    Some(match error {
+        Seen::NothingSeen { .. } => {
             "--against CASE names the case that `hgm run` has made of both scans, --landmarks points on both"
         }
-        EvaluateError::NotAPrediction { .. } => {
+        Seen::NotAPrediction { .. } => {
             "give the folder of `hgm predict` first and the other after --against; landmarks go without --against"
         }
-        EvaluateError::NoLandmarks { .. } => "--landmarks takes points on both scans",
-        EvaluateError::NothingAfter { .. } => "--against takes a folder that `hgm run` has made",
-        EvaluateError::NowhereSeen { .. } => "--seen chooses the other state",
-        EvaluateError::NoPose { .. } => {
+        Seen::NoLandmarks { .. } => "--landmarks takes points on both scans",
+        Seen::NothingAfter { .. } => "--against takes a folder that `hgm run` has made",
+        Seen::NowhereSeen { .. } => "--seen chooses the other state",
+        Seen::NoPose { .. } => {
             "--against CASE says it, or --post-to-pre FILE, as `hgm register POST PRE -o FILE` writes it"
         }
-        EvaluateError::OtherScan { .. } | EvaluateError::OtherGrid { .. } | EvaluateError::NoLandmark { .. } => None?,
+        Seen::OtherScan { .. } | Seen::OtherGrid { .. } | Seen::NoLandmark { .. } => None?,
     })
 }
 

@@ -5,30 +5,18 @@ use super::failure::Failure;
 use super::flags::word;
 use super::listener::{Listener, TAKEN_FOR};
 use super::output::print_line;
-use crate::artefact::no_more_writes;
+use crate::artefact::end_between_files;
 use crate::image::nifti::Orientation;
 use crate::workflow::{Case, Layer, Place, Programs, Progress, Settings, Shared, read_text};
 use anyhow::{Context, anyhow};
 use serde::Serialize;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
 /// Whether a result has been printed: then stdout is whole, and a failure is told on stderr and by the exit code alone.
 static EMITTED: AtomicBool = AtomicBool::new(false);
-
-/// What ends a command that runs until it is told to, in the place of ending at once.
-static AT_SIGNAL: OnceLock<Box<dyn Fn() + Send + Sync>> = OnceLock::new();
-
-/// Has the first Ctrl-C (or closed terminal, or SIGTERM) call this instead of ending the program; the next one ends it.
-pub fn at_signal(end: impl Fn() + Send + Sync + 'static) {
-    // A program runs one command.
-    AT_SIGNAL.set(Box::new(end)).ok();
-}
 
 /// See [`EMITTED`].
 pub fn has_emitted() -> bool {
@@ -176,21 +164,4 @@ fn config(options: &GlobalOptions) -> Result<toml::Table, Failure> {
         None => toml::Table::new(),
         Some(path) => Settings::layer(&read_text(path)?, &path.display().to_string())?,
     })
-}
-
-/// On Ctrl-C, a closed terminal or a scheduler's SIGTERM: lets the file that is being written become whole, then ends.
-fn end_between_files() -> std::io::Result<()> {
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-    std::thread::spawn(move || {
-        for (earlier, signal) in signals.forever().enumerate() {
-            if let (0, Some(end)) = (earlier, AT_SIGNAL.get()) {
-                end();
-                continue;
-            }
-            let _whole = no_more_writes();
-            // As shells tell it.
-            std::process::exit(128 + signal);
-        }
-    });
-    Ok(())
 }

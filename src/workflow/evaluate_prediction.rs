@@ -10,6 +10,7 @@ use super::outcome::write_page;
 use super::stage_name::{StageName, Subject};
 use super::stages::{OBSERVED, Predicted, grid_of, mask_of, mni_from_pre, read_draws, transforms};
 use super::user_file::{read_text, shown};
+use super::warning::Warning;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::predict::{
@@ -36,6 +37,17 @@ pub struct SeenAfterwards {
     /// The rigid motion that carries a point of the later scan to the earlier one, where no case says it: 4x4 text (RAS, mm) or
     /// ITK's.
     pub pre_from_post: Option<PathBuf>,
+}
+
+impl SeenAfterwards {
+    /// Why not to trust what `case` is held against it by: a quality gate that one of the two did not pass.
+    ///
+    /// # Errors
+    /// [`WorkflowError`] of a folder that is no case.
+    pub fn doubts(&self, case: &Path) -> Result<Vec<Warning>, WorkflowError> {
+        let folders = [case].into_iter().chain(self.case.as_deref());
+        Ok(folders.map(Case::open).collect::<Result<Vec<_>, _>>()?.iter().flat_map(Case::gate_warnings).collect())
+    }
 }
 
 /// What a case was held against, and how it did.

@@ -193,6 +193,11 @@ fn a_dry_run_refuses_what_a_run_would_and_a_cohort_of_whom_nobody_can_be_done() 
     let (code, said) = dry("out", &["-w", &at("study")]);
     assert!(code == Some(3) && said.contains("--work-dir"), "{said}");
     assert!(!Path::new(&at("out")).exists());
+    for (more, told) in [(&["--entity", "run-2"][..], true), (&["--cells", "5000"], true), (&["--dry-run"], false)] {
+        let ended = output(&[&["bids", &at("study"), &at("out"), "group"], more].concat());
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(said.contains("without effect at the group level"), told, "{said}");
+    }
 }
 
 #[test]

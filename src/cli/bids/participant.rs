@@ -3,7 +3,8 @@
 use super::options::Args;
 use crate::cli::{Failure, Session, run};
 use crate::workflow::cohort::{
-    Dataset, Log, Participants, SubjectError, Work, participants, planned, planned_table, table, unwell,
+    Dataset, Log, Participants, SubjectError, Work, participants, planned, planned_table, some_can_be_done, table,
+    unwell,
 };
 use crate::workflow::{Layer, Place, Settings};
 use anyhow::anyhow;
@@ -26,11 +27,7 @@ pub fn plan(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Fai
     let plans = args.plans();
     let planned = planned(&args.asked(dataset, &plans, &place), &|error| Failure::from(error).message())?;
     session.emit(&json!({ "subjects": planned }), &planned_table(&planned))?;
-    if planned.iter().all(|subject| subject.message.is_some()) {
-        let (count, scans) = (planned.len(), dataset.folder.display());
-        return Err(Failure::Rejected(anyhow!("{scans}: none of {count} subjects can be done, for the reasons above")));
-    }
-    Ok(())
+    Ok(some_can_be_done(&planned, dataset)?)
 }
 
 pub fn run(args: &Args, dataset: &Dataset, session: &Session) -> Result<(), Failure> {

@@ -12,7 +12,8 @@ pub use dataset::{Dataset, DatasetError, ScanAndPlan, ScanPair};
 pub use foretold::{plan_folder, planned_subject};
 pub use group_level::{Group, group};
 pub use participant_level::{
-    Ended, Participants, Planned, SubjectError, Work, participants, planned, planned_table, table, unwell,
+    Ended, Participants, Planned, SubjectError, Work, participants, planned, planned_table, some_can_be_done, table,
+    unwell,
 };
 pub use population::{Learnt, POPULATION, learn, merge_populations, population_prior, read_population};
 

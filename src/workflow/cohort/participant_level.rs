@@ -4,7 +4,7 @@ use super::out_folder::may_hold_derivatives;
 use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
 use crate::report::cohort::Status;
-use crate::workflow::error::{ErrorKind, WorkflowError};
+use crate::workflow::error::{CohortError, ErrorKind, WorkflowError};
 use crate::workflow::{Goal, Place, Progress, Settings};
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -228,6 +228,18 @@ pub struct Planned {
     pub case: PathBuf,
     /// Why it cannot be done.
     pub message: Option<String>,
+}
+
+/// Whether a run would come to a result of anybody.
+///
+/// # Errors
+/// Where it would not.
+pub fn some_can_be_done(planned: &[Planned], dataset: &Dataset) -> Result<(), WorkflowError> {
+    if planned.iter().all(|subject| subject.message.is_some()) {
+        let (dataset, count) = (dataset.folder.clone(), planned.len());
+        return Err(CohortError::NobodyToRun { dataset, count }.into());
+    }
+    Ok(())
 }
 
 /// What would be done with every subject; `words` says why one cannot be.

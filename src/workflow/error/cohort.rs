@@ -32,6 +32,8 @@ pub enum CohortError {
     OthersCases { cases: PathBuf },
     #[error("{}: not a log of hgm; delete it and run this subject again", file.display())]
     Log { file: PathBuf },
+    #[error("{}: none of {count} subjects can be done, for the reasons above", dataset.display())]
+    NobodyToRun { dataset: PathBuf, count: usize },
     #[error("{}: no subject has been run to its end here", out.display())]
     NobodyRun { out: PathBuf },
     #[error(transparent)]
