@@ -235,7 +235,9 @@ fn is_plan(folder: &std::path::Path) -> bool {
 fn of_dataset(error: &DatasetError) -> Option<String> {
     Some(match error {
         DatasetError::Absent { .. } => "see --participant-label".to_owned(),
-        DatasetError::NoScan { .. } => "--participant-label names those that are done".to_owned(),
+        DatasetError::NoScan { .. } => {
+            "--participant-label names those that are done, --entity the scan of a session".to_owned()
+        }
         DatasetError::NoPlan { .. } => {
             "--plans names another folder, --participant-label those that are planned".to_owned()
         }

@@ -7,7 +7,7 @@ use crate::fem::{Contact, FemError, Scenario, Support, Wall};
 use crate::geometry::{Frame, SmoothField};
 use crate::image::LabelMap;
 use crate::mesh::{ClosestPoint, TetMesh, TriMesh};
-use crate::tag::{BASE, FALX, MARGIN, VENTRICLE};
+use crate::tag::{BASE, FALX, MARGIN, VENTRICLE, without_voids};
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -17,7 +17,8 @@ pub const PIAL: &str = "pial";
 pub const BRAINSTEM: &str = "brainstem";
 
 /// The rest mesh with the sets that slide or hold: [`PIAL`], the cortex before the skull, without ventricle wall, margin,
-/// the cut through the brainstem and what lies within the opening; and [`BRAINSTEM`], that cut.
+/// the cut through the brainstem, what lies within the opening and the walls of holes, which stand before no skull; and
+/// [`BRAINSTEM`], that cut.
 #[must_use]
 pub fn with_sliding_sets(mesh: &TetMesh, skull: &SkullSettings) -> TetMesh {
     let mut mesh = mesh.clone();
@@ -29,7 +30,7 @@ pub fn with_sliding_sets(mesh: &TetMesh, skull: &SkullSettings) -> TetMesh {
     let cavity = ClosestPoint::new(&margin).filter(|_| skull.opening_mm > 0.0);
     let open =
         |n: u32| cavity.as_ref().is_some_and(|c| c.find(mesh.nodes_mm()[n as usize]).distance_mm < skull.opening_mm);
-    let mut pial = mesh.outside_without(&[VENTRICLE, MARGIN, FALX]);
+    let mut pial = without_voids(&mesh, &mesh.outside_without(&[VENTRICLE, MARGIN, FALX]));
     pial.retain(|facet| {
         let held = facet.iter().all(|n| held.binary_search(n).is_ok());
         !held && !facet.iter().any(|&n| open(n))

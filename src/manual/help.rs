@@ -36,7 +36,8 @@ Exit codes:
   2  usage: the command line cannot be understood
   3  input rejected: the message names file, field and remedy; no result was written, nothing is half-written
   4  computed (outputs kept), but not to be believed: no operation is seen, the scans do not show one person, the
-     second scan cuts the cavity, masks given are not of this brain, or a boundary set is implausible
+     second scan cuts the cavity, masks given are not of this brain, a boundary set is implausible, tissue is cut
+     off, or ventricles are lost
   128 + N  ended by signal N; the same command goes on where it was";
 
 /// The whole command line, as it is parsed and shown.

@@ -187,8 +187,8 @@ pub enum SegmentWarning {
     },
     /// No ventricle was found.
     #[error(
-        "no ventricle was found: their fluid is taken for that of the sulci, and for tissue where it is enclosed; look at the labels, \
-         and give a ventricle mask or a label map that has them"
+        "no ventricle was found: their fluid is taken for that of the sulci: tissue of the mesh where it is narrow, a hole where it is wide; look at \
+         the labels, and give a ventricle mask or a label map that has them"
     )]
     NoVentricle,
     /// Grey and white matter are hard to tell apart.
@@ -229,7 +229,7 @@ impl SegmentWarning {
             Self::NotVentricles { tissue_percent, far_percent } => {
                 tissue_percent.max(*far_percent) >= OF_SOMETHING_ELSE_PERCENT
             }
-            // Without them their fluid passes for fluid of the sulci, and is filled up.
+            // Without them their fluid passes for fluid of the sulci: it is filled up where it is narrow, and a hole where it is wide.
             Self::NoVentricle => true,
             Self::PoseOff { deg, shift_mm } => *deg >= OTHER_POSE_DEG || *shift_mm >= OTHER_POSE_MM,
             Self::LeavesOut { brain, percent, parts } => brain.leaves_too_much(parts, *percent),

@@ -23,7 +23,7 @@ use section::midsagittal_cut;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
-use void::without_voids;
+pub(crate) use void::without_voids;
 
 /// Held: where the brain rests on the skull, and the cut brainstem.
 pub const BASE: &str = "base";

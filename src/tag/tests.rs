@@ -124,13 +124,21 @@ fn a_hole_within_the_brain_is_neither_base_nor_top() {
     let solid = ellipsoid_brain(8.0, 0.0, false);
     // Deep enough for the floor of a hole to lie within the top.
     let tags = TagSettings { superior_depth_mm: 60.0, ..settings() };
-    let hollow = |centre: [f64; 3]| {
+    let hollow = |centre: [f64; 3], beside: Option<u8>| {
         let apart = |tet: &[u32; 4]| {
             let middle = tet.iter().map(|&n| Vector3::from(solid.nodes_mm()[n as usize])).sum::<Vector3<f64>>() / 4.0;
             (middle - Vector3::from(centre)).norm() > 12.0
         };
         let kept: Vec<usize> = (0..solid.tets().len()).filter(|&t| apart(&solid.tets()[t])).collect();
-        let (tets, labels) = kept.iter().map(|&t| (solid.tets()[t], solid.labels()[t])).unzip();
+        // What lies to one side of the hole within reach has another label: the tissue of its wall has a rim there.
+        let label_of = |t: usize| {
+            let middle =
+                solid.tets()[t].iter().map(|&n| Vector3::from(solid.nodes_mm()[n as usize])).sum::<Vector3<f64>>() / 4.0;
+            let way = middle - Vector3::from(centre);
+            beside.filter(|_| way.norm() < 20.0 && way.x < -4.0).unwrap_or(solid.labels()[t])
+        };
+        let (tets, labels): (_, Vec<u8>) = kept.iter().map(|&t| (solid.tets()[t], label_of(t))).unzip();
+        assert!(beside.is_none_or(|beside| labels.contains(&beside)));
         let mut mesh = TetMesh::new(solid.nodes_mm().to_vec(), tets, labels).unwrap();
         let report = tag_boundary_sets(&mut mesh, &tags).unwrap();
         [BASE, SUPERIOR].map(|set| report.set(set).unwrap().facets)
@@ -139,8 +147,10 @@ fn a_hole_within_the_brain_is_neither_base_nor_top() {
     let report = tag_boundary_sets(&mut whole, &tags).unwrap();
     let facets = [BASE, SUPERIOR].map(|set| report.set(set).unwrap().facets);
     // Low in the back, and high.
-    assert_eq!(hollow([-20.0, -40.0, -40.0]), facets);
-    assert_eq!(hollow([-20.0, -20.0, 50.0]), facets);
+    for beside in [None, Some(label::VENTRICLE), Some(label::RESECTED)] {
+        assert_eq!(hollow([-20.0, -40.0, -40.0], beside), facets, "{beside:?}");
+        assert_eq!(hollow([-20.0, -20.0, 50.0], beside), facets, "{beside:?}");
+    }
 }
 
 #[test]

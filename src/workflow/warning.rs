@@ -56,12 +56,12 @@ pub enum Warning {
     Island { tissue: &'static str, volume_mm3: f64 },
     #[error(
         "{cc:.1} cc of tissue ({parts}) are cut off from the rest of the brain and left out of the mesh, as if they were not there: \
-         check what is taken and the labels around it; what a resection cuts off belongs to it"
+         look at the labels around them; what a resection cuts off belongs to what is taken"
     )]
     CutOff { cc: f64, parts: String },
     #[error(
-        "{cc:.1} cc of fluid within the brain (an old stroke, a cyst) are a hole of the body: nothing presses on its wall; look at \
-         the labels where there is none"
+        "{cc:.1} cc of fluid within the brain (an old stroke, a cyst, ventricles that the map does not label) are a hole of the body: nothing \
+         presses on its wall; look at the labels where there is none"
     )]
     EnclosedFluid { cc: f64 },
     #[error(transparent)]

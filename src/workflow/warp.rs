@@ -1,7 +1,7 @@
 //! What a user has in one of a patient's frames carried to another: images, label maps, points, streamlines, surfaces.
 
 use super::case::Case;
-use super::error::{WarpError, WorkflowError};
+use super::error::{SaysMni, WarpError, WorkflowError};
 use super::maps::{Map, Part, WarpTo};
 use super::stages::grid_of;
 use super::user_file::{read_input, shown};
@@ -14,6 +14,7 @@ use crate::image::{Grid, Volume};
 use crate::layout::{POST_NATIVE_BRAIN, PRE_NATIVE_BRAIN};
 use crate::mesh::format::gifti::Space;
 use crate::overlay::{Carried, Drawing, PointState};
+use crate::segment::atlas;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -199,23 +200,29 @@ fn scan_grid(case: &Case, to: WarpTo) -> Result<Grid<Native>, WorkflowError> {
     grid_of(case, if to == WarpTo::Pre { POST_NATIVE_BRAIN } else { PRE_NATIVE_BRAIN })
 }
 
-/// Refuses a file that says it lies in MNI space, by its name or, of an image, its header; but for one on the scan's very grid: there
-/// the scan says so of its own frame.
+/// Refuses a file that says it lies in MNI space, by its name or, of an image, its header or the template's grid, on which `--to mni`
+/// writes; but for one on the scan's very grid: there the scan says so of its own frame.
 fn check_not_of_mni(
     name: &str,
     image: Option<&Vec<u8>>,
     scan: impl FnOnce() -> Result<Grid<Native>, WorkflowError>,
 ) -> Result<(), WorkflowError> {
-    let by_name = name.contains("space-MNI");
-    if !by_name && !image.is_some_and(|bytes| nifti::says_mni(bytes)) {
+    let grid = image.and_then(|bytes| nifti::decode_grid(bytes, name).ok());
+    let by = if name.contains("space-MNI") {
+        SaysMni::Name
+    } else if image.is_some_and(|bytes| nifti::says_mni(bytes)) {
+        SaysMni::Header
+    } else if grid.is_some_and(|grid| grid.coincides(&atlas::template().grid().relabelled(), 1e-3)) {
+        SaysMni::Grid
+    } else {
         return Ok(());
-    }
-    if let Some(Ok(grid)) = image.map(|bytes| nifti::decode_grid(bytes, name))
+    };
+    if let Some(grid) = grid
         && grid.coincides(&scan()?, 1e-3)
     {
         return Ok(());
     }
-    Err(WarpError::OfMni { file: name.to_owned(), by_name }.into())
+    Err(WarpError::OfMni { file: name.to_owned(), by }.into())
 }
 
 /// The part of what an image shows (labels; else what is brighter than its mean) that a field of the user's own moves out of the
@@ -279,6 +286,12 @@ mod tests {
             assert!(said.contains("its name says") && said.contains("rename it"), "{said}");
         }
         assert_eq!(check("a.nii", Some(&bytes), grid), Ok(()));
+        // What `--to mni` writes under any name.
+        let template = atlas::template().grid();
+        let ours = encode_u8(&Volume::from_fn(template, |_| 0u8));
+        let said = check("b.nii.gz", Some(&ours), grid).unwrap_err();
+        assert!(said.contains("b.nii.gz: its grid, that of the template, says") && said.contains("resample"), "{said}");
+        assert_eq!(check("b.nii.gz", Some(&ours), template.relabelled()), Ok(()));
     }
 
     #[test]

@@ -19,7 +19,8 @@ pub struct Args {
     /// Only these subjects, with or without sub-
     #[arg(long, visible_alias = "participant_label", value_name = "LABEL", num_args = 1.., value_delimiter = ',')]
     pub participant_label: Vec<String>,
-    /// Where a session has several T1 scans: take the one with this entity, such as run-2, or none: the one without any
+    /// Where a session has several T1 scans: take the one with this entity, such as run-2, or none: the one without any; an only scan is
+    /// taken unless it says otherwise (run-1)
     #[arg(long, value_name = "ENTITY")]
     pub entity: Vec<String>,
     /// Before the operation: each subject's scan of ses-preop and the mask of what is to be taken, as `hgm predict` (table [predict] of the

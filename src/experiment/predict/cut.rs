@@ -47,15 +47,15 @@ pub enum PlannedError {
     )]
     MoreThanHalf { plan: String, resected_cc: f64, tissue_cc: f64 },
     #[error(
-        "{plan}: it would cut the brain in two: {apart_cc:.0} cc would hang on nothing; leave a bridge of tissue, or take the part \
-         behind the cut as well"
+        "{plan}: it would cut loose {apart_cc:.0} cc of tissue, which would hang on nothing; leave bridges of tissue, or take what is \
+         behind the cuts as well"
     )]
     InTwo { plan: String, apart_cc: f64 },
 }
 
 /// More of a mask than this outside the brain: it belongs to another scan.
 const MOST_OUTSIDE: f64 = 0.5;
-/// Parts that come loose and are more than this together are half a brain; less is specks at the border, cc.
+/// Parts that come loose and are more than this together are a part of the brain; less is specks at the border, cc.
 const LARGEST_SPECK_CC: f64 = 10.0;
 
 /// Looks at a plan before anything is computed from it; `plan` is its name for messages, `drawn_mm3` its volume as it was drawn.
@@ -159,7 +159,7 @@ mod tests {
         };
         assert!(of(1).is_ok(), "{:?}", of(1));
         let said = of(4).unwrap_err().to_string();
-        assert!(said.contains("in two: 33 cc"), "{said}");
+        assert!(said.contains("cut loose 33 cc"), "{said}");
     }
 
     #[test]
@@ -173,7 +173,7 @@ mod tests {
             ([15.0, 20.0, 39.0], [4.0; 3], "outside the brain"),
             ([29.5, 8.0, 8.0], [2.0; 3], "touches no grey or white matter"),
             ([20.0, 20.0, 20.0], [40.0, 30.0, 30.0], "more than half"),
-            ([29.5, 19.5, 19.5], [4.0, 12.0, 12.0], "cut the brain in two"),
+            ([29.5, 19.5, 19.5], [4.0, 12.0, 12.0], "cut loose"),
         ];
         for (centre, half_axes, words) in cases {
             let said = said(centre, half_axes);

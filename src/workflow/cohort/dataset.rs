@@ -50,8 +50,8 @@ pub enum DatasetError {
     NoSubjects { folder: PathBuf },
     #[error("{absent} is not in {}; it has {}", folder.display(), subjects.join(", "))]
     Absent { absent: String, folder: PathBuf, subjects: Vec<String> },
-    #[error("{folder}: no {stem}_T1w.nii.gz{}; add the scan, or leave the subject out", with(entities))]
-    NoScan { folder: String, stem: String, entities: Vec<String> },
+    #[error("{folder}: no {stem}_T1w.nii.gz{}{}; add the scan, or leave the subject out", with(entities), but(there))]
+    NoScan { folder: String, stem: String, entities: Vec<String>, there: Vec<String> },
     #[error("{folder}: {} scans fit ({}){}", found.len(), found.join(", "), or_none(found))]
     SeveralScans { folder: String, found: Vec<String>, entity: String },
     #[error(
@@ -65,6 +65,11 @@ pub enum DatasetError {
 
 fn with(entities: &[String]) -> String {
     if entities.is_empty() { String::new() } else { format!(" with {}", entities.join(", ")) }
+}
+
+/// What is there instead.
+fn but(there: &[String]) -> String {
+    if there.is_empty() { String::new() } else { format!(", only {}", there.join(", ")) }
 }
 
 impl Dataset {
@@ -88,7 +93,8 @@ impl Dataset {
         Ok(Self { folder: folder.to_path_buf(), subjects })
     }
 
-    /// The two scans of a subject; `entities` (such as `run-2`, or `none` for the scan without any) choose where a session has several.
+    /// The two scans of a subject; `entities` (such as `run-2`, or `none` for the scan without any) choose where a session has several,
+    /// and a session's only scan is taken unless its name says otherwise (`run-1`).
     ///
     /// # Errors
     /// [`DatasetError::NoScan`] or [`DatasetError::SeveralScans`].
@@ -129,27 +135,33 @@ impl Dataset {
         }
     }
 
-    /// The scan of a session; `entities` choose among several, and are not asked of the only one.
+    /// The scan of a session; `entities` choose among several, and of the only one it is asked that it does not contradict them.
     fn scan(&self, subject: &str, session: &str, entities: &[String]) -> Result<RawScan, DatasetError> {
         let folder = format!("{subject}/{session}/anat");
         let mut found = names(&self.folder.join(&folder)).unwrap_or_default();
         let begin = format!("{subject}_{session}_");
         let stem = |name: &str| name.strip_suffix(".gz").unwrap_or(name).strip_suffix("_T1w.nii").map(str::to_owned);
         found.retain(|name| name.starts_with(&begin) && stem(name).is_some());
-        if found.len() > 1 {
-            found.retain(|name| {
-                let stem = stem(name).unwrap_or_default();
-                // `run-2` must not choose `run-21`.
-                let has = |entity: &String| {
-                    if entity == NONE { is_plain(name) } else { stem.split('_').any(|part| part == entity) }
-                };
-                entities.iter().all(has)
-            });
-        }
+        let (there, alone) = (found.clone(), found.len() == 1);
+        found.retain(|name| {
+            let stem = stem(name).unwrap_or_default();
+            let parts = || stem.split('_');
+            // `run-2` must not choose `run-21`.
+            let has = |entity: &String| {
+                if entity == NONE { is_plain(name) } else { parts().any(|part| part == entity) }
+            };
+            // A session of one scan need not number it, but `run-1` is not the second run.
+            let says_nothing = |entity: &String| {
+                let key = entity.split_once('-').map(|(key, _)| key);
+                key.is_none_or(|key| parts().all(|part| part.split_once('-').is_none_or(|(own, _)| own != key)))
+            };
+            entities.iter().all(|entity| has(entity) || alone && says_nothing(entity))
+        });
         match &found[..] {
             [one] => Ok(RawScan(format!("{folder}/{one}"))),
             [] => {
-                Err(DatasetError::NoScan { folder, stem: format!("{subject}_{session}"), entities: entities.to_vec() })
+                let stem = format!("{subject}_{session}");
+                Err(DatasetError::NoScan { folder, stem, entities: entities.to_vec(), there })
             }
             several => {
                 let entity = distinguishing(several).to_owned();
@@ -258,19 +270,24 @@ mod tests {
     }
 
     #[test]
-    fn an_entity_chooses_where_there_are_several_scans_and_is_not_asked_of_the_only_one() {
+    fn an_entity_chooses_among_several_scans_and_the_only_one_is_taken_unless_it_contradicts_it() {
         let (_folder, dataset) = dataset(&[
             "sub-01/ses-preop/anat/sub-01_ses-preop_run-1_T1w.nii.gz",
             "sub-01/ses-preop/anat/sub-01_ses-preop_run-2_T1w.nii.gz",
             "sub-01/ses-postop/anat/sub-01_ses-postop_T1w.nii.gz",
             "sub-02/ses-preop/anat/sub-02_ses-preop_T1w.nii.gz",
-            "sub-02/ses-postop/anat/sub-02_ses-postop_run-1_T1w.nii.gz",
+            "sub-02/ses-postop/anat/sub-02_ses-postop_acq-mprage_T1w.nii.gz",
+            "sub-03/ses-preop/anat/sub-03_ses-preop_run-2_T1w.nii.gz",
+            "sub-03/ses-postop/anat/sub-03_ses-postop_run-1_T1w.nii.gz",
         ]);
         let chosen = |subject: &str, entity: &str| dataset.pair(subject, &[entity.to_owned()]);
         let pair = chosen("sub-01", "run-2").unwrap();
         assert!(pair.pre.0.ends_with("preop_run-2_T1w.nii.gz") && pair.post.0.ends_with("postop_T1w.nii.gz"));
         let alone = chosen("sub-02", "run-2").unwrap();
-        assert!(alone.pre.0.ends_with("preop_T1w.nii.gz") && alone.post.0.ends_with("postop_run-1_T1w.nii.gz"));
+        assert!(alone.pre.0.ends_with("preop_T1w.nii.gz") && alone.post.0.ends_with("postop_acq-mprage_T1w.nii.gz"));
+        assert!(chosen("sub-02", "none").is_ok() && dataset.pair("sub-03", &[]).is_ok());
+        let other = chosen("sub-03", "run-2").unwrap_err().to_string();
+        assert!(other.contains("with run-2, only sub-03_ses-postop_run-1_T1w.nii.gz; add the scan"), "{other}");
         let absent = chosen("sub-01", "run-3").unwrap_err().to_string();
         assert!(absent.contains("with run-3"), "{absent}");
     }

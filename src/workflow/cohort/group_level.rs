@@ -28,7 +28,7 @@ pub struct Group {
 /// # Panics
 /// Never: a cohort is plain data.
 pub fn group(dataset: &Dataset, out: &Path, cases: &Path, dry_run: bool) -> Result<Group, WorkflowError> {
-    may_hold_derivatives(dataset, out, cases)?;
+    may_hold_derivatives(dataset, out)?;
     let members = dataset.subjects.iter().map(|name| member(out, cases, name)).collect::<Result<Vec<Member>, _>>()?;
     if members.iter().all(|m| m.outcome.is_none()) {
         return Err(CohortError::NobodyRun { out: out.to_path_buf() }.into());

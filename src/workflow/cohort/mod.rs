@@ -25,7 +25,7 @@ use crate::layout;
 use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
 use foretold::with_prediction;
-use out_folder::may_hold_derivatives;
+use out_folder::may_hold_cases;
 use published::Published;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ pub struct Log {
 /// # Errors
 /// [`CohortError`] when the folder cannot be made, or one of the two holds scans or another program's files.
 pub fn begin(dataset: &Dataset, out: &Path, cases: &Path) -> Result<(), CohortError> {
-    may_hold_derivatives(dataset, out, cases)?;
+    may_hold_cases(dataset, out, cases)?;
     std::fs::create_dir_all(out).map_err(|source| CohortError::NoFolder { out: out.to_path_buf(), source })?;
     let absolute = |folder: &Path| {
         folder.canonicalize().map_err(|source| CohortError::Lost { folder: folder.to_path_buf(), source })

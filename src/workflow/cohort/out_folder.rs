@@ -7,19 +7,26 @@ use std::path::Path;
 
 const DESCRIPTION: &str = "dataset_description.json";
 
-/// Refuses a folder whose description and README would be replaced by those of the derivatives, and a folder of cases among another's
-/// files. Comes before anything is written.
+/// Refuses a folder whose description and README would be replaced by those of the derivatives. Comes before anything is written.
 ///
 /// # Errors
 /// [`CohortError::RawDataSet`] for the data set itself, by whatever path, and for any other that is not of derivatives;
-/// [`CohortError::OthersDerivatives`] for those that hgm has not made; [`CohortError::OthersCases`] for either where the cases go.
-pub(super) fn may_hold_derivatives(dataset: &Dataset, out: &Path, cases: &Path) -> Result<(), CohortError> {
+/// [`CohortError::OthersDerivatives`] for those that hgm has not made.
+pub(super) fn may_hold_derivatives(dataset: &Dataset, out: &Path) -> Result<(), CohortError> {
     let (out_folder, instead) = (out.to_path_buf(), dataset.folder.join("derivatives/hgm"));
     match holds(dataset, out) {
-        Holds::Scans => return Err(CohortError::RawDataSet { out: out_folder, instead }),
-        Holds::Others => return Err(CohortError::OthersDerivatives { out: out_folder, instead }),
-        Holds::Ours => {}
+        Holds::Scans => Err(CohortError::RawDataSet { out: out_folder, instead }),
+        Holds::Others => Err(CohortError::OthersDerivatives { out: out_folder, instead }),
+        Holds::Ours => Ok(()),
     }
+}
+
+/// The same, and a folder of cases among another's files. The group level only reads cases, and does not ask this.
+///
+/// # Errors
+/// As [`may_hold_derivatives`]; [`CohortError::OthersCases`] for a data set of scans or another program's files where the cases go.
+pub(super) fn may_hold_cases(dataset: &Dataset, out: &Path, cases: &Path) -> Result<(), CohortError> {
+    may_hold_derivatives(dataset, out)?;
     match holds(dataset, cases) {
         Holds::Scans | Holds::Others => Err(CohortError::OthersCases { cases: cases.to_path_buf() }),
         Holds::Ours => Ok(()),

@@ -1,6 +1,6 @@
 //! The participant level: each subject through the whole job, then its files under BIDS names.
 
-use super::out_folder::may_hold_derivatives;
+use super::out_folder::may_hold_cases;
 use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
 use crate::report::cohort::Status;
@@ -250,7 +250,7 @@ pub fn planned(
     asked: &Participants<'_>,
     words: &dyn Fn(DatasetError) -> String,
 ) -> Result<Vec<Planned>, WorkflowError> {
-    may_hold_derivatives(asked.dataset, asked.out, &asked.cases.folder)?;
+    may_hold_cases(asked.dataset, asked.out, &asked.cases.folder)?;
     let (dataset, entities) = (asked.dataset, asked.entities);
     let plan = |name: &String| {
         let found = match asked.work {

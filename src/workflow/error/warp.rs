@@ -11,9 +11,46 @@ pub enum WarpError {
     #[error(
         "{file}: {says} that it lies in MNI space, and what a case carries lies in its scans' own frames: give the file as it was before it was \
          taken there; where {that} and it does lie in the scan's frame, {otherwise}",
-        says = if *by_name { "its name says" } else { "its header says (code 4)" },
-        that = if *by_name { "the name is wrong" } else { "the header is wrong" },
-        otherwise = if *by_name { "rename it" } else { "set sform_code and qform_code to 1" }
+        says = by.says(),
+        that = by.that(),
+        otherwise = by.otherwise()
     )]
-    OfMni { file: String, by_name: bool },
+    OfMni { file: String, by: SaysMni },
+}
+
+/// What of a file says that it lies in MNI space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaysMni {
+    /// `space-MNI` in its name.
+    Name,
+    /// Code 4 of its header.
+    Header,
+    /// Its grid, which is the template's and not the scan's.
+    Grid,
+}
+
+impl SaysMni {
+    fn says(self) -> &'static str {
+        match self {
+            Self::Name => "its name says",
+            Self::Header => "its header says (code 4)",
+            Self::Grid => "its grid, that of the template, says",
+        }
+    }
+
+    fn that(self) -> &'static str {
+        match self {
+            Self::Name => "the name is wrong",
+            Self::Header => "the header is wrong",
+            Self::Grid => "this is chance",
+        }
+    }
+
+    fn otherwise(self) -> &'static str {
+        match self {
+            Self::Name => "rename it",
+            Self::Header => "set sform_code and qform_code to 1",
+            Self::Grid => "resample it onto the scan's grid",
+        }
+    }
 }
