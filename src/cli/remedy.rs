@@ -99,7 +99,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         Job::NoSuchModel { .. } => "`hgm gp studies` lists them",
         Job::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
         Job::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
-        Job::Lost { .. } => "see --cells and --edge-mm",
+        Job::Lost { .. } | Job::LostInCoarser { .. } => "see --cells and --edge-mm",
         Job::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         Job::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
         Job::SampleMissing { .. } => {

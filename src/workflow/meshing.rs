@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
@@ -62,6 +62,9 @@ pub struct MeshedFile {
     pub left_out_mm3: BTreeMap<u8, f64>,
     /// The boundary sets.
     pub sets: Vec<SetReport>,
+    /// Labels of which the mesh has nothing, where that was half a cc at most.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Why the quality gate refuses the mesh.
     pub refused: Vec<String>,
 }
@@ -123,7 +126,11 @@ pub fn mesh_file(
             write_surfaces(&mesh, folder, if in_mni { gifti::Space::Mni152 } else { gifti::Space::Scanner })?;
         }
         let bytes = encode(&mesh, &extension).map_err(|source| MeshFileError::Format { file: file.clone(), source })?;
-        Ok(Produced { files: vec![(file.clone(), bytes)], facts: facts(&meshed), warnings: meshed.refused })
+        Ok(Produced {
+            files: vec![(file.clone(), bytes)],
+            facts: facts(&meshed),
+            warnings: [meshed.warnings, meshed.refused].concat(),
+        })
     });
     let outcome = outcome.map_err(|error| match error {
         StageError::Compute(error) => error,
@@ -157,14 +164,18 @@ fn make(
             Err(error) => refused.push(error.to_string()),
         }
     }
-    refused.extend(lost_labels(labels, &mesh, &settings.without, record.edge_mm).iter().map(ToString::to_string));
+    let lost = lost_labels(labels, &mesh, &settings.without, record.edge_mm);
+    // A stray voxel is told; what is large enough to be seen is missed.
+    let (much, little): (Vec<_>, Vec<_>) = lost.iter().partition(|lost| lost.mm3 > LARGE_ISLAND_MM3);
+    refused.extend(much.into_iter().map(ToString::to_string));
+    let warnings = little.into_iter().map(ToString::to_string).collect();
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let mut left_out_mm3 = BTreeMap::new();
     for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > LARGE_ISLAND_MM3) {
         *left_out_mm3.entry(island.label).or_default() += island.volume_mm3;
     }
     let islands = record.islands.len();
-    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, refused }))
+    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, warnings, refused }))
 }
 
 fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {

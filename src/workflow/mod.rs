@@ -78,7 +78,7 @@ pub use bundled_pair::{demo, demo_pair_settings, demo_phantom_settings};
 pub use case::Case;
 pub use error::{
     AskedError, CaseError, CohortError, ErrorKind, EvaluateError, InputError, LabelMapError, LandmarkError, MaskRole,
-    MeshFileError, PredictError, SimulationError, TakenUpError, WarpError, WorkflowError,
+    MeshFileError, PredictError, SaysMni, SimulationError, TakenUpError, WarpError, WorkflowError,
 };
 pub use estimate_options::{EstimateOptions, Observed};
 pub use evaluate::evaluate_landmarks;

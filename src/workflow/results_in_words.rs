@@ -101,6 +101,9 @@ pub fn meshed(found: &MeshedFile, output: &Path) -> String {
     for (number, mm3) in &found.left_out_mm3 {
         text += &format!("  left out: {:.2} cc of {}, apart from the rest\n", mm3 / 1000.0, name_of_label(*number));
     }
+    for warning in &found.warnings {
+        text += &format!("  warning: {warning}\n");
+    }
     for set in &found.sets {
         let ([x, y, z], name, nodes, mm2) = (set.centroid_mm, &set.name, set.nodes, set.area_mm2);
         text += &format!("  set {name}: {nodes} nodes, {mm2:.0} mm2 around ({x:.0}, {y:.0}, {z:.0})\n");

@@ -24,7 +24,7 @@ pub use mesh_file::MeshFileError;
 pub use predict::PredictError;
 pub use simulation::SimulationError;
 pub use taken_up::TakenUpError;
-pub use warp::WarpError;
+pub use warp::{SaysMni, WarpError};
 
 use super::cohort::DatasetError;
 use super::lost_label::LostLabel;
@@ -101,6 +101,11 @@ pub enum WorkflowError {
     NoTissue { labels: &'static str },
     #[error("{labels}: {lost}")]
     Lost { labels: &'static str, lost: LostLabel },
+    #[error(
+        "{labels}: in the coarser mesh, by which an estimate tells what its mesh does to it, {lost}; or do without that mesh \
+         (`two_meshes = false` of [estimate])"
+    )]
+    LostInCoarser { labels: &'static str, lost: LostLabel },
     #[error(transparent)]
     Tag(#[from] TagError),
     #[error(transparent)]

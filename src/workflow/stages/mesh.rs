@@ -26,12 +26,15 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 const NAME: StageName = StageName::Mesh;
-/// A part that lay apart is worth a warning from half a cubic centimetre on; smaller ones are specks of noise.
+/// A part that lay apart is worth a warning from half a cubic centimetre on, and so is a label that is lost; smaller ones are specks
+/// of noise.
 pub(crate) const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Tissue that is cut off and is more than this is a part of the brain that a simulation must not do without, mm3.
 const LARGEST_CUT_OFF_MM3: f64 = 10_000.0;
+/// Fewer tetrahedra than these hang on by an edge wherever a coarse mesh is thin, and are no part of anything.
+const FEWEST_CUT_OFF: f64 = 4.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
 pub(crate) fn mesh_stage(work: &Work<'_>, made: &Made) -> (Stage, MeshSettings) {
@@ -66,12 +69,8 @@ pub(crate) fn mesh(
             return Ok(mesh);
         }
         let (body, holes_mm3) = closed_sulci(labels, SULCUS_MM);
-        let Tagged { rest, whole, record, tags, cut_off_mm3 } = tagged(work, &body, &settings, template_from_labels)?;
-        let lost = lost_labels(&body, &whole, &settings.without, record.edge_mm);
-        if let Some(lost) = lost.iter().find(|lost| lost.label == label::RESECTED) {
-            // Nothing would be taken out, and a whole brain pass for the operated one.
-            return Err(WorkflowError::Lost { labels: PRE_LABELS, lost: lost.clone() });
-        }
+        let Tagged { rest, whole, record, tags, lost, mut cut_off_mm3 } =
+            tagged(work, &body, &settings, template_from_labels)?;
         // Of a part that was cut off a set has nothing.
         let tags = tags.of_part(&rest, &work.settings.tag);
         let mut produced = Produced::default();
@@ -81,12 +80,18 @@ pub(crate) fn mesh(
             let (surface, _) = TriMesh::from_facets(rest.nodes_mm(), facets);
             produced.files.push((REST_SURFACE.of(set), gifti::encode_surface(&surface, Space::Mni152, set)));
         }
-        let large = record.islands.iter().filter(|island| island.volume_mm3 > LARGE_ISLAND_MM3);
+        // Tissue that lay apart in the labels is as much cut off as what the mesh has and holds by no face, and is told with it.
+        let apart = || record.islands.iter().filter(|island| island.became == label::BACKGROUND);
+        for island in apart().filter(|island| label::is_tissue(island.label)) {
+            *cut_off_mm3.entry(island.label).or_insert(0.0) += island.volume_mm3;
+        }
+        let large = apart().filter(|i| !label::is_tissue(i.label) && i.volume_mm3 > LARGE_ISLAND_MM3);
         produced.warn(large.map(|island| {
             let tissue = label::name(island.label).unwrap_or("unknown");
             Warning::Island { tissue, volume_mm3: island.volume_mm3 }
         }));
-        let cut_off = cut_off(&cut_off_mm3);
+        let mean_mm3 = volumes_mm3(&rest).values().sum::<f64>() / rest.tets().len() as f64;
+        let cut_off = cut_off(&cut_off_mm3, mean_mm3);
         if holes_mm3 > 0.0 {
             produced.warn([Warning::EnclosedFluid { cc: holes_mm3 / 1000.0 }]);
         }
@@ -119,17 +124,20 @@ struct Tagged {
     whole: TetMesh,
     record: MeshingRecord,
     tags: TagReport,
+    /// Labels of which `whole` has nothing.
+    lost: Vec<LostLabel>,
     /// Tissue of `whole` that hangs on the rest by no face and is not in it, by label.
     cut_off_mm3: BTreeMap<u8, f64>,
 }
 
-/// What is cut off in a sentence, from half a cubic centimetre on, and whether it is too much to do without.
-fn cut_off(mm3: &BTreeMap<u8, f64>) -> Option<(Warning, bool)> {
+/// What is cut off in a sentence, from half a cubic centimetre and a few tetrahedra of `mean_mm3` on, and whether it is too much to do
+/// without.
+fn cut_off(mm3: &BTreeMap<u8, f64>, mean_mm3: f64) -> Option<(Warning, bool)> {
     let all_mm3: f64 = mm3.values().sum();
     let part = |(l, mm3): (&u8, &f64)| format!("{:.1} of {}", mm3 / 1000.0, label::name(*l).unwrap_or("unknown"));
     let parts: Vec<String> = mm3.iter().map(part).collect();
     let warning = Warning::CutOff { cc: all_mm3 / 1000.0, parts: parts.join(", ") };
-    (all_mm3 >= LARGE_ISLAND_MM3).then_some((warning, all_mm3 > LARGEST_CUT_OFF_MM3))
+    (all_mm3 >= LARGE_ISLAND_MM3.max(FEWEST_CUT_OFF * mean_mm3)).then_some((warning, all_mm3 > LARGEST_CUT_OFF_MM3))
 }
 
 /// Volume of every label, mm3.
@@ -170,6 +178,11 @@ fn tagged(
     let failed = |source| WorkflowError::Engine { labels: labels.to_owned(), source };
     let meshed = mesh_labels(straight.as_ref().unwrap_or(body), settings, &work.place.programs.engines());
     let (mut whole, record) = meshed.map_err(failed)?;
+    let lost = lost_labels(body, &whole, &settings.without, record.edge_mm);
+    if let Some(lost) = lost.iter().find(|lost| lost.label == label::RESECTED) {
+        // Nothing would be taken out, and a whole brain pass for the operated one.
+        return Err(WorkflowError::Lost { labels, lost: lost.clone() });
+    }
     let tags = tag_boundary_sets_with(&mut whole, &work.settings.tag, |p| in_template(bent(p)))?;
     let engine = record.engine.name();
     let whole = whole.moved(bent).map_err(|source| failed(EngineError::Invalid { engine, source }))?;
@@ -177,10 +190,13 @@ fn tagged(
     let (tissue, _) = whole.restricted(label::is_tissue).ok_or_else(none)?;
     let (rest, _) = tissue.largest_face_connected_part().ok_or_else(none)?;
     let cut_off_mm3 = missing_mm3(&tissue, &rest);
-    Ok(Tagged { rest, whole, record, tags, cut_off_mm3 })
+    Ok(Tagged { rest, whole, record, tags, lost, cut_off_mm3 })
 }
 
 /// The same body in a quarter of the tetrahedra: what a mesh does to an estimate shows in the difference.
+///
+/// # Errors
+/// [`WorkflowError::LostInCoarser`] where what was resected is too small for those cells.
 pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> Result<TetMesh, WorkflowError> {
     const PART: usize = 4;
     let (_, mut settings) = mesh_stage(work, made);
@@ -189,7 +205,11 @@ pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> R
         MeshSize::EdgeMm(edge_mm) => MeshSize::EdgeMm(edge_mm * (PART as f64).cbrt()),
     };
     let body = with_closed_sulci(&anatomy.labels, SULCUS_MM);
-    Ok(tagged(work, &body, &settings, Some(&anatomy.template_from_patient))?.rest)
+    match tagged(work, &body, &settings, Some(&anatomy.template_from_patient)) {
+        // The difference would be that of a brain that nothing was taken from.
+        Err(WorkflowError::Lost { labels, lost }) => Err(WorkflowError::LostInCoarser { labels, lost }),
+        made => Ok(made?.rest),
+    }
 }
 
 /// The same body with the resected tissue still in it, under a label of its own: what an operation can be undone on.
@@ -243,18 +263,21 @@ mod tests {
     #[test]
     fn tissue_that_hangs_on_nothing_is_told_from_half_a_cc_and_refused_from_ten() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
-        let apart = |size: f64| {
+        let missing = |size: f64| {
             let far = corners[..4].iter().map(|p| [100.0 + size * p[0], size * p[1], size * p[2]]);
             let nodes = corners.iter().copied().chain(far).collect();
             let labels = vec![label::GREY_MATTER, label::WHITE_MATTER, label::WHITE_MATTER];
             let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3], [1, 2, 3, 4], [5, 6, 7, 8]], labels).unwrap();
-            cut_off(&missing_mm3(&mesh, &mesh.largest_face_connected_part().unwrap().0))
+            missing_mm3(&mesh, &mesh.largest_face_connected_part().unwrap().0)
         };
+        let apart = |size: f64| cut_off(&missing(size), 10.0);
         // A corner of a cube holds a sixth of it.
         let size_of = |cc: f64| (6000.0 * cc).cbrt();
         assert_eq!(apart(size_of(0.4)), None);
         let (warning, much) = apart(size_of(0.6)).unwrap();
         assert!(!much && warning.to_string().contains("0.6 cc of tissue (0.6 of white_matter)"), "{warning}");
         assert!(apart(size_of(11.0)).unwrap().1);
+        // Of tetrahedra of half a cubic centimetre it is one.
+        assert_eq!(cut_off(&missing(size_of(0.6)), 500.0), None);
     }
 }
