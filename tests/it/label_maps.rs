@@ -211,11 +211,14 @@ fn twenty_wrong_or_mixed_up_maps_are_refused() {
 }
 
 #[test]
-fn a_label_of_which_no_tetrahedron_is_left_is_told_by_name() {
+fn a_label_of_which_no_tetrahedron_is_left_is_told_by_name_and_refused_but_for_a_stray_voxel() {
     let head = map(own);
-    let beside =
-        Volume::from_fn(head.grid, |n| if head.grid.voxel(n).iter().all(|&v| v < 3) { 6 } else { head.data[n] });
-    let (code, said) = meshed(&beside, &["--labels", "hgm"]);
+    let beside = |edge: usize| {
+        Volume::from_fn(head.grid, |n| if head.grid.voxel(n).iter().all(|&v| v < edge) { 6 } else { head.data[n] })
+    };
+    let (code, said) = meshed(&beside(1), &["--labels", "hgm"]);
+    assert_eq!(code, Some(0), "{said}");
+    let (code, said) = meshed(&beside(3), &["--labels", "hgm"]);
     assert!(code == Some(4) && said.contains("nothing of tumour"), "{code:?}: {said}");
     let specks = |n: usize| head.data[n] == 0 && head.grid.voxel(n).iter().all(|v| v % 2 == 0);
     let speckled = Volume::from_fn(head.grid, |n| if specks(n) { 6 } else { head.data[n] });
