@@ -187,7 +187,7 @@ pub enum SegmentWarning {
     },
     /// No ventricle was found.
     #[error(
-        "no ventricle was found: their fluid is taken for that of the sulci: tissue of the mesh where it is narrow, a hole where it is wide; look at \
+        "no ventricle was found: their fluid is taken for that of the sulci (tissue of the mesh where narrow, a hole where wide); look at \
          the labels, and give a ventricle mask or a label map that has them"
     )]
     NoVentricle,
