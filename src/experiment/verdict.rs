@@ -487,7 +487,9 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
 fn limits_of_tried(reasons: &[Reason]) -> String {
     use Reason::{EndOfTried, OneTried, WithoutEquilibrium};
     let limit = |r: &&Reason| matches!(r, OneTried { .. } | EndOfTried { .. } | WithoutEquilibrium { .. });
-    reasons.iter().filter(limit).map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect()
+    let said: Vec<String> =
+        reasons.iter().filter(limit).map(|reason| format!(" {}.", capitalised(&reason.sentence()))).collect();
+    said.concat()
 }
 
 fn capitalised(text: &str) -> String {

@@ -22,7 +22,7 @@ pub fn with_closed_sulci<F: Frame>(labels: &LabelMap<F>, closing_mm: f64) -> Lab
 
 /// [`with_closed_sulci`], and how much enclosed fluid is a hole of that body, mm3.
 pub fn closed_sulci<F: Frame>(labels: &LabelMap<F>, closing_mm: f64) -> (LabelMap<F>, f64) {
-    let Closed { near, closed, filled } = Closed::of(labels, closing_mm);
+    let Closing { near, closed, filled } = Closing::of(labels, closing_mm);
     let enclosed = Mask::from_fn(labels.grid, |n| filled.data[n] && !closed.data[n]);
     let pockets = components(&enclosed, Connectivity::Faces);
     let mut deep = vec![0usize; pockets.voxels.len() + 1];
@@ -42,7 +42,7 @@ pub fn closed_sulci<F: Frame>(labels: &LabelMap<F>, closing_mm: f64) -> (LabelMa
 
 /// What the cortex encloses: tissue, closed sulci and every pocket of fluid within.
 pub fn inside_of_cortex<F: Frame>(labels: &LabelMap<F>, closing_mm: f64) -> Mask<F> {
-    let Closed { filled, .. } = Closed::of(labels, closing_mm);
+    let Closing { filled, .. } = Closing::of(labels, closing_mm);
     Mask::from_fn(labels.grid, |n| match labels.data[n] {
         label::BACKGROUND => false,
         label::CSF => filled.data[n],
@@ -51,7 +51,7 @@ pub fn inside_of_cortex<F: Frame>(labels: &LabelMap<F>, closing_mm: f64) -> Mask
 }
 
 /// A closing, step by step.
-struct Closed<F: Frame> {
+struct Closing<F: Frame> {
     /// What lies within the radius of tissue.
     near: Mask<F>,
     /// Tissue with its narrow gaps.
@@ -60,7 +60,7 @@ struct Closed<F: Frame> {
     filled: Mask<F>,
 }
 
-impl<F: Frame> Closed<F> {
+impl<F: Frame> Closing<F> {
     fn of(labels: &LabelMap<F>, closing_mm: f64) -> Self {
         let solid = labels.map(|l| l != label::BACKGROUND && l != label::CSF);
         let near = dilate(&solid, closing_mm);

@@ -143,7 +143,7 @@ pub fn fit_gp(
             "warnings": warnings,
         });
         let files = vec![("hyperparameters.toml".to_owned(), fit.hyperparameters.to_toml().into_bytes())];
-        Ok::<_, FitRefusal>(Produced { files, facts, warnings, ..Produced::default() })
+        Ok::<_, FitRefusal>(Produced { files, warnings, facts })
     });
     let files = vec![folder.join("hyperparameters.toml")];
     Ok(GenerativeFiles { files, settings: json!(settings), facts: facts(outcome)? })

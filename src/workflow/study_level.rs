@@ -84,7 +84,7 @@ pub fn fit_study_level(
             "moduli": file.moduli, "warnings": warnings, "text": fit_text(&file),
         });
         let files = vec![("study-level.toml".to_owned(), file.to_toml().into_bytes())];
-        Ok::<_, FitError>(Produced { files, facts, warnings, ..Produced::default() })
+        Ok::<_, FitError>(Produced { files, warnings, facts })
     });
     let files = vec![folder.join("study-level.toml")];
     Ok(GenerativeFiles { files, settings, facts: facts(outcome)? })

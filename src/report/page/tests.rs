@@ -283,7 +283,7 @@ fn a_shift_of_which_nothing_is_believed_has_no_number_on_the_first_screen() {
 fn the_errors_of_nodes_that_two_sets_share_are_told_to_be_the_smaller_ones() {
     let shown = |on_two_sets| {
         let map = ErrorMap {
-            scale: ColourScale::over([0.0, 2.0].into_iter(), "error per node (mm)").unwrap(),
+            scale: ColourScale::over([0.0, 2.0], "error per node (mm)").unwrap(),
             pictures: Vec::new(),
             errors_mm: vec![("margin".to_owned(), vec![0.5, 2.0])],
             on_two_sets,

@@ -153,7 +153,9 @@ fn volumes_mm3(mesh: &TetMesh) -> BTreeMap<u8, f64> {
 fn missing_mm3(whole: &TetMesh, part: &TetMesh) -> BTreeMap<u8, f64> {
     const ROUNDING_MM3: f64 = 1e-3;
     let (mut missing, kept) = (volumes_mm3(whole), volumes_mm3(part));
-    missing.iter_mut().for_each(|(l, mm3)| *mm3 -= kept.get(l).unwrap_or(&0.0));
+    for (l, mm3) in &mut missing {
+        *mm3 -= kept.get(l).unwrap_or(&0.0);
+    }
     missing.retain(|_, mm3| *mm3 > ROUNDING_MM3);
     missing
 }
