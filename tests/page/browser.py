@@ -123,6 +123,8 @@ class Browser:
     def open(self, address, timeout=60):
         """Loads a page; returns seconds from navigation to the load event."""
         begin = time.monotonic()
+        # An earlier page's load is not this one's.
+        self.events = [event for event in self.events if event["method"] != "Page.loadEventFired"]
         self.call("Page.navigate", url=address)
         while time.monotonic() < begin + timeout:
             if any(e["method"] == "Page.loadEventFired" for e in self.events):
