@@ -135,8 +135,14 @@ fn average(best: &mut EstimateOutcome, models: &[(String, EstimateOutcome)], wei
         let p = &mut best.posterior;
         p.mode[n] = quantile(&parts, 0.5).exp();
         p.interval_95[n] = [quantile(&parts, 0.025).exp(), quantile(&parts, 0.975).exp()];
-        p.log_sd[n] = sd;
+        // Beside the others of the best model, whose correlations are kept: a covariance stays one.
+        let times = if p.log_sd[n] > 0.0 && p.log_sd[n].is_finite() { sd / p.log_sd[n] } else { 0.0 };
+        for other in (0..p.log_covariance.len()).filter(|other| *other != n) {
+            p.log_covariance[n][other] *= times;
+            p.log_covariance[other][n] *= times;
+        }
         p.log_covariance[n][n] = sd * sd;
+        p.log_sd[n] = sd;
         p.identifiability.verdicts[n] = Knowledge::Averaged;
     }
 }
@@ -190,6 +196,36 @@ mod tests {
         };
         assert_eq!(of(&[Some(4130.0), Some(1850.0), Some(9000.0)]), verdict(Some(1850.0)));
         assert_eq!(of(&[Some(4130.0), None]), verdict(None));
+    }
+
+    /// Of two tissues, with this standard deviation and correlation.
+    fn of_two(sd: f64, together: f64) -> EstimateOutcome {
+        let names = ["grey_matter", "white_matter"].map(|tissue| format!("shear_modulus_pa of {tissue}"));
+        let (own, off) = (sd * sd, together * sd * sd);
+        serde_json::from_value(serde_json::json!({
+            "posterior": {
+                "names": names, "mode": [1000.0, 700.0], "log_sd": [sd, sd], "interval_95": [[1.0, 2.0], [1.0, 2.0]],
+                "log_covariance": [[own, off], [off, own]],
+                "identifiability": {
+                    "verdicts": ["identified", "identified"], "sensitivity_correlation": [[1.0, 0.0], [0.0, 1.0]],
+                    "condition": 1.0, "valley": [1.0, 0.0], "valley_log_sd": 0.1
+                }
+            },
+            "prior": [], "observations": 12, "independent_observations": 12.0, "noise_mm": 0.3, "residual_rms_mm": 0.4,
+            "convergence": "step-below-tolerance", "solves": 9, "tangent_solves": 18, "limits": [],
+            "verdict": { "finding": "identified", "reasons": [], "sentence": "", "moduli": [] }
+        }))
+        .unwrap()
+    }
+
+    #[test]
+    fn an_average_that_is_surer_than_its_best_model_keeps_a_covariance() {
+        let models = [("best".to_owned(), of_two(0.5, 0.9)), ("other".to_owned(), of_two(0.1, 0.9))];
+        let mut best = models[0].1.clone();
+        average(&mut best, &models, &[0.1, 0.9]);
+        let [[a, b], [c, d]] = [0, 1].map(|n| [0, 1].map(|m| best.posterior.log_covariance[n][m]));
+        assert!(a < 0.5 * 0.25 && b == c && ((b * c / (a * d)).sqrt() - 0.9).abs() < 1e-9, "{a} {b} {d}");
+        assert!((a.sqrt() - best.posterior.log_sd[0]).abs() < 1e-12);
     }
 
     #[test]

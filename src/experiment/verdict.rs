@@ -225,6 +225,8 @@ pub enum Reason {
     LoadAssumed,
     /// The same where tissue stands in fluid up to a level.
     LevelAssumed,
+    /// Weight and other loads, all given: the moduli scale with them.
+    LoadsAssumed,
     /// The descent was not finished.
     NotConverged,
     /// How the body answers to a shape a little other than it was taken to be could not be found.
@@ -303,6 +305,9 @@ impl Reason {
             }
             Self::LevelAssumed => {
                 "gravity alone fixes only modulus / weight: the moduli are as good as the fluid's level assumed".to_owned()
+            }
+            Self::LoadsAssumed => {
+                "the loads fix only modulus / load: the moduli are as good as the density and the pressures or forces assumed".to_owned()
             }
             Self::NotConverged => "the search ended before the minimum was reached".to_owned(),
             Self::ShapeTakenAsExact { amounts } => format!(

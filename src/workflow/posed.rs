@@ -13,6 +13,7 @@ use super::user_file::{read_input, read_text, shown};
 use super::work::{Place, Work};
 use crate::anatomy::label;
 use crate::experiment::compare::Comparison;
+use crate::experiment::parameter_name::in_words as called;
 use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::verdict::{Finding, Verdict};
@@ -154,9 +155,28 @@ pub fn posed_case(
     }
     let supports = (subject == Some(Subject::Patient)).then_some(settings.resection.supports);
     let notes = estimate.as_ref().map_or_else(Vec::new, |facts| {
-        notes(&facts.estimate.verdict, facts.comparison.as_ref(), supports.unwrap_or(Supports::Fixed))
+        let mut notes = notes(&facts.estimate.verdict, facts.comparison.as_ref(), supports.unwrap_or(Supports::Fixed));
+        notes.extend(claimed.and_then(|facts| not_taken_over(&facts.estimate.posterior.names)));
+        notes
     });
     Ok(Posed { name: shown(folder), mesh, scenario, estimate, sights, notes })
+}
+
+/// What an estimate of these parameters has found that a body is not posed with.
+fn not_taken_over(parameters: &[String]) -> Option<String> {
+    // Of the supports a note of its own tells; fluid is taken over.
+    let taken = ["shear_modulus_pa", "gap_mm", "part of the fluid"];
+    let own: Vec<String> = parameters
+        .iter()
+        .filter(|name| !taken.iter().any(|t| name.starts_with(t)))
+        .map(|name| called(name).0)
+        .collect();
+    (!own.is_empty()).then(|| {
+        format!(
+            "the estimate has its own {}: here loads are those of the settings, and laws neo-Hookean",
+            own.join(", ")
+        )
+    })
 }
 
 /// What of a body is not as the estimate with this verdict has it; `supports` are those it was asked for.
@@ -257,6 +277,14 @@ mod tests {
         let said = of(Finding::CannotTell, &both, Supports::Evidence);
         assert!(said.contains("average") && said.contains("slides"), "an average has something of both: {said}");
         assert!(!of(Finding::CannotTell, &["supports fixed"], Supports::Evidence).contains("slides"));
+    }
+
+    #[test]
+    fn what_an_estimate_has_beside_moduli_is_named() {
+        let of = |names: &[&str]| not_taken_over(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+        assert_eq!(of(&["shear_modulus_pa of brain", "gap_mm between cortex and skull"]), None);
+        let said = of(&["shear_modulus_pa of brain", "effective density_kg_per_m3"]).unwrap();
+        assert!(said.contains("its own effective density") && !said.contains("shear"), "{said}");
     }
 
     #[test]

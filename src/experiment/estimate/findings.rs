@@ -7,6 +7,7 @@ use super::process::{Factor, Process};
 use super::projection::Projection;
 use super::re_registration::InstrumentError;
 use super::shape::ShapeFound;
+use super::softest::Softest;
 use super::{Descent, EstimateError};
 use crate::geometry::{Mni, RigidTransform};
 use nalgebra::DMatrix;
@@ -104,7 +105,7 @@ pub struct Findings {
     /// The shift.
     pub shift: Shift,
     /// Where nothing was seen to move: how soft each parameter's tissue may be (logarithm), where that is bounded.
-    pub softest: Vec<Option<f64>>,
+    pub softest: Vec<Option<Softest>>,
     /// Mean of the displacement seen, mm.
     pub seen_mean_mm: [f64; 3],
     /// The places that were looked at, mm, and their nodes.

@@ -14,6 +14,7 @@ mod fluid;
 mod fluid_levels;
 mod independent;
 mod levenberg_marquardt;
+mod load_assumed;
 mod mesh_error;
 mod nuisance;
 mod outcome;

@@ -5,6 +5,7 @@ use super::correlated;
 use super::findings::ProblemError;
 use super::fluid::FluidOutcome;
 use super::independent::fit_independent;
+use super::load_assumed::load_assumed;
 use super::mesh_error::{at_places, left_of_difference};
 use super::outcome::{Estimate, EstimateOutcome};
 use super::problem::{Errors, Problem};
@@ -14,7 +15,7 @@ use super::unknown::Unknown;
 use super::verdict_of_fit::{Posed, verdict_of_fit};
 use super::{EstimateSettings, LogPrior, laplace};
 use crate::experiment::sample::Tissue;
-use crate::experiment::verdict::{Finding, Reason};
+use crate::experiment::verdict::Finding;
 use crate::fem::Within;
 use crate::material::law::Material;
 use std::collections::BTreeMap;
@@ -33,9 +34,7 @@ const AS_SEEN: Within = Within::Energy(1e-3);
 pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Result<Estimate, ProblemError> {
     let (unknowns, prior): (Vec<Unknown>, Vec<LogPrior>) = problem.unknowns.into_iter().unzip();
     let start: Vec<f64> = if problem.start.is_empty() { prior.iter().map(|p| p.mean).collect() } else { problem.start };
-    let only_weight = problem.template.loads.patch.is_empty() && problem.template.loads.pressure.is_empty();
-    let load_known = !unknowns.iter().any(|u| matches!(u, Unknown::Density | Unknown::Drained(_)));
-    let in_fluid = problem.template.loads.csf.is_some();
+    let assumed = load_assumed(&problem.template.loads, &unknowns);
     let mut model_error: Vec<f64> = unknowns
         .iter()
         .map(|u| if matches!(u, Unknown::ShearModulus(_)) { problem.model_log_sd } else { 0.0 })
@@ -106,11 +105,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let posed = Posed {
         prior: &prior,
         tissues: &tissues,
-        assumed: (only_weight && load_known).then_some(if in_fluid {
-            Reason::LevelAssumed
-        } else {
-            Reason::LoadAssumed
-        }),
+        assumed,
+        model_error: &model_error,
         gravity_m_per_s2: problem.template.loads.gravity_m_per_s2,
         body_known: problem.body_known,
     };
@@ -187,7 +183,7 @@ mod tests {
     use crate::experiment::phantom::{PhantomSettings, block};
     use crate::experiment::prior::{PriorSettings, law_priors};
     use crate::experiment::sweep::scenario_of;
-    use crate::experiment::verdict::{Claim, Verdict};
+    use crate::experiment::verdict::{Claim, Reason, Verdict};
     use crate::fem::{Loads, Scenario, simulate};
     use crate::material::law::{gent, mooney_rivlin, ogden};
     use crate::material::meta_model::MetaModel;

@@ -16,8 +16,10 @@ pub(super) struct Posed<'a> {
     pub prior: &'a [LogPrior],
     /// The tissue whose shear modulus a parameter is.
     pub tissues: &'a [Option<String>],
-    /// What is told of the load where nothing but a weight that is given pulls at the body.
+    /// What is told of the load where a weight that is given pulls at the body.
     pub assumed: Option<Reason>,
+    /// What labels, supports and mesh make wrong of the logarithm of each parameter, one standard deviation.
+    pub model_error: &'a [f64],
     /// Gravity as assumed, m/s2.
     pub gravity_m_per_s2: [f64; 3],
     /// Whether load and supports are known, as a phantom's are: then nothing contradicts them.
@@ -31,7 +33,7 @@ pub(super) fn verdict_of_fit(
     posterior: &Posterior,
     posed: &Posed<'_>,
 ) -> Verdict {
-    let Posed { prior, tissues, ref assumed, gravity_m_per_s2, body_known } = *posed;
+    let Posed { prior, tissues, ref assumed, model_error, gravity_m_per_s2, body_known } = *posed;
     let mut unexplained = Vec::new();
     let mut still = None;
     let mut share = None;
@@ -100,8 +102,8 @@ pub(super) fn verdict_of_fit(
     };
     let answer = |n: usize| match (&fitted.correlated, finding) {
         (Some(found), Finding::NoShift) => {
-            let bound = found.softest.get(n).copied().flatten();
-            bound.map_or(Claim::Withheld, |log_pa| Claim::Above { bound_pa: log_pa.exp() })
+            let softest = found.softest.get(n).copied().flatten();
+            softest.map_or(Claim::Withheld, |of| Claim::Above { bound_pa: of.log_bound(model_error[n]).exp() })
         }
         _ if finding.has_stiffness() => {
             Claim::Interval { mode_pa: posterior.mode[n], interval_95_pa: posterior.interval_95[n] }

@@ -16,7 +16,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 const NAME: StageName = StageName::Compare;
 /// The laws of the family.
 const LAWS: [MetaModel; 3] = [MetaModel::NEO_HOOKEAN, MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN];
@@ -42,7 +42,7 @@ pub(crate) fn compare(
         let laws = |body: &HeldBody| if body.levels.is_some() { &own[..] } else { &LAWS[..] };
         let models: usize = bodies.list.iter().map(|body| families.len() * laws(body).len()).sum();
         work.tell(|p| p.begin("models", models));
-        let (mut models, mut seen, mut produced) = (Vec::new(), BTreeMap::new(), Produced::default());
+        let (mut models, mut seen, mut left_out) = (Vec::new(), BTreeMap::new(), Vec::new());
         for (n, body) in bodies.list.iter().enumerate() {
             for (count, tissues) in &families {
                 for &law in laws(body) {
@@ -56,10 +56,8 @@ pub(crate) fn compare(
                             seen.insert(name.clone(), (tissues, prior, found.seen));
                             models.push((name, found.outcome));
                         }
-                        // A model that has no equilibrium explains nothing; the others are still compared.
-                        Err(error) => {
-                            produced.warn([Warning::ModelLeftOut { model: name, reason: error.to_string() }]);
-                        }
+                        // The others are still compared; what could not be solved is neither refuted nor borne out.
+                        Err(error) => left_out.push((name, error.to_string())),
                     }
                     work.tell(|p| p.step());
                 }
@@ -70,6 +68,9 @@ pub(crate) fn compare(
         if let Some((tissues, prior, seen)) = comparison.candidates.first().and_then(|best| seen.get(&best.name)) {
             comparison.verdict = bodies.bounded(work, input, (tissues.as_slice(), prior), seen, comparison.verdict)?;
         }
+        comparison.verdict = comparison.verdict.beside_unsolved(left_out.iter().map(|(model, _)| model.clone()));
+        let mut produced = Produced::default();
+        produced.warn(left_out.into_iter().map(|(model, reason)| Warning::ModelLeftOut { model, reason }));
         let json = serde_json::to_string_pretty(&comparison).expect("figures are plain data") + "\n";
         produced.files.push((COMPARISON.to_owned(), json.into_bytes()));
         produced.facts = facts(&comparison);

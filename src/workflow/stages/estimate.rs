@@ -31,7 +31,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 35;
+const VERSION: u32 = 36;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -420,8 +420,12 @@ impl Bodies {
         let (unknowns, scenario) = Self::posed(work, &body, tissues, prior)?;
         let (_, errors, noise_mm) = self.observation(&body, input, options);
         let seen = (Observation::Nodes(seen.to_vec()), errors);
-        let problem =
-            Problem { body_known: false, ..Problem::new(&body.mesh, &scenario, unknowns, input.poisson_ratio, seen) };
+        let problem = Problem {
+            body_known: false,
+            model_log_sd: options.model_log_sd,
+            body_log_sd: body.log_sd(options),
+            ..Problem::new(&body.mesh, &scenario, unknowns, input.poisson_ratio, seen)
+        };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
         let stuck = solve_problem(problem, &settings).map(|found| found.outcome.verdict);
         let stuck = stuck.unwrap_or_else(|_| Verdict::new(Finding::NoShift, None, Vec::new(), Vec::new()));
