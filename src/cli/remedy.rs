@@ -99,7 +99,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         Job::NoSuchModel { .. } => "`hgm gp studies` lists them",
         Job::StudyLevelFile { .. } => "make it with `hgm gp fit --model study-level`",
         Job::EveryTaskOfTwo => "drop --every-task, or use --tissues 1",
-        Job::Lost { .. } | Job::LostInCoarser { .. } => "see --cells and --edge-mm",
+        Job::Lost { .. } => "see --cells and --edge-mm",
         Job::NoTissue { .. } => "--brain-mask takes a brain mask of your own",
         Job::Observed(_) => "`hgm prep` takes masks of your own (--cavity-mask, --ventricle-mask)",
         Job::SampleMissing { .. } => {
@@ -139,8 +139,14 @@ fn of_predicting(error: &PredictError) -> Option<&'static str> {
     use PredictError::{BesideScan, Ellipsoid, NoPlan, NoSurface, NoVoxel, OpenSurface, OtherSurface, Plan};
     use PredictError::{Label, Level, NoSuchLabel, NoTarget, OnePlan, SeveralPlans, TargetOutside, Taught};
     Some(match error {
-        Plan(_) | NoPlan | Ellipsoid { .. } | NoSurface { .. } => "see --resection and --resection-ellipsoid",
-        OtherSurface { .. } | OpenSurface { .. } | NoVoxel { .. } | BesideScan { .. } => of_predicting(&NoPlan)?,
+        Plan(_)
+        | NoPlan
+        | Ellipsoid { .. }
+        | NoSurface { .. }
+        | OtherSurface { .. }
+        | OpenSurface { .. }
+        | NoVoxel { .. }
+        | BesideScan { .. } => "see --resection and --resection-ellipsoid",
         Taught(TaughtError::OtherTissues { .. }) => TISSUES_OF_POPULATION,
         Taught(_) => "see --population, --drained and --fluid-below",
         Level(LevelError::BelowBrain { .. }) => "see --fluid-below and --drained",

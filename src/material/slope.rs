@@ -1,6 +1,6 @@
 //! How a search that ended too early is told.
 
-/// A gradient below this for each observation is flat: a step of one in all logarithms gains no more.
+/// A gradient below this for each observation is flat.
 pub(super) const STEEP: f64 = 1e-5;
 
 /// The slope for each observation that a search has ended on, where it is none that is flat; one that is no number is not.

@@ -68,13 +68,20 @@ mod tests {
     use super::*;
     use crate::workflow::cohort::begin;
     use crate::workflow::error::{ErrorKind, WorkflowError};
+    use std::path::PathBuf;
 
-    #[test]
-    fn derivatives_replace_no_description_of_a_data_set_of_scans() {
+    /// A data set of scans without any.
+    fn study() -> (tempfile::TempDir, PathBuf, Dataset) {
         let all = tempfile::tempdir().unwrap();
         let raw = all.path().join("study");
         std::fs::create_dir_all(raw.join("sub-01")).unwrap();
         let dataset = Dataset::open(&raw, &[]).unwrap();
+        (all, raw, dataset)
+    }
+
+    #[test]
+    fn derivatives_replace_no_description_of_a_data_set_of_scans() {
+        let (all, raw, dataset) = study();
         let other = all.path().join("other");
         std::fs::create_dir(&other).unwrap();
         // The data set itself, also where nothing describes it, and another one.
@@ -98,10 +105,7 @@ mod tests {
 
     #[test]
     fn another_programs_derivatives_are_left_alone_and_cases_go_into_nobody_elses_folder() {
-        let all = tempfile::tempdir().unwrap();
-        let raw = all.path().join("study");
-        std::fs::create_dir_all(raw.join("sub-01")).unwrap();
-        let dataset = Dataset::open(&raw, &[]).unwrap();
+        let (all, raw, dataset) = study();
         let [others, out] = ["derivatives/smriprep", "derivatives/hgm"].map(|name| raw.join(name));
         std::fs::create_dir_all(&others).unwrap();
         for makers in ["", r#", "GeneratedBy": [{"Name": "sMRIPrep"}]"#] {

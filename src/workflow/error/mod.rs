@@ -101,11 +101,6 @@ pub enum WorkflowError {
     NoTissue { labels: &'static str },
     #[error("{labels}: {lost}")]
     Lost { labels: &'static str, lost: LostLabel },
-    #[error(
-        "{labels}: in the coarser mesh, by which an estimate tells what its mesh does to it, {lost}; or do without that mesh \
-         (`two_meshes = false` of [estimate])"
-    )]
-    LostInCoarser { labels: &'static str, lost: LostLabel },
     #[error(transparent)]
     Tag(#[from] TagError),
     #[error(transparent)]

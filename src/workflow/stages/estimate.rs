@@ -174,8 +174,8 @@ pub(crate) struct EstimateInput<'a> {
     pub poisson_ratio: f64,
     /// What the state is compared with.
     pub reference: &'a Reference,
-    /// The same body in a coarser mesh, made when it is asked for.
-    pub coarser: Option<&'a dyn Fn() -> Result<TetMesh, WorkflowError>>,
+    /// The same body in a coarser mesh where it has one, made when it is asked for.
+    pub coarser: Option<&'a dyn Fn() -> Result<Option<TetMesh>, WorkflowError>>,
     /// The body as each of the supports that are tried holds it, made when it is asked for; the one above where there are none.
     pub held: Option<&'a dyn Fn() -> Result<Vec<HeldBody>, WorkflowError>>,
     /// The same with every fluid that a comparison crosses them with.
@@ -282,7 +282,7 @@ pub(super) struct Bodies {
     pub list: Vec<HeldBody>,
     /// Nodes deep enough to be believed, with their places (mm).
     deep: Vec<(u32, [f64; 3])>,
-    /// The same body in a coarser mesh.
+    /// The same body in a coarser mesh, where it has one.
     coarser: Option<TetMesh>,
 }
 
@@ -303,7 +303,7 @@ impl Bodies {
         };
         let list = if list.is_empty() { vec![as_posed()] } else { list };
         let coarser = match input.coarser {
-            Some(make) if options.two_meshes && options.observed == Observed::Displacement => Some(make()?),
+            Some(make) if options.two_meshes && options.observed == Observed::Displacement => make()?,
             _ => None,
         };
         // The same places for every body: evidence is of one set of data.

@@ -33,7 +33,7 @@ const NAME: StageName = StageName::Mesh;
 pub(crate) const LARGE_ISLAND_MM3: f64 = 500.0;
 /// Tissue that is cut off and is more than this is a part of the brain that a simulation must not do without, mm3.
 const LARGEST_CUT_OFF_MM3: f64 = 10_000.0;
-/// Fewer tetrahedra than these hang on by an edge wherever a coarse mesh is thin, and are no part of anything.
+/// Fewer tetrahedra than these are the mesh's own roughness, not a part of the brain.
 const FEWEST_CUT_OFF: f64 = 4.0;
 
 /// The stage, and the settings of the mesh: fluid is left out, the tets conform to the falx.
@@ -195,11 +195,9 @@ fn tagged(
     Ok(Tagged { rest, whole, record, tags, lost, cut_off_mm3 })
 }
 
-/// The same body in a quarter of the tetrahedra: what a mesh does to an estimate shows in the difference.
-///
-/// # Errors
-/// [`WorkflowError::LostInCoarser`] where what was resected is too small for those cells.
-pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> Result<TetMesh, WorkflowError> {
+/// The same body in a quarter of the tetrahedra: what a mesh does to an estimate shows in the difference. `None` where what was
+/// resected is too small for those cells: the difference would be that of a brain that nothing was taken from.
+pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> Result<Option<TetMesh>, WorkflowError> {
     const PART: usize = 4;
     let (_, mut settings) = mesh_stage(work, made);
     settings.size = match settings.size {
@@ -208,9 +206,8 @@ pub(crate) fn coarser_mesh(work: &Work<'_>, made: &Made, anatomy: &Anatomy) -> R
     };
     let body = with_closed_sulci(&anatomy.labels, SULCUS_MM);
     match tagged(work, &body, &settings, Some(&anatomy.template_from_patient)) {
-        // The difference would be that of a brain that nothing was taken from.
-        Err(WorkflowError::Lost { labels, lost }) => Err(WorkflowError::LostInCoarser { labels, lost }),
-        made => Ok(made?.rest),
+        Err(WorkflowError::Lost { .. }) => Ok(None),
+        made => Ok(Some(made?.rest)),
     }
 }
 
