@@ -38,7 +38,7 @@ pub fn descriptor(hgm: &Command) -> Option<(String, Vec<u8>)> {
             output("group_page", "Page of all subjects", "[OUT]/group.html", "The table as a page (level group)", true),
         ],
         "error-codes": [
-            {"code": 1, "description": "failed: the computation broke down, or a file could not be written"},
+            {"code": 1, "description": "failed: the computation broke down, a file could not be written, or another job holds the folder"},
             {"code": 2, "description": "usage: the command line cannot be understood"},
             {"code": 3, "description": "input rejected: the message names file, field and remedy"},
             {"code": 4, "description": "computed (outputs kept), but not to be believed"},

@@ -32,7 +32,7 @@ const WIDTH: usize = 100;
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done
-  1  failed: the computation broke down, or a file could not be written
+  1  failed: the computation broke down, a file could not be written, or another job holds the folder
   2  usage: the command line cannot be understood
   3  input rejected: the message names file, field and remedy; no result was written, nothing is half-written
   4  computed (outputs kept), but not to be believed: no operation is seen, the scans do not show one person, the

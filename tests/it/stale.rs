@@ -45,7 +45,8 @@ fn slow_other_scans_and_a_second_job_are_refused_in_a_folder_that_is_used_and_he
         (result.status.code(), String::from_utf8_lossy(&result.stderr).into_owned())
     };
     let (code, said) = run(&prep(pre, post));
-    assert!(code == Some(3) && said.contains(&format!("process {}", first.id())), "{said}");
+    // Nothing is wrong with what was given: the same command may go on later.
+    assert!(code == Some(1) && said.contains(&format!("process {}", first.id())), "{said}");
     // A job that is killed holds nothing.
     first.kill().unwrap();
     first.wait().unwrap();
