@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from . import _hgm
 from ._case import Case
 from ._command import Progress, Settings, call, options
-from ._errors import QualityRefused
+from ._errors import InputRefused, QualityRefused
 from ._files import Files, files
 
 Folder = Union[str, "os.PathLike[str]"]
@@ -32,6 +32,20 @@ def _job(files: Files, words: list[str], output: Folder, progress: Optional[Prog
 
 def _given(files: Files, **paths: Any) -> dict[str, Any]:
     return {name: None if value is None else files.path(name, value) for name, value in paths.items()}
+
+
+def _six(resection: Any) -> list[float]:
+    """An ellipsoid's numbers; a list of files and a mask's voxels are none."""
+    try:
+        six = np.asarray(resection, dtype=np.float64)
+    except (TypeError, ValueError):
+        six = np.empty(0)
+    if six.shape != (6,):
+        raise InputRefused(
+            "resection: neither an ellipsoid nor a file: give six numbers (x, y, z, rx, ry, rz), or one path or image of "
+            "nibabel's"
+        )
+    return [float(x) for x in six]
 
 
 def run(
@@ -183,7 +197,7 @@ def predict(
         )
         words = ["predict", temporary.path("pre", pre)]
         if isinstance(resection, (list, tuple, np.ndarray)):
-            words.append("--resection-ellipsoid=" + ",".join(str(float(x)) for x in resection))
+            words.append("--resection-ellipsoid=" + ",".join(str(x) for x in _six(resection)))
         else:
             words.append("--resection=" + temporary.path("resection", resection))
         heads = [heads] if isinstance(heads, str) else list(heads)
