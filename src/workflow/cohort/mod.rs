@@ -1,6 +1,7 @@
 //! A cohort: the subjects of a BIDS data set, each as one case, and all of them together.
 
 mod dataset;
+mod folderless;
 mod foretold;
 mod group_level;
 mod out_folder;
@@ -24,6 +25,7 @@ use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::report::cohort::{Member, Status};
 use crate::report::derivatives::{dataset_files, subject_files, way_up};
+use folderless::without_folders;
 use foretold::with_prediction;
 use out_folder::may_hold_cases;
 use published::Published;
@@ -110,8 +112,7 @@ pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, CohortE
         let shown = format!("{subject}/hgm/{}", layout::OUTCOME);
         match case.check_outcome() {
             Ok(()) => outcome = Some(ExperimentOutcome::from_json(&text, &shown)?),
-            // Without the folders of this machine.
-            Err(error) => stale = Some(error.to_string().replace(&format!("{}/", cases.display()), "")),
+            Err(error) => stale = Some(without_folders(&error.to_string(), &[out, cases])),
         }
     }
     // A gate that what lies there passes has stopped a later run than the one that made it.
@@ -161,6 +162,8 @@ mod tests {
         assert!(after.outcome.is_none() && after.settings_sha256.is_none());
         let said = after.message.unwrap();
         assert!(after.status == Status::Unfinished && said.starts_with("sub-01/hgm: sim/outcome.json"), "{said}");
+        // A folder is the same with a slash behind it.
+        assert_eq!(read(&out.path().join("")).message.unwrap(), said);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The participant level: each subject through the whole job, then its files under BIDS names.
 
+use super::folderless::without_folders;
 use super::out_folder::may_hold_cases;
 use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
@@ -49,6 +50,15 @@ impl Participants<'_> {
             Work::Pair(_) => subject.to_owned(),
             Work::Plan { .. } => format!("{subject}_plan"),
         }
+    }
+
+    /// The folders of this machine that a message may name.
+    fn folders(&self) -> Vec<&Path> {
+        let plans = match self.work {
+            Work::Pair(_) => None,
+            Work::Plan { plans, .. } => Some(plans),
+        };
+        [self.out, &self.dataset.folder, &self.cases.folder].into_iter().chain(plans).collect()
     }
 
     /// Its case folder.
@@ -143,10 +153,7 @@ pub fn participants(
             }
             Err(error) => {
                 let mut log = words(name, error);
-                // Without the folders of this machine.
-                for folder in [asked.out, &asked.dataset.folder] {
-                    log.message = log.message.replace(&format!("{}/", folder.display()), "");
-                }
+                log.message = without_folders(&log.message, &asked.folders());
                 let text = serde_json::to_string_pretty(&log).expect("a log is plain data") + "\n";
                 write_whole(&file, text.as_bytes())?;
                 end.message = Some(log.message);
@@ -311,6 +318,27 @@ mod tests {
         assert!(plan(&raw, &raw).is_err() && plan(&out, &raw).is_err());
         assert_eq!(plan(&out, &out).unwrap()[0].participant_id, "sub-01");
         assert!(!out.exists());
+    }
+
+    #[test]
+    fn what_is_kept_of_a_subject_names_no_folder_of_this_machine() {
+        let (all, dataset) = one_subject();
+        let [out, cases, plans] = ["out/", "scratch/", "hers/plans/"].map(|name| all.path().join(name));
+        let place = Place::from(cases.as_path());
+        let work = Work::Plan { plans: &plans, chosen: &[] };
+        let asked = Participants { work, ..asked(&dataset, &out, &place) };
+        let message = format!(
+            "{}: none, {}sub-01/x.nii, {}sub-01/hgm, {}sub-01/y.nii",
+            plans.display(),
+            plans.display(),
+            cases.display(),
+            out.display()
+        );
+        let mut words = |_: &str, _| Log { kind: "input rejected".to_owned(), message: message.clone(), exit_code: 3 };
+        let done = participants(&asked, &Settings::default(), &mut Silent, &mut words).unwrap();
+        let kept = std::fs::read_to_string(log_file(&out, "sub-01_plan")).unwrap();
+        let told = done[0].message.as_deref().unwrap();
+        assert!(told == "plans/: none, sub-01/x.nii, sub-01/hgm, sub-01/y.nii" && kept.contains(told), "{told}");
     }
 
     #[test]
