@@ -4,12 +4,14 @@
 //! whose manifest is there is complete. A stage is skipped when its key (inputs + settings + stage version) is the manifest's and
 //! every output still has the bytes the manifest names.
 
+mod apart;
 mod manifest;
 mod reason;
 mod signal;
 mod stage;
 mod write;
 
+pub use apart::{ApartError, check_apart, moments_called_as, place};
 pub use manifest::{Manifest, OutputRecord, Provenance};
 pub use reason::Reason;
 pub use signal::{at_signal, end_between_files};

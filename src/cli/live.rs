@@ -1,8 +1,8 @@
 //! `hgm live CASE|MESH [SCENARIO]`: a body to pull at in the browser, or a recorded session again.
 
 use super::{Failure, Session};
-use crate::artefact::{at_signal, check_writable, write_whole};
-use crate::live::{LiveBody, replay_to_files, serve};
+use crate::artefact::{at_signal, write_whole};
+use crate::live::{LiveBody, check_output, replay_to_files, serve};
 use crate::workflow::{BodySource, Layer, Resection, posed_case, posed_mesh};
 use anyhow::anyhow;
 use serde_json::json;
@@ -46,6 +46,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let given = [Some(&args.body), args.scenario.as_ref(), args.replay.as_ref()];
+    let made_of: Vec<_> = given.into_iter().flatten().map(PathBuf::as_path).collect();
+    args.record.iter().chain(&args.output).try_for_each(|file| check_output(file, &made_of))?;
     let body = body(args, session)?;
     match (&args.replay, &args.output) {
         (Some(file), Some(output)) => {
@@ -74,9 +77,6 @@ fn body(args: &Args, session: &Session) -> Result<LiveBody, Failure> {
 }
 
 fn open(body: &LiveBody, args: &Args, session: &Session) -> Result<(), Failure> {
-    if let Some(file) = &args.record {
-        check_writable(file)?;
-    }
     let server = serve(body, args.port, args.record.is_some())?;
     at_signal(server.stopper());
     let address = server.address();

@@ -127,7 +127,7 @@ fn of_asking(error: &AskedError) -> &'static str {
         AskedError::ScenarioOfCase { .. } => "leave SCENARIO out",
         AskedError::MeshBeforeResection { .. } => "leave --before-resection out",
         AskedError::PackedNifti { .. } => "see -o and --write-brain-mask",
-        AskedError::TransformNamedImage { .. } | AskedError::TransformOverInput { .. } => "correct -o",
+        AskedError::TransformNamedImage { .. } => "correct -o",
         AskedError::MasksOfTemplate => "leave --moving-mask and --fixed-mask out",
         AskedError::PoseAndStart | AskedError::StartBesideLabels => "leave --pose-start out",
     }

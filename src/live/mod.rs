@@ -30,7 +30,7 @@ pub use export::Export;
 pub use frame::{Pace, frame_bytes};
 pub use pace::{Driven, Measured};
 pub use recording::{Recording, RecordingError, Timed};
-pub use replay::{ReplayError, Replayed, replay_to_files};
+pub use replay::{ReplayError, Replayed, check_output, replay_to_files};
 pub use series::Series;
 pub use server::{ServeError, Server, serve};
 pub use session::Session;

@@ -6,8 +6,8 @@ use super::export::Export;
 use super::recording::{Recording, RecordingError};
 use super::series::Series;
 use super::session::Session;
-use crate::artefact::{WriteError, check_writable, write_whole};
-use crate::workflow::{ErrorKind, InputError, Progress, read_text};
+use crate::artefact::{ApartError, WriteError, check_apart, check_writable, moments_called_as, write_whole};
+use crate::workflow::{Case, ErrorKind, InputError, Progress, read_text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -21,6 +21,10 @@ const EVERY: u64 = 30;
 pub enum ReplayError {
     #[error("{}: a file every so many steps makes a series, whose name ends in .pvd", output.display())]
     NotASeries { output: PathBuf },
+    #[error("{}: the name of a state ends in .vtu, that of a series in .pvd: end it in one of them", output.display())]
+    Ending { output: PathBuf },
+    #[error(transparent)]
+    Apart(#[from] ApartError),
     #[error(transparent)]
     Input(#[from] InputError),
     #[error("{}: {source}", file.display())]
@@ -35,7 +39,11 @@ impl ReplayError {
     /// Who is to do something about it.
     pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::NotASeries { .. } | Self::Input(_) | Self::Recording { .. } => ErrorKind::Rejected,
+            Self::NotASeries { .. }
+            | Self::Ending { .. }
+            | Self::Apart(_)
+            | Self::Input(_)
+            | Self::Recording { .. } => ErrorKind::Rejected,
             Self::State(_) | Self::Write(_) => ErrorKind::Failed,
         }
     }
@@ -58,22 +66,47 @@ pub struct Replayed {
     pub at_rest: bool,
 }
 
+/// Refuses a recording, a state or a series that would be written over what the session is made of: a mesh, a scenario, a recording,
+/// or the folder of a case, whose files stand for it. Comes before the session.
+///
+/// # Errors
+/// [`ReplayError::Apart`]; a place that takes no file.
+pub fn check_output(output: &Path, made_of: &[&Path]) -> Result<(), ReplayError> {
+    check_writable(output)?;
+    let moments = if is_series(output) { moments_called_as(output, made_of.iter().copied()) } else { Vec::new() };
+    let outputs: Vec<&Path> = moments.iter().map(PathBuf::as_path).chain([output]).collect();
+    let (cases, files): (Vec<&Path>, Vec<&Path>) = made_of.iter().copied().partition(|path| path.is_dir());
+    let of_cases = cases.into_iter().flat_map(|folder| Case::at(folder).own_of(outputs.iter().copied()));
+    Ok(check_apart(&outputs, of_cases.chain(files.into_iter().map(Path::to_path_buf)))?)
+}
+
+fn is_series(output: &Path) -> bool {
+    ends_in(output, "pvd")
+}
+
+fn ends_in(output: &Path, ending: &str) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
 /// Repeats the recording in a file and writes the state at its end, or, where the name ends in .pvd, a series with one every
 /// so many steps.
 ///
 /// # Errors
-/// [`ReplayError`]: steps between files of one state, a file that is no recording or one of another body or with a command
-/// that is refused, a state that cannot be written.
+/// [`ReplayError`]: steps between files of one state, a name that is neither's or the recording's own, a file that is no recording or
+/// one of another body or with a command that is refused, a state that cannot be written.
 pub fn replay_to_files(
     file: &Path,
     body: &LiveBody,
     (output, every): (&Path, Option<u64>),
     progress: &mut dyn Progress,
 ) -> Result<Replayed, ReplayError> {
-    check_writable(output)?;
-    let in_series = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"));
+    check_output(output, &[file])?;
+    let in_series = is_series(output);
     if every.is_some() && !in_series {
         return Err(ReplayError::NotASeries { output: output.to_path_buf() });
+    }
+    if !in_series && !ends_in(output, "vtu") {
+        return Err(ReplayError::Ending { output: output.to_path_buf() });
     }
     let refused = |source| ReplayError::Recording { file: file.to_path_buf(), source };
     let recording = Recording::from_text(&read_text(file)?).map_err(refused)?;

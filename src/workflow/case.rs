@@ -5,7 +5,7 @@ use super::facts::{EstimateFacts, Implausible, MeshFacts};
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::warning::Warning;
-use crate::artefact::Manifest;
+use crate::artefact::{Manifest, place};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::mesh::TetMesh;
@@ -53,6 +53,19 @@ impl Case {
     /// A file of the case, by its name in the [`layout`].
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
+    }
+
+    /// Those of its files that these paths lead to: no job is made of a file that it replaces, and no result of the user's own is written
+    /// over one.
+    pub(crate) fn own_of<'a>(&self, paths: impl IntoIterator<Item = &'a Path>) -> Vec<PathBuf> {
+        let (folder, recorded) = (place(&self.folder), self.recorded());
+        let is_own = |file: &String| {
+            let made = recorded.iter().any(|manifest| manifest.outputs.contains_key(file));
+            made || layout::TABLE.iter().any(|entry| entry.path == file)
+        };
+        let below =
+            |path: &Path| place(path).strip_prefix(&folder).ok().map(|file| file.to_string_lossy().into_owned());
+        paths.into_iter().filter_map(below).filter(is_own).map(|file| self.path(&file)).collect()
     }
 
     /// The page.

@@ -47,6 +47,14 @@ impl Inputs {
     pub fn pair(pre: impl Into<PathBuf>, post: impl Into<PathBuf>) -> Self {
         Self { pre: pre.into(), post: post.into(), ..Self::default() }
     }
+
+    /// The files among them.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let own = [&self.dseg, &self.pose, &self.pose_start, &self.brain_mask, &self.ventricle_mask];
+        let drawn = [&self.cavity_mask, &self.resected_mask];
+        let scans = [&self.pre, &self.post];
+        scans.into_iter().chain(own.into_iter().chain(drawn).flatten()).map(PathBuf::as_path).collect()
+    }
 }
 
 /// How far apart two programs may write one voxel of one grid.

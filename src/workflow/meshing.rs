@@ -9,7 +9,7 @@ use super::settings::Settings;
 use super::stages::{LARGE_ISLAND_MM3, WithReading, mesh_outcome};
 use super::user_file::read_input;
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError, check_writable, write_whole};
+use crate::artefact::{Produced, Stage, StageError, check_apart, check_writable, write_whole};
 use crate::experiment::outcome::MeshOutcome;
 use crate::geometry::Native;
 use crate::image::{LabelMap, nifti};
@@ -28,6 +28,8 @@ const VERSION: u32 = 7;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
+const SURFACES: [&str; 4] = ["pial", "white", "ventricle", "margin"];
+const SURFACE_ENDINGS: [&str; 3] = [".surf.gii", ".stl", ".ply"];
 
 /// The files of a mesh.
 #[derive(Clone, Debug, Default)]
@@ -45,6 +47,18 @@ pub struct MeshFiles {
     pub preview: Option<PathBuf>,
     /// Folder for the closed surfaces pial, white, ventricle and margin as GIFTI, STL and PLY.
     pub surfaces: Option<PathBuf>,
+}
+
+impl MeshFiles {
+    /// What may be written.
+    fn written(&self) -> Vec<PathBuf> {
+        let surface = |folder: &PathBuf| {
+            let of = |name: &&str| SURFACE_ENDINGS.map(|ending| folder.join(format!("{name}{ending}")));
+            SURFACES.iter().flat_map(of).collect::<Vec<_>>()
+        };
+        let surfaces = self.surfaces.as_ref().map(surface).unwrap_or_default();
+        std::iter::once(self.output.clone()).chain(self.preview.clone()).chain(surfaces).collect()
+    }
 }
 
 /// What a mesh has turned out to be, as its manifest keeps it.
@@ -91,6 +105,10 @@ pub fn mesh_file(
     for file in [Some(&files.output), files.preview.as_ref()].into_iter().flatten() {
         check_writable(file)?;
     }
+    check_apart(
+        files.written(),
+        std::iter::once(&files.labels).chain(files.numbers.as_ref().map(PathBuf::from).as_ref()),
+    )?;
     let name = files.labels.display().to_string();
     let bytes = read_input(&files.labels)?;
     let (mut posed, tags, programs) = (settings.mesh.clone(), &settings.tag, programs.engines());
@@ -191,18 +209,14 @@ fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
 fn write_surfaces(mesh: &TetMesh, folder: &Path, space: gifti::Space) -> Result<(), WorkflowError> {
     let all = mesh.boundary_facets(|_| true);
     let of = |l: u8| mesh.boundary_facets(|own| own == l);
-    let surfaces = [
-        ("pial", all),
-        ("white", of(label::WHITE_MATTER)),
-        ("ventricle", of(label::VENTRICLE)),
-        ("margin", of(label::RESECTED)),
-    ];
-    for (name, facets) in surfaces.into_iter().filter(|s| !s.1.is_empty()) {
+    let surfaces = [all, of(label::WHITE_MATTER), of(label::VENTRICLE), of(label::RESECTED)];
+    for (name, facets) in SURFACES.into_iter().zip(surfaces).filter(|s| !s.1.is_empty()) {
         let (surface, _) = TriMesh::from_facets(mesh.nodes_mm(), &facets);
         let gii = gifti::encode_surface(&surface, space, name);
-        write_whole(&folder.join(format!("{name}.surf.gii")), &gii)?;
-        write_whole(&folder.join(format!("{name}.stl")), &stl::encode(&surface))?;
-        write_whole(&folder.join(format!("{name}.ply")), &ply::encode(&surface, &[])?)?;
+        let files = [gii, stl::encode(&surface), ply::encode(&surface, &[])?];
+        for (ending, bytes) in SURFACE_ENDINGS.into_iter().zip(files) {
+            write_whole(&folder.join(format!("{name}{ending}")), &bytes)?;
+        }
     }
     Ok(())
 }

@@ -119,7 +119,7 @@ pub use warp::{PointCounts, Through, Warp, Warped, warp, warp_points};
 pub use why::{Asked, Explained, why};
 pub use work::Place;
 
-use crate::artefact::check_writable;
+use crate::artefact::{check_apart, check_writable};
 use crate::experiment::compare::Comparison;
 use crate::layout;
 use lock::Lock;
@@ -156,6 +156,7 @@ pub fn run_to(
 ) -> Result<Case, WorkflowError> {
     let work = Work::new(place, Subject::Patient, settings, progress);
     can_be_done(&work, goal)?;
+    check_apart(work.case.own_of(inputs.files()), inputs.files())?;
     work.ended(every_stage(goal, inputs, &work))?;
     Ok(work.case)
 }

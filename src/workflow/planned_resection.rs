@@ -77,6 +77,14 @@ impl PlannedResection {
         if numbers.contains(&0) { Err(wrong()) } else { Ok(Self::Label(numbers)) }
     }
 
+    /// Its file, where it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Mask(path) | Self::Surface(path) => Some(path),
+            Self::Label(_) | Self::Ellipsoid(_) => None,
+        }
+    }
+
     /// What it is, without any name of the user's.
     pub fn kind(&self) -> String {
         match self {

@@ -1,12 +1,13 @@
 //! The files a user gives before an operation: one scan, the plan, points, masks of their own.
 
+use super::case::Case;
 use super::error::{MaskRole, WorkflowError};
 use super::inputs::{HandPose, given_labels, labels_alone, read_mask_of};
 use super::planned_resection::PlannedResection;
 use super::user_file::{read_input, shown};
 use super::warning::{Warning, all_of};
 use super::work::Work;
-use crate::artefact::sha256_hex;
+use crate::artefact::{ApartError, check_apart, sha256_hex};
 use crate::experiment::outcome::RegistrationOutcome;
 use crate::geometry::{Mni, Native, Pre, RigidTransform};
 use crate::image::nifti::{self, encode_mask};
@@ -38,6 +39,17 @@ pub struct PlanInputs {
     pub brain_mask: Option<PathBuf>,
     /// Lateral and third ventricles, in the scan's grid.
     pub ventricle_mask: Option<PathBuf>,
+}
+
+impl PlanInputs {
+    /// Refuses a file of the case that is to be made: it would be made of what it replaces. The plans are all of the job.
+    pub(super) fn check_apart_from(&self, case: &Case, plans: &[&PlannedResection]) -> Result<(), ApartError> {
+        let own = [&self.targets, &self.dseg, &self.pose, &self.pose_start, &self.brain_mask, &self.ventricle_mask];
+        let plans = plans.iter().filter_map(|plan| plan.path());
+        let files: Vec<&Path> =
+            own.into_iter().flatten().chain([&self.pre]).map(PathBuf::as_path).chain(plans).collect();
+        check_apart(case.own_of(files.iter().copied()), files)
+    }
 }
 
 /// A mask with the bytes it stands for.

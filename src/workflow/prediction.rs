@@ -38,6 +38,7 @@ pub fn predict(
     }
     let work = Work::new(place, Subject::Plan, settings, progress);
     can_be_done(&work)?;
+    inputs.check_apart_from(&work.case, &[&inputs.resection])?;
     let scan = PlannedScan::read(inputs, &work)?;
     let targets = targets_of(inputs)?;
     predict_scan(&work, &scan, targets.as_ref())

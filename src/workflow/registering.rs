@@ -7,7 +7,7 @@ use super::refusal::show;
 use super::settings::Settings;
 use super::user_file::read_input;
 use super::warning::{Warning, all_of};
-use crate::artefact::{check_writable, write_whole};
+use crate::artefact::{check_apart, check_writable, write_whole};
 use crate::geometry::{Frame, Native, RigidTransform};
 use crate::image::Volume;
 use crate::image::nifti::{self, NiftiImage};
@@ -93,12 +93,7 @@ pub fn register_files(
     if files.output.is_dir() {
         return Err(InputError::Folder { path: files.output.clone() }.into());
     }
-    check_output(files)?;
-    let transform = match files.output.extension() {
-        Some(e) if e != "tfm" => files.output.clone(),
-        _ => files.output.with_extension("txt"),
-    };
-    let itk_transform = transform.with_extension("tfm");
+    let [transform, itk_transform] = outputs(files)?;
     check_writable(&transform)?;
     let mut warnings = Vec::new();
     let (moving, moving_bytes) = image(&files.moving, settings, &mut warnings)?;
@@ -154,25 +149,29 @@ pub fn register_files(
     Ok(Registered { transform, itk_transform, quality, warnings, refused })
 }
 
-/// Refuses to write a transform where an image is, or where its name says that one would be.
-fn check_output(files: &RegisterFiles) -> Result<(), AskedError> {
+/// The two files of the transform. Refuses to write one where an image is, or where its name says that one would be.
+fn outputs(files: &RegisterFiles) -> Result<[PathBuf; 2], WorkflowError> {
     const IMAGES: [&str; 14] = [
         ".nii", ".nii.gz", ".mgz", ".mgh", ".img", ".img.gz", ".hdr", ".hdr.gz", ".nrrd", ".nhdr", ".mha", ".mhd",
         ".dcm", ".ima",
     ];
-    let output = || files.output.clone();
     let name = files.output.to_string_lossy().to_ascii_lowercase();
     if IMAGES.iter().any(|ending| name.ends_with(ending)) {
-        return Err(AskedError::TransformNamedImage { output: output() });
+        return Err(AskedError::TransformNamedImage { output: files.output.clone() }.into());
     }
     let mut inputs = vec![&files.moving];
     if let Onto::Image { fixed, moving_mask, fixed_mask } = &files.onto {
         inputs.extend([Some(fixed), moving_mask.as_ref(), fixed_mask.as_ref()].into_iter().flatten());
     }
-    // By way of a link as well.
-    let there = files.output.canonicalize().ok();
-    let same = |input: &&PathBuf| there.is_some() && input.canonicalize().ok() == there;
-    if inputs.iter().any(same) { Err(AskedError::TransformOverInput { output: output() }) } else { Ok(()) }
+    let text = match files.output.extension() {
+        Some(e) if e != "tfm" => files.output.clone(),
+        _ => files.output.with_extension("txt"),
+    };
+    let both = [text.clone(), text.with_extension("tfm")];
+    // What was named as well: an ending is added to it, and an image was meant.
+    check_apart([&files.output], &inputs)?;
+    check_apart(&both, &inputs)?;
+    Ok(both)
 }
 
 /// The fit without its frames: of files an image is what it is.
@@ -214,13 +213,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("scan"), b"a scan").unwrap();
-        let to = |output: &str| {
-            check_output(&RegisterFiles { moving: at("scan"), onto: Onto::Template, output: at(output) })
-        };
+        let to =
+            |output: &str| outputs(&RegisterFiles { moving: at("scan"), onto: Onto::Template, output: at(output) });
         for name in ["new.nii.gz", "new.NII", "new.mgz", "new.hdr"] {
-            assert!(matches!(to(name), Err(AskedError::TransformNamedImage { .. })), "{name}");
+            let named = AskedError::TransformNamedImage { output: at(name) };
+            assert!(matches!(to(name), Err(WorkflowError::Asked(error)) if error == named), "{name}");
         }
-        assert!(matches!(to("scan"), Err(AskedError::TransformOverInput { .. })));
-        assert_eq!(to("new.txt"), Ok(()));
+        assert!(matches!(to("scan"), Err(WorkflowError::Apart(_))));
+        assert_eq!(to("new.tfm").unwrap(), [at("new.txt"), at("new.tfm")]);
     }
 }

@@ -7,7 +7,7 @@ use super::refusal::show;
 use super::settings::Settings;
 use super::user_file::read_input;
 use super::warning::Warning;
-use crate::artefact::{check_writable, write_whole};
+use crate::artefact::{check_apart, check_writable, write_whole};
 use crate::image::nifti::{self, encode_mask, encode_u8};
 use crate::report::refusal::{as_scanned, posed};
 use crate::segment::{
@@ -52,18 +52,20 @@ pub struct Segmented {
 /// Labels a scan. Labels that are not to be believed are written all the same ([`Segmented::refused`]).
 ///
 /// # Errors
-/// A name for the labels that does not end in .nii.gz, a scan or mask that cannot be used, a head that cannot be labelled, the disk's.
+/// A name for the labels that does not end in .nii.gz or is that of another file of the job, a scan or mask that cannot be used, a head that cannot be labelled, the disk's.
 pub fn segment_file(
     files: &SegmentFiles,
     settings: &Settings,
     progress: &mut dyn Progress,
 ) -> Result<Segmented, WorkflowError> {
-    for path in [Some(&files.output), files.write_brain_mask.as_ref()].into_iter().flatten() {
+    let outputs = || [Some(&files.output), files.write_brain_mask.as_ref()].into_iter().flatten();
+    for path in outputs() {
         if !path.to_string_lossy().ends_with(".nii.gz") {
             return Err(AskedError::PackedNifti { output: path.clone() }.into());
         }
         check_writable(path)?;
     }
+    check_apart(outputs(), std::iter::once(&files.t1).chain(&files.brain_mask))?;
     let name = files.t1.display().to_string();
     let read = nifti::decode_scan(&read_input(&files.t1)?, &name, &settings.image)?;
     let t1 = read.volume;

@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::settings::in_words;
 use super::user_file::{read_input, read_text};
 use super::work::facts;
-use crate::artefact::{Produced, Stage, StageError, check_writable};
+use crate::artefact::{Produced, Stage, StageError, check_apart, check_writable, moments_called_as};
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
     self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, FemWarning, Method, Motion, Outcome, Scenario,
@@ -83,9 +83,10 @@ pub fn simulate(
     check_writable(&files.output)?;
     let stem = file.strip_suffix(".vtu").unwrap_or(&file).to_owned();
     let made_of = [Some(&files.mesh), Some(&files.scenario), files.start.as_ref(), files.reference.as_ref()];
-    if let Some(input) = made_of.into_iter().flatten().find(|input| written_by(input, &folder, &stem)) {
-        return Err(SimulationError::OverInput { input: input.clone(), output: files.output.clone() }.into());
-    }
+    let made_of: Vec<&Path> = made_of.into_iter().flatten().map(PathBuf::as_path).collect();
+    let mut results = moments_called_as(&files.output, made_of.iter().copied());
+    results.extend([files.output.clone(), files.output.with_extension("pvd")]);
+    check_apart(results, made_of)?;
     let mesh_bytes = read_input(&files.mesh)?;
     let mesh = mesh_in(&files.mesh, &mesh_bytes)?;
     let scenario = Scenario::from_toml(&read_text(&files.scenario)?).map_err(|e| SimulationError::Scenario {
@@ -201,16 +202,6 @@ fn same_cells(tets: &[[u32; 4]]) -> Option<[usize; 2]> {
     }
     seen.sort_unstable();
     seen.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| [pair[0].1, pair[1].1])
-}
-
-/// Whether a file that is there has the name of a result, or of a moment of a motion.
-fn written_by(input: &Path, folder: &Path, stem: &str) -> bool {
-    let (Ok(input), Ok(folder)) = (input.canonicalize(), folder.canonicalize()) else { return false };
-    let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let Some(rest) = name.strip_prefix(stem) else { return false };
-    let moment = rest.strip_prefix('-').and_then(|rest| rest.strip_suffix(".vtu"));
-    let of_motion = moment.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()));
-    input.parent() == Some(&folder) && (of_motion || [".vtu", ".pvd"].contains(&rest))
 }
 
 /// The array `displacement` of a result.

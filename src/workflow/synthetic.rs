@@ -6,8 +6,8 @@ use super::labels::labels_of_tool;
 use super::progress::Progress;
 use super::settings::Settings;
 use super::user_file::{read_input, shown};
-use crate::artefact::{Produced, Stage, StageError};
-use crate::experiment::synth::{Head, SynthError, synthesize, synthesize_on};
+use crate::artefact::{Produced, Stage, StageError, check_apart};
+use crate::experiment::synth::{FILES, Head, SynthError, synthesize, synthesize_on};
 use crate::geometry::{Mni, Pre};
 use crate::image::nifti::{self, encode_u8};
 use crate::image::{LabelMap, Mask, Volume};
@@ -37,13 +37,16 @@ pub struct SyntheticFiles {
 /// Makes the patient, or skips it; the figures of its truth come back.
 ///
 /// # Errors
-/// Settings out of range, a lobe too small, a head that cannot be used, the disk's.
+/// Settings out of range, a folder in which a file of the patient's would be written over the head, a lobe too small, a head that cannot be used, the disk's.
 pub fn synthetic_patient(
     files: &SyntheticFiles,
     settings: &Settings,
     force: bool,
     progress: &mut dyn Progress,
 ) -> Result<serde_json::Value, WorkflowError> {
+    let table = files.labels.as_ref().map(PathBuf::from);
+    let made_of = [&files.head, &files.dseg, &table, &files.resected_mask].into_iter().flatten();
+    check_apart(FILES.map(|file| files.output.join(file)), made_of)?;
     // How a head is read and taken apart is part of what comes of it.
     let of_head = files.head.as_ref().map(|_| (settings.image, &settings.anat));
     let stage = Stage::new("synth", VERSION, &files.output, &(&settings.synth, of_head));

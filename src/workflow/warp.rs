@@ -6,7 +6,7 @@ use super::maps::{Map, Part, WarpTo};
 use super::stages::grid_of;
 use super::user_file::{read_input, shown};
 use super::warning::{Warning, all_of, says_talairach};
-use crate::artefact::{check_writable, write_whole};
+use crate::artefact::{check_apart, check_writable, write_whole};
 use crate::experiment::field::{Between, looks_like_labels, seen_through};
 use crate::geometry::{Mni, Native, Position};
 use crate::image::nifti::{self, NiftiWarning, ReadOptions, decode_displacement_as, encode_intensities};
@@ -117,6 +117,11 @@ pub fn warp(asked: &Warp) -> Result<Warped, WorkflowError> {
         return Err(WarpError::Ending { file: name, output, ending }.into());
     }
     check_writable(&asked.output)?;
+    let carrying = match &asked.through {
+        Through::Field(field) => vec![field.clone()],
+        Through::Case { folder, .. } => Case::at(folder).own_of([asked.output.as_path()]),
+    };
+    check_apart([&asked.output], carrying.iter().chain([&asked.file]))?;
     let bytes = read_input(&asked.file)?;
     let part = if image { Part::Images } else { Part::Points };
     if let Through::Case { folder, to, .. } = &asked.through {
@@ -308,6 +313,11 @@ mod tests {
             let (through, reading) = (Through::Field(at("field.nii.gz")), ReadOptions::default());
             warp(&Warp { file: at(file), output: at(output), through, labels: Some(true), reading }).unwrap()
         };
+        for over in ["labels.nii.gz", "field.nii.gz"] {
+            let (through, reading) = (Through::Field(at("field.nii.gz")), ReadOptions::default());
+            let asked = Warp { file: at("labels.nii.gz"), output: at(over), through, labels: Some(true), reading };
+            assert!(matches!(warp(&asked), Err(WorkflowError::Apart(_))), "{over}");
+        }
         let said = warped("labels.nii.gz", "b.nii.gz").warnings;
         assert!(matches!(said[..], [Warning::LeftBehind { percent, .. }] if (percent - 20.0).abs() < 1e-9), "{said:?}");
         let points = warped("a.surf.gii", "b.surf.gii").points.unwrap();

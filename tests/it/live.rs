@@ -462,6 +462,28 @@ fn a_replay_gives_the_same_bytes_with_one_and_two_threads() {
     assert_eq!((ended.status.code(), at("never.vtu").exists()), (Some(3), false), "{said}");
     assert!(["never.vtu", ".pvd", "--every"].iter().all(|word| said.contains(word)), "{said}");
 
+    // Nothing it is made of is written over, and a name says what it is.
+    std::fs::copy(at("block.vtu"), at("on-0001.vtu")).unwrap();
+    let before = contents(folder.path());
+    for (mesh, out, word) in [
+        ("block.vtu", "block.vtu", "another name"),
+        ("block.vtu", "./session.jsonl", "another name"),
+        ("block.vtu", "s.toml", "another name"),
+        ("on-0001.vtu", "on.pvd", "another name"),
+        ("block.vtu", "x.stl", ".vtu"),
+    ] {
+        let words = ["live", mesh, "s.toml", "--replay", "session.jsonl", "-o", out];
+        let ended = Process::new(program()).current_dir(folder.path()).args(words).output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(ended.status.code() == Some(3) && said.contains(word), "{out}: {said}");
+    }
+    for out in ["block.vtu", "s.toml"] {
+        let words = ["live", "block.vtu", "s.toml", "--no-browser", "--record", out];
+        let ended = Process::new(program()).current_dir(folder.path()).args(words).output().unwrap();
+        assert_eq!(ended.status.code(), Some(3), "{out}");
+    }
+    assert!(contents(folder.path()) == before);
+
     // What is no recording, or of something else, is refused and writes nothing.
     let text = recording.to_text();
     for (name, wrong, word) in [

@@ -53,6 +53,11 @@ fn two_sites_merge_and_what_cannot_be_merged_is_refused_with_nothing_written() {
         assert!(said(&result).contains(words), "{}", said(&result));
         assert!(!contents(folder.path()).contains_key("both.toml"));
     }
+    let words = ["population", "merge", &at("north.toml"), &at("south.toml"), "-o", &at("./north.toml")];
+    let over = output(&words);
+    assert!(
+        over.status.code() == Some(3) && said(&over).contains("north.toml") && said(&over).contains("another name")
+    );
     let result = merge(&["north.toml", "south.toml"]);
     assert!(result.status.success(), "{}", said(&result));
     let all: Vec<f64> = north.into_iter().chain(south).collect();

@@ -1,7 +1,7 @@
 //! What a user may hand to `hgm run` that cannot be used: exit code 3, a message with file, field and remedy, and nothing
 //! written.
 
-use crate::job::{CHEAP, output, sample};
+use crate::job::{CHEAP, contents, output, sample};
 use hgm::geometry::Native;
 use hgm::image::nifti::{ReadOptions, decode, encode_u8};
 use hgm::image::{Grid, LabelMap, Volume};
@@ -34,6 +34,36 @@ fn filled(plain: &[u8], value: i16) -> Vec<u8> {
         copy.extend(value.to_le_bytes());
     }
     copy
+}
+
+#[test]
+fn no_result_is_written_over_what_it_is_made_of_nor_two_into_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::create_dir_all(path("case/anat")).unwrap();
+    for name in ["pre.nii.gz", "post.nii.gz", "case/anat/pre_space-MNI_T1w.nii.gz"] {
+        std::fs::copy(sample("pre.nii.gz"), path(name)).unwrap();
+    }
+    std::fs::copy(sample("post.nii.gz"), path("post.nii.gz")).unwrap();
+    let (pre, post, new) = (path("pre.nii.gz"), path("post.nii.gz"), path("new.nii.gz"));
+    let kept = path("case/anat/pre_space-MNI_T1w.nii.gz");
+    let before = contents(folder.path());
+    for words in [
+        vec!["segment", &pre, "-o", &pre],
+        vec!["segment", &pre, "--brain-mask", &post, "-o", &new, "--write-brain-mask", &post],
+        vec!["segment", &pre, "-o", &new, "--write-brain-mask", &new],
+        vec!["mesh", &pre, "-o", &path("m.vtu"), "--preview", &pre],
+        vec!["synth", "--head", &pre, "-o", &path("")],
+        vec!["synth", "--head", &pre, "--resected-mask", &post, "-o", &path(".")],
+        vec!["run", &kept, &post, "-o", &path("case")],
+        vec!["predict", &kept, "--resection-ellipsoid", "0,0,0,5,5,5", "-o", &path("case")],
+    ] {
+        let ended = output(&words);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(3), "{words:?}: {said}");
+        assert!(said.contains(".nii.gz") && said.contains("another name"), "{words:?}: {said}");
+        assert!(contents(folder.path()) == before, "{words:?}");
+    }
 }
 
 #[test]

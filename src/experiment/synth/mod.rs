@@ -27,6 +27,7 @@ mod settings;
 mod ventricles;
 
 pub use fault::ScanFaults;
+pub use files::FILES;
 pub use frame::Patient;
 pub use head::Head;
 pub use head_side::HeadSide;

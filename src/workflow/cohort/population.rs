@@ -1,7 +1,7 @@
 //! What a cohort's estimates say of people: who teaches, the population, and each patient with what the others say.
 
 use super::case_folder;
-use crate::artefact::write_whole;
+use crate::artefact::{check_apart, write_whole};
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::population::{Kind, Literature, Moments, PopulationFile, PopulationPrior, merged};
 use crate::experiment::prior::{PriorError, PriorSettings, law_priors};
@@ -161,8 +161,9 @@ pub fn population_prior(path: &Path) -> Result<PopulationPrior, WorkflowError> {
 /// Several cohorts' files as one, into `output`.
 ///
 /// # Errors
-/// A file that is no population; cohorts of different kinds, or one that was given twice; the disk's.
+/// A file that is no population; cohorts of different kinds, or one that was given twice; an output that is one of them; the disk's.
 pub fn merge_populations(paths: &[PathBuf], output: &Path) -> Result<PopulationFile, WorkflowError> {
+    check_apart([output], paths)?;
     let files = paths
         .iter()
         .map(|path| Ok((shown(path), read_population(path)?)))

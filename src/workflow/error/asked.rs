@@ -29,8 +29,6 @@ pub enum AskedError {
         output.display()
     )]
     TransformNamedImage { output: PathBuf },
-    #[error("{}: is one of the images that are given: name another file for the transform", output.display())]
-    TransformOverInput { output: PathBuf },
     #[error("masks do not go with the template: its own brain is what is compared")]
     MasksOfTemplate,
     #[error("a pose and a start for one were given: the pose is final, leave one of the two out")]

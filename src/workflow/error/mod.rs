@@ -29,7 +29,7 @@ pub use warp::{SaysMni, WarpError};
 use super::cohort::DatasetError;
 use super::lost_label::LostLabel;
 use super::settings::SettingsError;
-use crate::artefact::WriteError;
+use crate::artefact::{ApartError, WriteError};
 use crate::experiment::estimate::{BodyError, EstimateError, ProblemError};
 use crate::experiment::observed::ObservedError;
 use crate::experiment::outcome::{Answer, OutcomeError};
@@ -79,6 +79,8 @@ pub enum WorkflowError {
     Asked(#[from] AskedError),
     #[error(transparent)]
     Input(#[from] InputError),
+    #[error(transparent)]
+    Apart(#[from] ApartError),
     #[error(transparent)]
     Labels(#[from] LabelMapError),
     #[error(transparent)]

@@ -19,11 +19,6 @@ pub enum SimulationError {
     #[error("a motion (`method = \"backward-euler\"`) starts at rest: it takes no state to start from")]
     StartOfMotion,
     #[error(
-        "{}: the simulation is made of it, and results called {} would be written over it; give them another name",
-        input.display(), output.display()
-    )]
-    OverInput { input: PathBuf, output: PathBuf },
-    #[error(
         "{name}: cells {first} and {second} have the same nodes: their tissue would count twice; write each cell once"
     )]
     TwiceTheSameCell { name: String, first: usize, second: usize },
