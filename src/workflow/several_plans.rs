@@ -9,11 +9,13 @@ use super::progress::Progress;
 use super::settings::Settings;
 use super::stage_name::Subject;
 use super::stages::read_table;
+use super::warning::Warning;
 use super::work::{Place, Work, facts};
 use crate::artefact::write_whole;
 use crate::experiment::predict::{PlanComparison, PlanDraws, PlanFigures, Prediction, compared_plans};
 use crate::layout::{PLAN_CASE, PLANS_JSON, PLANS_PAGE};
 use crate::report::page::plans::plans_page;
+use std::path::Path;
 
 /// As [`super::predict`] for several plans of one scan (`inputs` holds the first, `others` the rest): a case for each in the
 /// folders `plan-1`, `plan-2` ... of the place, and their comparison beside them.
@@ -34,6 +36,8 @@ pub fn predict_plans(
     if let Some(n) = (1..plans.len()).find(|&n| plans[..n].contains(&plans[n])) {
         return Err(PredictError::Twice { plan: plans[n].to_string() }.into());
     }
+    let folder_of = |n: usize| place.folder.join(PLAN_CASE.of(&n.to_string()));
+    (1..=plans.len()).try_for_each(|n| inputs.check_apart_from(&Case::at(&folder_of(n)), &plans))?;
     let targets = targets_of(inputs)?;
     let scans = {
         let work = Work::new(place, Subject::Plan, settings, progress);
@@ -58,11 +62,25 @@ pub fn predict_plans(
         }
         done.push((name, case, prediction));
     }
+    for plan in earlier_plans(&place.folder, plans.len()) {
+        progress.odd(&plan, &Warning::EarlierPlan.to_string());
+    }
     let comparison = compared(&plans, &done, settings.predict.threshold_mm)?;
     let json = format!("{:#}\n", facts(&comparison));
     write_whole(&place.folder.join(PLANS_JSON), json.as_bytes())?;
     write_whole(&place.folder.join(PLANS_PAGE), plans_page(&comparison).as_bytes())?;
     Ok((done.into_iter().map(|(_, case, _)| case).collect(), comparison))
+}
+
+/// Cases of plans beyond so many: an earlier run had more.
+fn earlier_plans(folder: &Path, plans: usize) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let number = |name: String| PLAN_CASE.member(&name)?.parse::<usize>().ok();
+    let is_case = |n: &usize| Case::at(&folder.join(PLAN_CASE.of(&n.to_string()))).subject() == Some(Subject::Plan);
+    let mut beyond: Vec<usize> = names.filter_map(number).filter(|n| *n > plans).filter(is_case).collect();
+    beyond.sort_unstable();
+    beyond.iter().map(|n| PLAN_CASE.of(&n.to_string())).collect()
 }
 
 fn compared(
@@ -87,4 +105,24 @@ fn compared(
         comparison.heads.push(compared_plans(&done[0].2.heads[number].head, &of_head));
     }
     Ok(comparison)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::artefact::{Produced, Stage};
+    use crate::workflow::stage_name::StageName;
+
+    #[test]
+    fn cases_of_plans_that_an_earlier_run_had_are_named_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["plan-1", "plan-2", "plan-3", "plan-11", "plan-x", "plans-4"] {
+            let pose = Stage::new(&StageName::Pose.to_string(), 1, &folder.path().join(name), &());
+            pose.run(false, || Ok::<_, WorkflowError>(Produced::default())).unwrap();
+        }
+        // A folder of the user's own.
+        std::fs::create_dir(folder.path().join("plan-5")).unwrap();
+        assert_eq!(earlier_plans(folder.path(), 2), ["plan-3", "plan-11"]);
+        assert!(earlier_plans(folder.path(), 11).is_empty());
+    }
 }

@@ -85,6 +85,8 @@ pub enum Warning {
     Folds { state: String, voxels: usize },
     #[error("its quality gate is not passed ({why}): look at its page before trusting what it carries")]
     GateNotPassed { why: String },
+    #[error("is of an earlier run with more plans, and not in this comparison: delete it where it is wanted no more")]
+    EarlierPlan,
     #[error("the best sample is not the one nearest to the reference's moduli")]
     OtherSampleIsBest,
 }
