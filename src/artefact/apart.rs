@@ -8,7 +8,7 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ApartError {
     #[error(
-        "{}: the result is made of it, and {} would be written over it; give the result another name",
+        "{}: the result is made of it, and {} would be written over it; give the result another name, or copy the input elsewhere",
         input.display(), output.display()
     )]
     OverInput { input: PathBuf, output: PathBuf },

@@ -60,7 +60,9 @@ impl Case {
     pub(crate) fn own_of<'a>(&self, paths: impl IntoIterator<Item = &'a Path>) -> Vec<PathBuf> {
         let (folder, recorded) = (place(&self.folder), self.recorded());
         let is_own = |file: &String| {
-            let made = recorded.iter().any(|manifest| manifest.outputs.contains_key(file));
+            // A patient that was made in the folder is no part of the case that lies beside it.
+            let of_case = recorded.iter().filter(|manifest| manifest.stage != "synth");
+            let made = of_case.into_iter().any(|manifest| manifest.outputs.contains_key(file));
             made || layout::TABLE.iter().any(|entry| entry.path == file)
         };
         let below =
