@@ -230,7 +230,10 @@ fn of_case(error: &CaseError) -> Option<String> {
         ),
         CaseError::Held { .. } => "wait until it has ended".to_owned(),
         CaseError::NothingResected { .. } => "leave --before-resection out".to_owned(),
-        CaseError::NoField { .. } | CaseError::NoStage { .. } | CaseError::Unreadable { .. } => return None,
+        CaseError::NoField { .. }
+        | CaseError::NoState { .. }
+        | CaseError::NoStage { .. }
+        | CaseError::Unreadable { .. } => return None,
     })
 }
 

@@ -6,8 +6,10 @@ use clap::Command;
 ///
 /// # Errors
 /// As a page is written to memory: none.
-pub fn pages(command: Command, name: &str) -> std::io::Result<Vec<(String, Vec<u8>)>> {
-    let subcommands: Vec<Command> = command.get_subcommands().cloned().collect();
+pub fn pages(mut command: Command, name: &str) -> std::io::Result<Vec<(String, Vec<u8>)>> {
+    // Only then has a command what its parents hand down: common options, and its whole name in the synopsis.
+    command.build();
+    let subcommands: Vec<Command> = command.get_subcommands().filter(|sub| sub.get_name() != "help").cloned().collect();
     let mut page = Vec::new();
     clap_mangen::Man::new(command.name(name.to_owned().leak() as &'static str)).render(&mut page)?;
     let mut all = vec![(name.to_owned(), page)];

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// How the order comes about, in a sentence.
 const RULE: &str = "First those that were refused, then those with warnings, then the others; among each of these by the measure \
-    that lies farthest on its bad side of the cohort's median, in robust deviations (1.483 times the median absolute deviation, \
+    that lies farthest on its bad side of the median of those that are done, in robust deviations (1.483 times the median absolute deviation, \
     but never less than the step that matters for that measure).";
 /// A Gaussian's standard deviation over its median absolute deviation.
 const DEVIATION_OVER_MAD: f64 = 1.482_602_218_505_602;
@@ -162,10 +162,13 @@ fn subject(member: &Member) -> SubjectRisk {
     }
 }
 
-/// Median and deviation over the subjects that have the measure.
+/// Median and deviation over the subjects that are done and have the measure: what was refused, often for its scans, says
+/// nothing of what is usual. Where none is done, over all.
 fn over((scan, measure): (WhichScan, &ScanMeasure), subjects: &[SubjectRisk]) -> Option<CohortMeasure> {
     let column = measure.column_of(scan);
-    let values: Vec<f64> = subjects.iter().filter_map(|subject| subject.figures.get(&column)).copied().collect();
+    let none_done = subjects.iter().all(|subject| subject.risk == Risk::Refused);
+    let usual = subjects.iter().filter(|subject| none_done || subject.risk != Risk::Refused);
+    let values: Vec<f64> = usual.filter_map(|subject| subject.figures.get(&column)).copied().collect();
     let (median, mad) = median_and_mad(&values)?;
     let deviation = (DEVIATION_OVER_MAD * mad).max(measure.step);
     Some(CohortMeasure { column, good: measure.good, subjects: values.len(), median, deviation })
@@ -256,6 +259,19 @@ mod tests {
         assert_eq!(order(&found), ["sub-8", "sub-9", "sub-7", "sub-1", "sub-2"]);
         assert_eq!(found.subjects[0].because(), "failed; not measured");
         assert_eq!(found.subjects[2].because(), "1 warning; no measure on its bad side");
+    }
+
+    #[test]
+    fn what_was_refused_does_not_say_what_is_usual() {
+        let refused = |name| Member { status: Status::QualityGate, ..measured(name, 0.5) };
+        let of = |refusals: &[Member]| {
+            let done = [("sub-1", 3.0), ("sub-2", 3.2), ("sub-3", 1.8)].map(|(name, cnr)| measured(name, cnr));
+            let found = LookFirst::new(&[&done[..], refusals].concat());
+            found.measures.into_iter().find(|measure| measure.column == "post_contrast_to_noise").unwrap()
+        };
+        assert_eq!(of(&["sub-4", "sub-5", "sub-6"].map(refused)), of(&[]));
+        // Among refused ones alone they are compared with each other.
+        assert_eq!(LookFirst::new(&["sub-4", "sub-5"].map(refused)).measures[0].subjects, 2);
     }
 
     #[test]

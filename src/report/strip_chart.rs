@@ -13,6 +13,8 @@ pub struct StripPoint {
     pub value: f64,
     /// Whether it lies apart from the others.
     pub apart: bool,
+    /// Whether it counts for median and box; drawn hollow otherwise.
+    pub counted: bool,
     /// The subject's page, where it has one.
     pub page: Option<String>,
 }
@@ -46,14 +48,16 @@ impl StripChart {
         if first >= last {
             return None;
         }
-        let middle = quantile(&sorted, 0.5);
+        let counted: Vec<&StripPoint> = sorted.iter().copied().filter(|p| p.counted).collect();
+        let middle = (!counted.is_empty()).then(|| quantile(&counted, 0.5));
         let description = format!(
-            "{} of {} subjects: from {} to {}, median {}",
+            "{} of {} subjects: from {} to {}{}{}",
             self.name,
             sorted.len(),
             number(first, 3),
             number(last, 3),
-            number(middle, 3)
+            middle.map_or_else(String::new, |middle| format!(", median {}", number(middle, 3))),
+            if counted.len() < sorted.len() { format!(" of {}", counted.len()) } else { String::new() },
         );
         let axis = Axis::over(sorted.iter().map(|p| p.value), false, false, SIDES);
         let mut svg = open(WIDTH, HEIGHT, &description);
@@ -75,8 +79,8 @@ impl StripChart {
                 FOOT + 17.0
             );
         }
-        if sorted.len() >= BOX_FROM {
-            let [low, high] = [0.25, 0.75].map(|q| axis.at(quantile(&sorted, q)));
+        if let (true, Some(middle)) = (counted.len() >= BOX_FROM, middle) {
+            let [low, high] = [0.25, 0.75].map(|q| axis.at(quantile(&counted, q)));
             let _ = write!(
                 svg,
                 "<rect x=\"{low:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"36\" fill=\"currentColor\" opacity=\".1\"/>\
@@ -103,10 +107,12 @@ fn draw(svg: &mut String, point: &StripPoint, [x, y]: [f64; 2]) {
         let r = RADIUS;
         (SERIES_COLOURS[0], format!("M{:.1} {y:.1}a{r} {r} 0 1 0 {1} 0a{r} {r} 0 1 0 -{1} 0z", x - r, 2.0 * r))
     };
+    // A path that is not filled takes no pointer inside: it is filled without being seen.
+    let opacity = if point.counted { ".75" } else { "0" };
     let page = point.page.as_ref().map_or_else(String::new, |page| format!(" data-page=\"{}\"", escape(page)));
     let _ = write!(
         svg,
-        "<path class=\"subject\" data-of=\"{0}\"{page} d=\"{form}\" fill=\"{colour}\" fill-opacity=\".75\" \
+        "<path class=\"subject\" data-of=\"{0}\"{page} d=\"{form}\" fill=\"{colour}\" fill-opacity=\"{opacity}\" \
          stroke=\"{colour}\"><title>{0}: {1}</title></path>",
         escape(&point.name),
         number(point.value, 4)
@@ -145,6 +151,7 @@ mod tests {
             name: format!("sub-<{n}>"),
             value,
             apart: n == 0,
+            counted: true,
             page: (n > 0).then(|| format!("sub-{n}.html")),
         };
         StripChart { name: "cavity (cc)".to_owned(), points: values.iter().enumerate().map(point).collect() }
@@ -158,6 +165,17 @@ mod tests {
         assert!(svg.contains("from 1.00 to 9.00, median 2.00") && svg.contains("data-page=\"sub-5.html\""), "{svg}");
         assert!(!chart(&[1.0, 2.0]).to_svg().unwrap().contains("<rect"), "two have no quartiles");
         assert!(chart(&[2.0, 2.0]).to_svg().is_none() && chart(&[2.0]).to_svg().is_none());
+    }
+
+    #[test]
+    fn who_does_not_count_is_hollow_and_moves_neither_median_nor_box() {
+        let mut with_refused = chart(&[1.0, 2.0, 3.0, 4.0, 5.0, 90.0, 91.0, 92.0]);
+        with_refused.points[5..].iter_mut().for_each(|point| point.counted = false);
+        let svg = with_refused.to_svg().unwrap();
+        assert!(svg.contains("8 subjects: from 1.00 to 92.0, median 3.00 of 5"), "{svg}");
+        assert_eq!(svg.matches("fill-opacity=\"0\"").count(), 3);
+        with_refused.points.iter_mut().for_each(|point| point.counted = false);
+        assert!(!with_refused.to_svg().unwrap().contains("median"));
     }
 
     #[test]

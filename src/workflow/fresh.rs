@@ -110,19 +110,27 @@ impl Case {
         self.stale(file, Reason::Input { role: layout::OUTCOME.to_owned() })
     }
 
-    /// Refuses a state that the outcome was made without; of one that is not there at all nothing is said.
+    /// Refuses a state that the outcome was made without, and a name that is no state's.
     ///
     /// # Errors
-    /// As [`Case::outcome`]; [`CaseError::Stale`] of a state that another job has left in the folder.
+    /// As [`Case::outcome`]; [`CaseError::Stale`] of a state that another job has left in the folder;
+    /// [`CaseError::NoState`] where there is none of this name.
     pub(crate) fn check_state(&self, state: &str) -> Result<(), WorkflowError> {
         let outcome = self.outcome()?;
         let file = layout::SAMPLE_STATE.of(state);
-        let told = outcome.samples.iter().any(|sample| sample.id == state && sample.file.is_some());
-        // A phantom's reference and a prediction's states are no samples: they are known by their stage.
-        if told || !self.path(&file).exists() || self.made_with(&file)? == Some(true) {
+        let told = outcome.samples.iter().filter(|sample| sample.file.is_some()).map(|sample| &sample.id);
+        if told.clone().any(|id| id == state) {
             return Ok(());
         }
-        Err(self.left_behind(&file))
+        if !self.path(&file).exists() || state.contains(['/', '\\']) {
+            let made = self.recorded().into_iter().flat_map(|stage| stage.outputs.into_keys());
+            let made = made.filter_map(|file| layout::SAMPLE_STATE.member(&file).map(str::to_owned));
+            let states: BTreeSet<String> = made.chain(told.cloned()).collect();
+            let (folder, state) = (self.folder().to_path_buf(), state.to_owned());
+            return Err(CaseError::NoState { folder, state, states: states.into_iter().collect() }.into());
+        }
+        // A phantom's reference and a prediction's states are no samples: they are known by their stage.
+        if self.made_with(&file)? == Some(true) { Ok(()) } else { Err(self.left_behind(&file)) }
     }
 
     /// The bytes of a file, as its stage wrote it, where the outcome was made with it.
@@ -281,6 +289,10 @@ pub(super) mod tests {
             assert!(refused.to_string().contains("sim/estimate.vtu is not of the present state"), "{refused}");
         }
         assert_eq!(named_state(&case, Some("sample-03")).unwrap(), "sample-03");
+        for wrong in ["sample-30", "../sim/estimate"] {
+            let refused = named_state(&case, Some(wrong)).unwrap_err().to_string();
+            assert!(refused.contains(&format!("no state `{wrong}` in this case; it has sample-03")), "{refused}");
+        }
         // Nor where there is no other: that file is there, and not of the outcome.
         let refused = default_state(&answered(&folder.path().join("prepared"), &[])).unwrap_err();
         assert!(matches!(refused, WorkflowError::Case(CaseError::Stale { .. })), "{refused}");

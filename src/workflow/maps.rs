@@ -81,6 +81,10 @@ impl Map {
         }
         let (pre_from_post, mni_from_pre) = transforms(case)?;
         if to == WarpTo::Mni {
+            // No state moves what goes to MNI space; a name that is none's is refused all the same.
+            if state.is_some() {
+                named_state(case, state)?;
+            }
             let rigid = AffineTransform::from_matrix(&mni_from_pre.to_matrix());
             let map = Self { forward: None, rigid, grid: Some(atlas::template().grid().relabelled()), ..Self::still() };
             return Ok((map, "rigid".to_owned()));

@@ -88,8 +88,11 @@ fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
 
 fn collect(root: &Value, schema: &Value, table: &str, [now, default]: [&Value; 2], all: &mut Vec<Setting>) {
     let Some(properties) = resolved(root, schema)["properties"].as_object() else { return };
-    // Plain values before tables, as TOML wants it.
-    let is_table = |name: &str| now[name].is_object();
+    // Plain values before tables, as TOML wants it. A table that is not set has its keys all the same.
+    let is_table = |name: &str| {
+        let unset = || now[name].is_null() && resolved(root, &properties[name])["properties"].is_object();
+        now[name].is_object() || unset()
+    };
     for (name, property) in properties.iter().filter(|(name, _)| !is_table(name)) {
         let told = |value: &Value| (!value.is_null()).then(|| value.clone());
         all.push(Setting {
@@ -139,7 +142,10 @@ pub fn annotated(settings: &[Setting]) -> String {
     for setting in settings {
         if table != Some(&setting.table) {
             if !setting.table.is_empty() {
-                text += &format!("{}[{}]\n", if text.is_empty() { "" } else { "\n" }, setting.table);
+                // A head alone would set what is not set.
+                let set = settings.iter().any(|other| other.table == setting.table && other.value.is_some());
+                let mark = if set { "" } else { "# " };
+                text += &format!("{}{mark}[{}]\n", if text.is_empty() { "" } else { "\n" }, setting.table);
             }
             table = Some(&setting.table);
         }
@@ -186,6 +192,16 @@ mod tests {
         let unwrapped = text.replace("\n# ", " ");
         assert!(text.contains("engine = \"gmsh\"") && unwrapped.contains("Default: \"lattice\"."), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 130), "{text}");
+    }
+
+    #[test]
+    fn keys_of_a_table_that_is_not_set_are_told_without_setting_it() {
+        let all = every_setting(&Settings::default());
+        for (table, name) in [("resection.csf", "drained"), ("predict.fluid_level", "sd_mm")] {
+            let told = settings_of_table(all.clone(), table).unwrap();
+            assert!(told.iter().any(|s| s.name == name && s.value.is_none()), "{table}: {told:?}");
+            assert!(annotated(&told).starts_with(&format!("# [{table}]\n")), "{}", annotated(&told));
+        }
     }
 
     #[test]

@@ -63,6 +63,9 @@ fn every_command_and_subcommand_has_a_page_with_an_example() {
         let page = String::from_utf8(page.clone()).unwrap();
         assert!(page.contains("Example: "), "{name} has no example");
         assert!(page.contains("input rejected") && page.contains("NO_COLOR"), "{name} tells no exit codes");
+        // A command that only holds others has none of its own to be run with.
+        let called = name.replace('-', " ");
+        assert!(page.contains("\\-\\-threads") && page.contains(&format!("\\fB{called}\\fR")), "{name}: {page}");
     }
 }
 

@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, alias = "n-procs", alias = "n_procs", alias = "n-cpus", alias = "n_cpus", value_name = "N")]
     pub nprocs: Option<usize>,
     /// Memory at hand in GB: a mesh engine that is a program of its own is held to it (setting mesh.limits.memory_mb)
-    #[arg(long, alias = "mem_gb", value_name = "GB", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, alias = "mem_gb", value_name = "GB", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub mem_gb: Option<u64>,
     /// Taken because every BIDS App has it: hgm runs no validator, and refuses by name what it cannot use
     #[arg(long, alias = "skip_bids_validation")]

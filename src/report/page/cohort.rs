@@ -44,12 +44,13 @@ impl Cohort {
     fn population_section(&self) -> Option<Markup> {
         let population = self.population.as_ref()?;
         let row = |pupil: &Pupil| {
+            let of_subject = self.subjects.iter().find(|row| row.participant_id == pupil.participant_id);
             html! {
                 @for own in &pupil.shrunken {
-                    tr {
+                    tr data-subject=(pupil.participant_id) data-verdict=[of_subject.map(said)] data-apart=[of_subject.map(apart)] {
                         th scope="row" { (pupil.participant_id) }
                         td { (own.name) }
-                        td { (number(own.value, 3)) " (" (number(own.interval_95[0], 3)) " to " (number(own.interval_95[1], 3)) ")" }
+                        td data-value=(own.value) { (number(own.value, 3)) " (" (number(own.interval_95[0], 3)) " to " (number(own.interval_95[1], 3)) ")" }
                     }
                 }
             }
@@ -82,7 +83,7 @@ impl Cohort {
         all.clone().filter_map(unwell).chain(all.filter_map(apart)).chain(odd).collect()
     }
 
-    /// RMSE undeformed and of the best sample, subject by subject and in the median.
+    /// RMSE undeformed and deformed, subject by subject and in the median.
     fn errors_section(&self) -> Option<Markup> {
         let panel = |set: &str| {
             let columns = [format!("rest_rmse_{set}_mm"), format!("rmse_{set}_mm")];
@@ -92,7 +93,9 @@ impl Cohort {
                 let [before, after] = columns.each_ref().map(|column| row.figures.get(column).copied());
                 Some(Change { name: row.participant_id.clone(), before: before?, after: after? })
             };
-            let changes: Vec<Change> = self.subjects.iter().filter_map(change).collect();
+            // The same subjects as in the medians beside them.
+            let done = self.subjects.iter().filter(|row| row.status == Status::Done);
+            let changes: Vec<Change> = done.filter_map(change).collect();
             let middle = [middle(&columns[0])?, middle(&columns[1])?];
             (!changes.is_empty()).then(|| ChangePanel { name: set_name(set), changes, middle })
         };
@@ -107,9 +110,9 @@ impl Cohort {
             })
             .collect();
         let chart = ChangeChart {
-            description: format!("RMSE of every subject undeformed and of its best sample. {}", said.join("; ")),
+            description: format!("RMSE of every subject that is done, undeformed and deformed. {}", said.join("; ")),
             y_label: "RMSE (mm)".to_owned(),
-            states: ["undeformed", "best sample"].map(str::to_owned),
+            states: ["undeformed", "deformed"].map(str::to_owned),
             panels,
             floor: self.median.get("noise_floor_mm").copied(),
         };
@@ -120,7 +123,7 @@ impl Cohort {
                     figure {
                         (PreEscaped(chart.to_svg()))
                         figcaption {
-                            "One line per subject; beside them the median and its MAD. Differences below the noise floor \
+                            "One line per subject that is done; beside them the median and its MAD. Differences below the noise floor \
                              (median over the subjects) mean nothing."
                         }
                     }
@@ -224,6 +227,7 @@ impl Cohort {
                     name: row.participant_id.clone(),
                     value: *row.figures.get(column)?,
                     apart: row.outlying.contains(column),
+                    counted: row.status == Status::Done,
                     page: row.status.has_page().then(|| page_of(row)),
                 })
             };
@@ -233,8 +237,8 @@ impl Cohort {
         (!strips.is_empty()).then(|| {
             html! {
                 p {
-                    "A point for each subject; the box holds the middle half of them, its line is the median (from five subjects \
-                     on), a triangle lies apart. Point at one to find its subject in every figure, press it for the subject's \
+                    "A point for each subject; the box holds the middle half of those that are done, its line is the \
+                     median (from five on); a hollow point is not done and counts for neither, a triangle lies apart. Point at one to find its subject in every figure, press it for the subject's \
                      page; the filters above hold here, too."
                 } "\n"
                 div class="strips" { @for svg in &strips { (PreEscaped(svg)) "\n" } }

@@ -11,6 +11,8 @@ use thiserror::Error;
 pub enum CaseError {
     #[error("no stage `{wanted}` in this case; it has {}", stages.join(", "))]
     NoStage { wanted: String, stages: Vec<String> },
+    #[error("{}: there is no state `{state}` in this case; it has {}", folder.display(), known(states))]
+    NoState { folder: PathBuf, state: String, states: Vec<String> },
     #[error("{}: not a case folder", folder.display())]
     NotACase { folder: PathBuf },
     #[error("{}: {file} is not there", folder.display())]
@@ -50,6 +52,10 @@ pub enum CaseError {
 
 pub(super) fn in_words(reasons: &[Reason]) -> String {
     reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+fn known(states: &[String]) -> String {
+    if states.is_empty() { "none yet".to_owned() } else { states.join(", ") }
 }
 
 fn by(holder: &str) -> String {
