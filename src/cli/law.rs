@@ -5,7 +5,6 @@ use super::{Failure, Session};
 use crate::manual::help::laws;
 use crate::material::meta_model::{MetaModel, Search};
 use crate::workflow::{LawTest, Layer, fit_laws, results_in_words};
-use anyhow::anyhow;
 use clap::Subcommand;
 use serde_json::json;
 use std::path::PathBuf;
@@ -34,7 +33,7 @@ enum Command {
 #[derive(Debug, clap::Args)]
 struct FitArgs {
     /// The test
-    #[arg(required_unless_present = "literature", conflicts_with = "literature", value_name = "CSV")]
+    #[arg(required_unless_present = "literature", conflicts_with_all = ["literature", "studies"], value_name = "CSV")]
     test: Option<PathBuf>,
     /// A literature model by id instead
     #[arg(long, value_name = "ID")]
@@ -55,11 +54,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         settings.search = Search::Published;
     }
     let test = match &args.test {
-        Some(_) if args.studies.studies.is_some() => {
-            return Err(Failure::Rejected(anyhow!(
-                "--studies has no effect on a test of your own: leave one of the two out"
-            )));
-        }
         Some(file) => LawTest::measured(file)?,
         None => LawTest::literature(args.literature.unwrap_or_default(), &args.studies.read()?)?,
     };
