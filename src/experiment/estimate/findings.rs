@@ -122,8 +122,9 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// The change of the first `own` parameters that makes up for a change (mm) of the model at the places, row by row.
-    pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Vec<f64> {
+    /// The change of the first `own` parameters that makes up for a change (mm) of the model at the places, row by row;
+    /// `None` where none is found.
+    pub fn made_up_by(&self, change_mm: impl Fn(usize) -> f64, own: usize) -> Option<Vec<f64>> {
         let rows = 3 * self.nodes.len();
         let change = DMatrix::from_fn(rows, 1, |row, _| change_mm(row));
         let white = self.projection.whiten(&change).column(0).into_owned();

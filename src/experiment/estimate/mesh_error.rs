@@ -42,11 +42,17 @@ pub fn left_of_difference(fine: &TetMesh, coarse: &TetMesh) -> f64 {
 }
 
 /// The change of the first `own` parameters that makes up for a change of the model's displacement, in the linearised
-/// problem: residuals are independent and of standard deviation 1.
-pub fn made_up_by(jacobian: &DMatrix<f64>, precision: &DMatrix<f64>, change: &DVector<f64>, own: usize) -> Vec<f64> {
+/// problem: residuals are independent and of standard deviation 1. `None` where that problem has no solution in numbers: no
+/// change found is not a change of nothing.
+pub fn made_up_by(
+    jacobian: &DMatrix<f64>,
+    precision: &DMatrix<f64>,
+    change: &DVector<f64>,
+    own: usize,
+) -> Option<Vec<f64>> {
     let hessian = jacobian.transpose() * jacobian + precision;
-    let step = hessian.cholesky().map(|h| h.solve(&(jacobian.transpose() * change)));
-    step.map_or_else(|| vec![0.0; own], |step| step.as_slice()[..own].to_vec())
+    let step = hessian.cholesky()?.solve(&(jacobian.transpose() * change));
+    step.iter().all(|s| s.is_finite()).then(|| step.as_slice()[..own].to_vec())
 }
 
 #[cfg(test)]
@@ -69,7 +75,15 @@ mod tests {
     fn a_change_along_a_parameter_is_made_up_for_by_it_alone() {
         let jacobian = DMatrix::from_fn(40, 3, |r, c| f64::from(((r * (c + 2) + c) % 7) as u32) - 2.5);
         let change = jacobian.column(1) * 0.2;
-        let made = made_up_by(&jacobian, &DMatrix::zeros(3, 3), &change, 2);
+        let made = made_up_by(&jacobian, &DMatrix::zeros(3, 3), &change, 2).unwrap();
         assert!(made[0].abs() < 1e-12 && (made[1] - 0.2).abs() < 1e-12, "{made:?}");
+    }
+
+    #[test]
+    fn a_change_that_cannot_be_solved_for_is_not_taken_for_none() {
+        let (change, none) = (DVector::from_element(6, 0.2), DMatrix::zeros(6, 2));
+        assert_eq!(made_up_by(&none, &DMatrix::zeros(2, 2), &change, 2), None);
+        assert_eq!(made_up_by(&none, &DMatrix::identity(2, 2), &change, 2), Some(vec![0.0; 2]));
+        assert_eq!(made_up_by(&none, &DMatrix::identity(2, 2), &(change * f64::NAN), 2), None);
     }
 }

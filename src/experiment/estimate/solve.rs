@@ -77,15 +77,17 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         let nothing = Observation::Nodes(Vec::new());
         let there = Body::new(coarse, problem.template, unknown.clone(), problem.poisson_ratio, nothing)
             .and_then(|mut body| body.solve(&fitted.descent.log_parameters));
-        // A coarse mesh without an equilibrium says nothing of the finer one: then what is expected of meshes stands.
+        // A coarse mesh without an equilibrium, or a difference that nothing makes up for in numbers, says nothing of the finer
+        // mesh: then what is expected of meshes stands.
         if let Ok(there) = there {
             let there = at_places(coarse, &there.outcome.displacement_mm, &found.places_mm);
             let change =
                 |row: usize| state.displacement_mm[found.nodes[row / 3] as usize][row % 3] - there[row / 3][row % 3];
-            let made = found.made_up_by(change, prior.len());
-            let left = left_of_difference(problem.mesh, coarse);
-            mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
-            model_error.clone_from(&mesh_log_sd);
+            if let Some(made) = found.made_up_by(change, prior.len()) {
+                let left = left_of_difference(problem.mesh, coarse);
+                mesh_log_sd = made.iter().map(|m| (m * left).abs()).collect();
+                model_error.clone_from(&mesh_log_sd);
+            }
         }
     }
     let of_mesh = model_error.iter().copied().fold(0.0, f64::max);
