@@ -1,6 +1,7 @@
 //! Levenberg-Marquardt on residuals in mm with a Gaussian prior on the log-parameters.
 
 use super::{LogPrior, Scale};
+use crate::experiment::parameter_name::in_words;
 use crate::experiment::setting::{SettingError, first_broken};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -144,6 +145,24 @@ pub enum EstimateError {
          again"
     )]
     NotFinite(usize),
+    /// What is known of a parameter beforehand is NaN or infinite.
+    #[error(
+        "what is known beforehand of the {0} is not a finite number: what is 0 has no logarithm to be estimated by; give it \
+         another size, or take it from what is estimated"
+    )]
+    Known(String),
+    /// The cost of the start, or its slope there, is NaN or infinite.
+    #[error(
+        "how well the start of the estimate fits is not a finite number: `noise_mm` is too small, or a sensitivity of the \
+         displacement could not be found"
+    )]
+    Cost,
+}
+
+/// Refuses what is known beforehand where it is no number: nothing is far from it or near to it.
+pub(super) fn known_beforehand(prior: &[LogPrior]) -> Result<(), EstimateError> {
+    let astray = prior.iter().find(|known| !known.mean.is_finite());
+    astray.map_or(Ok(()), |known| Err(EstimateError::Known(in_words(&known.name).0)))
 }
 
 /// Minimises sum r^2 / (2 noise^2) + sum (theta - mean)^2 / (2 sd^2) over theta = ln(parameters) from `start`.
@@ -156,6 +175,7 @@ pub fn estimate<M: Forward>(
     start: &[f64],
     settings: &EstimateSettings,
 ) -> Result<Descent, EstimateError> {
+    known_beforehand(prior)?;
     let weight = settings.noise_mm.powi(-2);
     let precision = super::joint_precision(prior);
     let mean = DVector::from_iterator(prior.len(), prior.iter().map(|p| p.mean));
@@ -177,6 +197,10 @@ pub fn estimate<M: Forward>(
         return Err(EstimateError::NotFinite(n));
     }
     let mut costs = vec![cost(&theta, &here.residuals_mm)];
+    // Nothing is below a NaN, and the largest of it and 0 is 0: the descent would be at its minimum.
+    if !costs[0].is_finite() {
+        return Err(EstimateError::Cost);
+    }
     let (mut evaluations, mut damping) = (1, 1e-3);
     let mut convergence = Convergence::IterationsExhausted;
     'descent: for _ in 0..settings.iterations {
@@ -184,6 +208,9 @@ pub fn estimate<M: Forward>(
         let jt = here.jacobian_mm.transpose();
         let gradient = &jt * &here.residuals_mm * weight + &precision * (&theta - &mean);
         let hessian = &jt * &here.jacobian_mm * weight + &precision;
+        if !gradient.iter().chain(hessian.iter()).all(|number| number.is_finite()) {
+            return Err(EstimateError::Cost);
+        }
         // From the minimum as the linearisation sees it, in standard deviations; unknown where that has none.
         let away =
             hessian.clone().cholesky().map_or(f64::INFINITY, |f| f.solve(&gradient).dot(&gradient).max(0.0).sqrt());
@@ -193,7 +220,7 @@ pub fn estimate<M: Forward>(
             let damped = &hessian + DMatrix::from_diagonal(&scale);
             let Some(factor) = damped.cholesky() else {
                 damping *= 10.0;
-                // Numbers that are none (a noise of 0) have no factor, however damped.
+                // Numbers too far apart have no factor, however damped.
                 if damping > 1e8 {
                     convergence = no_further;
                     break 'descent;
@@ -201,7 +228,11 @@ pub fn estimate<M: Forward>(
                 continue;
             };
             let mut step = -factor.solve(&gradient);
-            let decrement = (-step.dot(&gradient)).max(0.0).sqrt();
+            let decrement = -step.dot(&gradient);
+            if !decrement.is_finite() {
+                return Err(EstimateError::Cost);
+            }
+            let decrement = decrement.max(0.0).sqrt();
             let longest = step.component_div(&unit).amax();
             if longest > settings.longest_step {
                 step *= settings.longest_step / longest;
@@ -223,7 +254,7 @@ pub fn estimate<M: Forward>(
             let trial = &theta + &step;
             evaluations += 1;
             let there = model.linearise(trial.as_slice()).ok();
-            let there = there.filter(|t| t.residuals_mm.iter().all(|r| r.is_finite()));
+            let there = there.filter(|t| t.residuals_mm.iter().chain(t.jacobian_mm.iter()).all(|r| r.is_finite()));
             let lower = there.filter(|t| cost(&trial, &t.residuals_mm) < costs[costs.len() - 1]);
             if let Some(there) = lower {
                 costs.push(cost(&trial, &there.residuals_mm));
@@ -399,6 +430,44 @@ mod tests {
         let descent =
             estimate(&mut model, &[tight(2.0), tight(0.0)], &[2.5, 0.5], &EstimateSettings::default()).unwrap();
         assert!((descent.log_parameters[0] - 2.0).abs() < 1e-4 && descent.log_parameters[1].abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_and_not_taken_for_a_minimum() {
+        let model = || Compliance { observed: simulate(&[1.3, 0.4]) };
+        // A pressure of 0: its logarithm.
+        let mut prior = no_prior();
+        (prior[1].name, prior[1].mean, prior[1].sd) = ("pressure".to_owned(), 0f64.ln(), Some(0.3));
+        let settings = EstimateSettings::default();
+        let found = estimate(&mut model(), &prior, &[3.0, 0.4], &settings);
+        assert_eq!(found.unwrap_err(), EstimateError::Known(in_words("pressure").0));
+        let noiseless = EstimateSettings { noise_mm: 0.0, ..settings.clone() };
+        let found = estimate(&mut model(), &no_prior(), &[3.0, 0.4], &noiseless);
+        assert_eq!(found.unwrap_err(), EstimateError::Cost);
+
+        /// A sensitivity that is no number at one point.
+        struct Slopeless {
+            model: Compliance,
+            at_start: bool,
+            asked: usize,
+        }
+        impl Forward for Slopeless {
+            type Error = String;
+            fn linearise(&mut self, log: &[f64]) -> Result<Linearisation, String> {
+                let mut found = self.model.linearise(log)?;
+                if self.asked == usize::from(!self.at_start) {
+                    found.jacobian_mm[(3, 1)] = f64::NAN;
+                }
+                self.asked += 1;
+                Ok(found)
+            }
+        }
+        let ended = |at_start| {
+            let mut model = Slopeless { model: model(), at_start, asked: 0 };
+            estimate(&mut model, &no_prior(), &[3.0, 0.4], &settings).map(|found| found.convergence)
+        };
+        assert_eq!(ended(true), Err(EstimateError::Cost));
+        assert_eq!(ended(false), Ok(Convergence::StepBelowTolerance), "a trial point only shortens the step");
     }
 
     #[test]
