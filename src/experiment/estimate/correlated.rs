@@ -4,6 +4,7 @@
 use super::body::{Body, Observation, Solved};
 use super::evidence::{Evidence, LinearModel, Unexplained};
 use super::findings::{Findings, Fitted, Odds, ProblemError, ROUGH, Shift, differences};
+use super::levenberg_marquardt::known_beforehand;
 use super::nuisance::{Nuisance, Weighted};
 use super::posterior::Z_95_ONE_SIDED;
 use super::process::{Factor, Process, spread_out};
@@ -134,6 +135,7 @@ impl Fit<'_, '_> {
             jacobian_mm: &at.linearisation.jacobian_mm,
             away: DVector::from_iterator(self.prior.len(), away),
             precision: super::joint_precision(&self.prior),
+            way_left: true,
         }
     }
 }
@@ -150,6 +152,8 @@ pub(super) fn fit(
     (instrument, shape): (Option<(&Instrument<'_>, usize)>, Option<&Shape<'_>>),
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
+    // What has not moved is not descended for: its evidence would be of no number.
+    known_beforehand(prior)?;
     let seen = body.observed_nodes().to_vec();
     let own = prior.len();
     if seen.len() <= own {
@@ -206,8 +210,10 @@ pub(super) fn fit(
     if moved {
         descent = fit.descend_projected(&descent, errors.noise, settings)?;
     }
-    let evidence = fit.errors(&descent, errors.noise)?;
-    let exact = fit.linear(&descent).with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
+    // What models are ranked by.
+    let ranked = fit.linear(&descent).after(descent.convergence);
+    let evidence = ranked.with_discrepancy(errors.noise).ok_or(EstimateError::Covariance)?;
+    let exact = ranked.with_noise_alone(errors.noise).ok_or(EstimateError::Covariance)?;
     // A discrepancy that is not needed is none: its size would widen nothing but by chance.
     let unexplained = if evidence.log_evidence > exact.log_evidence { evidence.unexplained } else { exact.unexplained };
 
@@ -295,6 +301,7 @@ impl Fit<'_, '_> {
             jacobian_mm: &self.rigid(),
             away: DVector::zeros(RIGID),
             precision: DMatrix::from_diagonal(&DVector::from_column_slice(&precision)),
+            way_left: true,
         };
         let nothing = still.with_noise_alone(noise).ok_or(EstimateError::Covariance)?;
         let anything = still.with_discrepancy(noise).ok_or(EstimateError::Covariance)?;

@@ -4,6 +4,7 @@
 //! Kennedy and O'Hagan, "Bayesian calibration of computer models", Journal of the Royal Statistical Society B 63, 2001;
 //! MacKay, "Information Theory, Inference, and Learning Algorithms", chapter 28.
 
+use super::Convergence;
 use super::process::{Factor, Process};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -47,6 +48,8 @@ pub struct LinearModel<'a> {
     pub away: DVector<f64>,
     /// Inverse covariance of the prior; rows of zero for no prior (the evidence has no meaning beside another's then).
     pub precision: DMatrix<f64>,
+    /// Whether the way to the minimum that the linearisation shows from the point counts as gone ([`Self::after`]).
+    pub way_left: bool,
 }
 
 /// The most probable noise and discrepancy, and what they make of the model.
@@ -60,7 +63,15 @@ pub struct Evidence {
 }
 
 impl LinearModel<'_> {
-    /// Logarithm of the evidence at the best point of the linearised model.
+    /// Of a point at which a search for the minimum ended in this way. Beyond the point of a search that was not finished nobody
+    /// knows how far the linearisation holds: many standard deviations of promised way would rank a model above those that
+    /// have gone theirs. What is left is no more than its evidence.
+    #[must_use]
+    pub fn after(self, convergence: Convergence) -> Self {
+        Self { way_left: !convergence.is_unfinished(), ..self }
+    }
+
+    /// Logarithm of the evidence at the best point of the linearised model, or at the point itself; `None` when it is no number.
     fn log_evidence(&self, unexplained: &Unexplained) -> Option<f64> {
         let factor = unexplained.factor(self.places_mm)?;
         let residuals = DMatrix::from_column_slice(self.residuals_mm.len(), 1, self.residuals_mm.as_slice());
@@ -71,12 +82,16 @@ impl LinearModel<'_> {
             let j = factor.whiten(self.jacobian_mm);
             let gradient = j.transpose() * &r + &self.precision * &self.away;
             let hessian = (j.transpose() * &j + &self.precision).cholesky()?;
-            quadratic -= gradient.dot(&hessian.solve(&gradient));
+            if self.way_left {
+                quadratic -= gradient.dot(&hessian.solve(&gradient));
+            }
             log_ratio = hessian.l_dirty().diagonal().map(f64::ln).sum();
             log_ratio -= self.log_root_of_precision();
         }
         let constant = 0.5 * r.len() as f64 * std::f64::consts::TAU.ln();
-        Some(-0.5 * quadratic - 1.5 * factor.log_determinant - log_ratio - constant)
+        let log_evidence = -0.5 * quadratic - 1.5 * factor.log_determinant - log_ratio - constant;
+        // Nothing can be ranked by what is no number.
+        log_evidence.is_finite().then_some(log_evidence)
     }
 
     /// Half the logarithm of the prior's precision, parameters of no prior left out.
@@ -197,7 +212,8 @@ mod tests {
 
     fn no_parameters<'a>(places: &'a [[f64; 3]], r: &'a DVector<f64>, j: &'a DMatrix<f64>) -> LinearModel<'a> {
         let none = DVector::zeros(0);
-        LinearModel { places_mm: places, residuals_mm: r, jacobian_mm: j, away: none, precision: DMatrix::zeros(0, 0) }
+        let precision = DMatrix::zeros(0, 0);
+        LinearModel { places_mm: places, residuals_mm: r, jacobian_mm: j, away: none, precision, way_left: true }
     }
 
     #[test]
@@ -236,6 +252,7 @@ mod tests {
             jacobian_mm: &j,
             away: away.clone(),
             precision: DMatrix::from_diagonal(&precision),
+            way_left: true,
         };
         let unexplained = Unexplained { noise: NOISE, discrepancy: Process { sd_mm: 0.0, length_mm: 10.0 } };
         // Seen minus the model at the prior's mean is a draw of C + J S J^T.
@@ -251,6 +268,42 @@ mod tests {
             - 6.0 * std::f64::consts::TAU.ln();
         let found = model.log_evidence(&unexplained).unwrap();
         assert!((found - expected).abs() < 1e-8 * expected.abs(), "{found} {expected}");
+    }
+
+    #[test]
+    fn a_search_that_was_not_finished_is_not_credited_with_the_way_that_it_did_not_go() {
+        let places = &places()[..4];
+        let j = DMatrix::from_fn(12, 1, |r, _| (r % 5) as f64 - 1.7);
+        let unexplained = Unexplained { noise: NOISE, discrepancy: Process { sd_mm: 0.0, length_mm: 10.0 } };
+        let at = |sds: f64, convergence| {
+            // So many standard deviations of the posterior from the minimum, which is the prior's mean.
+            let white = unexplained.factor(places).unwrap().whiten(&j);
+            let away = DVector::from_element(1, sds / (white.norm_squared() + 4.0).sqrt());
+            let r = &j * &away;
+            let precision = DMatrix::from_element(1, 1, 4.0);
+            let model =
+                LinearModel { places_mm: places, residuals_mm: &r, jacobian_mm: &j, away, precision, way_left: true };
+            model.after(convergence).log_evidence(&unexplained).unwrap()
+        };
+        let best = at(0.0, Convergence::StepBelowTolerance);
+        for found in [Convergence::StepBelowTolerance, Convergence::NoDescent, Convergence::NotSought] {
+            assert!((at(6.0, found) - best).abs() < 1e-6 * best.abs(), "{found:?}");
+        }
+        for unfinished in [Convergence::Stalled, Convergence::IterationsExhausted] {
+            assert!((at(6.0, unfinished) - (best - 18.0)).abs() < 1e-6 * best.abs(), "{unfinished:?}");
+            assert!((at(0.0, unfinished) - best).abs() < 1e-9 * best.abs());
+        }
+    }
+
+    #[test]
+    fn an_evidence_that_is_no_number_is_none() {
+        let (places, r) = (&places()[..4], DVector::zeros(12));
+        let j = DMatrix::from_element(12, 1, 1.0);
+        let (away, precision) = (DVector::from_element(1, f64::NEG_INFINITY), DMatrix::from_element(1, 1, 4.0));
+        let model =
+            LinearModel { places_mm: places, residuals_mm: &r, jacobian_mm: &j, away, precision, way_left: true };
+        assert_eq!(model.with_noise_alone(NOISE), None);
+        assert_eq!(model.with_discrepancy(NOISE), None);
     }
 
     #[test]
