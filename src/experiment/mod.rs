@@ -30,3 +30,4 @@ pub mod synth;
 pub mod ventricles;
 pub mod verdict;
 pub mod verdict_of_samples;
+mod way_down;

@@ -1,4 +1,4 @@
-//! Moduli and tissues as a text has them.
+//! Moduli and tissues as a text has them, and how a sentence begins.
 
 /// A modulus for readers: three digits, thousands apart.
 pub fn pa(value: f64) -> String {
@@ -33,6 +33,12 @@ pub fn range([low, high]: [f64; 2]) -> String {
 /// `grey_matter` as a text has it.
 pub(super) fn words(tissue: &str) -> String {
     tissue.replace('_', " ")
+}
+
+/// With a large letter first.
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 //! Two lines are drawn, both before any patient was seen: three standard deviations for a contradiction, and odds of
 //! e^3 = 20 to 1 for taking one explanation instead of another.
 
-use super::moduli_in_words::words;
+use super::moduli_in_words::{capitalised, words};
 pub use super::moduli_in_words::{pa, range, with_interval};
 use super::parameter_name::in_words;
-use nalgebra::Vector3;
+use super::way_down::other_way;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,8 @@ pub enum Finding {
     Conflict,
     /// Several models explain the shift about as well: the figures are averages over them.
     CannotTell,
+    /// Of models that explain the shift about as well one claims a stiffness and another none: no stiffness.
+    ModelsDisagree,
     /// The shift is explained, and says little of the stiffness: the interval is the prior's.
     PriorDominated,
     /// The shift is explained but for more than the measurement's noise, and the intervals are as much wider.
@@ -91,6 +93,7 @@ impl Finding {
             Self::Unexplained => "shift not explained",
             Self::Conflict => "contradicts what is known",
             Self::CannotTell => "cannot tell",
+            Self::ModelsDisagree => "models disagree",
             Self::PriorDominated => "the prior's",
             Self::Widened => "widened by what is unexplained",
             Self::Identified => "identified",
@@ -158,6 +161,22 @@ pub enum Reason {
         models: [String; 2],
         /// Logarithm of the odds between them.
         log_odds: f64,
+    },
+    /// A model of other tissues is about as probable: of those of this verdict it says nothing.
+    OtherTissues {
+        /// It.
+        model: String,
+        /// Logarithm of the odds against it.
+        log_odds: f64,
+    },
+    /// A model that is about as probable claims no stiffness.
+    RivalWithholds {
+        /// It.
+        model: String,
+        /// Logarithm of the odds against it.
+        log_odds: f64,
+        /// What it comes down to on its own.
+        finding: Finding,
     },
     /// The best state of a surface's set against rest.
     Surface {
@@ -234,7 +253,7 @@ pub enum Reason {
         /// How many of the amounts by which it may be off.
         amounts: usize,
     },
-    /// Another model could not be solved: it is neither refuted nor borne out.
+    /// Another model could not be solved to the end: it is neither refuted nor borne out.
     NotCompared {
         /// The model.
         model: String,
@@ -273,6 +292,13 @@ impl Reason {
             }
             Self::AnotherModel { models: [a, b], log_odds } => {
                 format!("{a} and {b} explain the shift about as well (log odds {log_odds:.1})")
+            }
+            Self::OtherTissues { model, log_odds } => {
+                format!("{model}, whose tissues are others, explains the shift about as well (log odds {log_odds:.1})")
+            }
+            Self::RivalWithholds { model, log_odds, finding } => {
+                let finding = finding.short();
+                format!("{model} is about as probable as the best model (log odds {log_odds:.1}) and claims no stiffness ({finding})")
             }
             Self::Surface { set, rest_mm, deformed_mm, floor_mm } => format!(
                 "{set}: {rest_mm:.2} mm at rest, {deformed_mm:.2} mm deformed, where {floor_mm:.2} mm can be told apart"
@@ -314,7 +340,7 @@ impl Reason {
                 "{amounts} of the amounts by which outline and supports may be off could not be solved: the intervals take them as exact"
             ),
             Self::NotCompared { model } => {
-                format!("{model} could not be solved: whether it explains the shift as well is not known")
+                format!("{model} could not be solved to the end: whether it explains the shift as well is not known")
             }
         }
     }
@@ -374,42 +400,38 @@ impl Verdict {
     ) -> Self {
         // Of a shift that was not seen there is no share: 0 would say that the model misses it.
         let explained_share = explained_share.filter(|_| finding != Finding::NoShift);
-        let sentence = sentence(finding, explained_share, &moduli, &reasons);
+        let other = reasons.iter().find(|reason| matches!(reason, Reason::OtherTissues { .. }));
+        let other = other.map_or_else(String::new, |other| format!(" {}.", capitalised(&other.sentence())));
+        let sentence = sentence(finding, explained_share, &moduli, &reasons) + &other;
         Self { finding, sentence, explained_share, moduli, reasons }
     }
 
-    /// Beside models that could not be solved: a stiffness that is claimed has not been compared with theirs.
+    /// Beside models that could not be solved: a stiffness that is claimed has not been compared with theirs, and a bound has to
+    /// hold for every model.
     #[must_use]
-    pub fn beside_unsolved(mut self, models: impl Iterator<Item = String>) -> Self {
-        let claims = self.finding.has_stiffness();
-        self.reasons.extend(models.filter(|_| claims).map(|model| Reason::NotCompared { model }));
-        Self::new(self.finding, self.explained_share, self.moduli, self.reasons)
+    pub fn beside_unsolved(self, models: impl Iterator<Item = String>) -> Self {
+        let bounds = self.moduli.iter().any(|(_, claim)| matches!(claim, Claim::Above { .. }));
+        let claims = self.finding.has_stiffness() || bounds;
+        let unsolved: Vec<Reason> = models.filter(|_| claims).map(|model| Reason::NotCompared { model }).collect();
+        if unsolved.is_empty() {
+            return self;
+        }
+        let Self { finding, explained_share, moduli, reasons, .. } = self.without_bounds();
+        Self::new(finding, explained_share, moduli, reasons.into_iter().chain(unsolved).collect())
+    }
+
+    /// Where a model that it has to hold for gives no bound.
+    #[must_use]
+    pub fn without_bounds(self) -> Self {
+        let held = |claim| if matches!(claim, Claim::Above { .. }) { Claim::Withheld } else { claim };
+        let moduli = self.moduli.into_iter().map(|(tissue, claim)| (tissue, held(claim))).collect();
+        Self::new(self.finding, self.explained_share, moduli, self.reasons)
     }
 
     /// The reasons in sentences.
     pub fn because(&self) -> Vec<String> {
         self.reasons.iter().map(Reason::sentence).collect()
     }
-}
-
-/// Where a direction of the MNI frame points to, by its largest component.
-fn side_of_head(direction: &Vector3<f64>) -> &'static str {
-    const SIDES: [[&str; 2]; 3] =
-        [["the left side", "the right side"], ["the back of the head", "the face"], ["the feet", "the crown"]];
-    let axis = direction.iamax();
-    SIDES[axis][usize::from(direction[axis] > 0.0)]
-}
-
-/// Which way was moved, and which way gravity pulls as assumed.
-fn other_way(seen_mm: &[f64; 3], gravity_m_per_s2: &[f64; 3]) -> String {
-    let (seen, down) = (Vector3::from(*seen_mm), Vector3::from(*gravity_m_per_s2));
-    format!(
-        "what is seen has moved {:.1} mm on average towards {}, {:.0} degrees from gravity as assumed (towards {})",
-        seen.norm(),
-        side_of_head(&seen),
-        seen.angle(&down).to_degrees(),
-        side_of_head(&down)
-    )
 }
 
 /// What is suspected where no stiffness is claimed.
@@ -454,7 +476,13 @@ fn sentence(finding: Finding, share: Option<f64>, moduli: &[(String, Claim)], re
         Finding::Conflict => {
             format!("Conflict: the shift contradicts what is known: {first}. {}", suspects("are not", reasons))
         }
-        Finding::CannotTell => format!("Cannot tell: {first}. Averaged over them: {intervals}."),
+        Finding::CannotTell => {
+            // The first is in the sentence already.
+            let more = reasons.iter().filter(|r| matches!(r, Reason::AnotherModel { .. })).count().saturating_sub(1);
+            let more = if more > 0 { format!(" and {more} more about as probable") } else { String::new() };
+            format!("Cannot tell: {first}. Averaged over them{more}: {intervals}.")
+        }
+        Finding::ModelsDisagree => format!("Cannot tell: {first}. No stiffness is claimed."),
         Finding::PriorDominated => format!(
             "The model explains the shift{percent}, which says little of the stiffness: the interval is the prior's. \
              {}.",
@@ -497,11 +525,6 @@ fn limits_of_tried(reasons: &[Reason]) -> String {
     said.concat()
 }
 
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -537,6 +560,19 @@ mod tests {
         };
         assert!(of(Finding::Identified)[0].starts_with("supports sliding could not be solved"));
         assert_eq!(of(Finding::NoShift), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_bound_is_none_beside_a_model_that_could_not_be_solved() {
+        let still = Reason::StillAsProbable { log_odds: -2.0, would_be_seen_mm: 0.64 };
+        let bound = ("grey_matter".to_owned(), Claim::Above { bound_pa: 2140.0 });
+        let alone = Verdict::new(Finding::NoShift, None, vec![bound], vec![still.clone()]);
+        assert_eq!(alone.clone().beside_unsolved(std::iter::empty()), alone);
+        let model = "supports sliding".to_owned();
+        let beside = alone.beside_unsolved(std::iter::once(model.clone()));
+        assert_eq!(beside.moduli, [("grey_matter".to_owned(), Claim::Withheld)]);
+        assert_eq!(beside.reasons, [still, Reason::NotCompared { model }]);
+        assert!(!beside.sentence.contains("2,140"), "{}", beside.sentence);
     }
 
     #[test]

@@ -188,9 +188,9 @@ fn notes(verdict: &Verdict, compared: Option<&Comparison>, supports: Supports) -
     }
     let averaged = finding == Finding::CannotTell;
     let slides = compared.map_or(supports == Supports::Sliding, |compared| {
-        // An average has something of every model.
-        let models = if averaged { compared.candidates.len() } else { 1 };
-        compared.candidates.iter().take(models).any(|model| HeldBody::slides(&model.name))
+        // An average has something of every model that it is over.
+        let models = if averaged { compared.averaged().count() } else { 1 };
+        compared.averaged().take(models).any(|model| HeldBody::slides(&model.name))
     });
     let average = "moduli are an average over models that cannot be told apart: no curve is drawn of it";
     let held = "the case's estimate slides along the skull, or some of its models do; here the base is held";
@@ -277,6 +277,12 @@ mod tests {
         let said = of(Finding::CannotTell, &both, Supports::Evidence);
         assert!(said.contains("average") && said.contains("slides"), "an average has something of both: {said}");
         assert!(!of(Finding::CannotTell, &["supports fixed"], Supports::Evidence).contains("slides"));
+        let ruled_out = Candidate { log_evidence: -9.0, ..model(both[1]) };
+        let candidates = vec![model(both[0]), model("supports fixed, fluid of unknown level"), ruled_out];
+        let verdict = verdict(Finding::CannotTell);
+        let comparison = Comparison { candidates, log_odds: Some(0.0), verdict: verdict.clone() };
+        let said = notes(&verdict, Some(&comparison), Supports::Evidence).join("; ");
+        assert!(said.contains("average") && !said.contains("slides"), "not of one that is ruled out: {said}");
     }
 
     #[test]

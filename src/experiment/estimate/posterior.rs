@@ -178,14 +178,15 @@ impl Posterior {
         self.marked(Knowledge::Widened)
     }
 
-    /// With every figure withheld that the data had narrowed: the model does not stand.
+    /// With every figure withheld that the data had narrowed: the model does not stand, or not alone.
     #[must_use]
     pub fn withheld(self) -> Self {
         self.marked(Knowledge::Withheld)
     }
 
     fn marked(mut self, mark: Knowledge) -> Self {
-        for verdict in self.identifiability.verdicts.iter_mut().filter(|v| **v == Knowledge::Identified) {
+        let narrowed = |v: &&mut Knowledge| matches!(**v, Knowledge::Identified | Knowledge::Widened);
+        for verdict in self.identifiability.verdicts.iter_mut().filter(narrowed) {
             *verdict = mark;
         }
         self
