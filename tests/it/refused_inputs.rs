@@ -2,6 +2,7 @@
 //! written.
 
 use crate::job::{CHEAP, contents, output, sample};
+use crate::made::prepared_pair;
 use hgm::geometry::Native;
 use hgm::image::nifti::{ReadOptions, decode, encode_u8};
 use hgm::image::{Grid, LabelMap, Volume};
@@ -213,6 +214,23 @@ fn settings_that_would_stop_a_later_stage_stop_the_job_before_the_first() {
     refuses(&run, "there is no load", &["gravity_m_per_s2", "[resection]"], &path("case"));
     let run = ["run", pair[0], pair[1], "--cells", "0", "-o", &path("case")];
     refuses(&run, "--cells", &["1 or more"], &path("case"));
+}
+
+#[test]
+fn a_comparison_refuses_to_estimate_loads_that_are_not_there_as_an_estimate_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    prepared_pair(Path::new(&path("case")));
+    let none = "[[resection.pressure]]\nset = \"superior\"\npressure_pa = 0.0\n";
+    for given in ["", none] {
+        std::fs::write(path("settings.toml"), format!("[estimate]\npressure = true\n{given}")).unwrap();
+        for command in ["estimate", "compare"] {
+            let ended = output(&["--config", &path("settings.toml"), command, &path("case")]);
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert_eq!(ended.status.code(), Some(3), "{command}: {said}");
+            assert!(said.contains("`pressure` needs pressures other than 0"), "{command}: {said}");
+        }
+    }
 }
 
 #[test]

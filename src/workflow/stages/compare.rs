@@ -16,7 +16,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 15;
+const VERSION: u32 = 16;
 const NAME: StageName = StageName::Compare;
 /// The laws of the family.
 const LAWS: [MetaModel; 3] = [MetaModel::NEO_HOOKEAN, MetaModel::MOONEY_RIVLIN, MetaModel::OGDEN];
@@ -29,6 +29,7 @@ pub(crate) fn compare(
     input: &EstimateInput<'_>,
 ) -> Result<Comparison, WorkflowError> {
     let (options, prior) = (&work.settings.estimate, &work.settings.prior);
+    options.suits(&input.scenario.loads).map_err(WorkflowError::EstimateLoads)?;
     let posed = serde_json::json!({
         "scenario": input.scenario, "poisson_ratio": input.poisson_ratio, "noise_mm": input.noise_mm,
         "estimate": options, "prior": prior, "laws": LAWS, "held": held_by(work),

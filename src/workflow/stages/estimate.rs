@@ -31,7 +31,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 36;
+const VERSION: u32 = 37;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;
@@ -40,7 +40,7 @@ const ESTIMATE: &str = "estimate";
 
 impl EstimateOptions {
     /// Refuses to estimate loads that are not there.
-    fn suits(&self, loads: &Loads) -> Result<(), &'static str> {
+    pub(super) fn suits(&self, loads: &Loads) -> Result<(), &'static str> {
         let weightless = loads.gravity_m_per_s2 == [0.0; 3] || loads.density_kg_per_m3 == 0.0;
         if (self.density || self.gravity_direction) && weightless {
             return Err(
@@ -427,9 +427,8 @@ impl Bodies {
             ..Problem::new(&body.mesh, &scenario, unknowns, input.poisson_ratio, seen)
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
-        let stuck = solve_problem(problem, &settings).map(|found| found.outcome.verdict);
-        let stuck = stuck.unwrap_or_else(|_| Verdict::new(Finding::NoShift, None, Vec::new(), Vec::new()));
-        Ok(with_weakest_bounds(verdict.clone(), &[&verdict, &stuck].into_iter()))
+        let Ok(stuck) = solve_problem(problem, &settings) else { return Ok(verdict.without_bounds()) };
+        Ok(with_weakest_bounds(verdict.clone(), &[&verdict, &stuck.outcome.verdict].into_iter()))
     }
 
     /// What is observed, how far it is believed, and the standard deviation of one observation in mm.
