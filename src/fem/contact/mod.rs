@@ -60,11 +60,11 @@ struct Standing {
     wall: u32,
     before: Before,
     area_m2: f64,
-    /// What the gap is more than the field, or than the way along the normal, m; the wall's own gap not counted where the
-    /// room follows it.
-    room_m: f64,
-    /// The room follows the wall's gap.
-    follows_gap: bool,
+    /// What the gap is more than the field, or than the way along the normal, m; the wall's own gap not counted.
+    own_m: f64,
+    /// The field where the node is at rest, m: with it the body at rest keeps half of the soft layer, whatever the wall's gap.
+    /// `None` before a plane, which stands where it stands.
+    at_rest_m: Option<f64>,
     /// How much nearer to the wall a step of 1 comes by the field at rest: where a smooth distance bends or two of them
     /// meet it rises by less than it should. Only for even walls, where the field says how the room changes and no more.
     field_slope: f64,
@@ -111,6 +111,26 @@ pub(super) struct Numbering<'a> {
     pub nodes_m: &'a [[f64; 3]],
 }
 
+impl Standing {
+    /// What the gap is more than the field, or than the way along the normal, before a wall with a gap (m) of its own, and whether
+    /// that follows the wall's gap: no node is nearer to the wall at rest than half the soft layer, where nothing is pressed.
+    fn room_m(&self, wall: &Barrier) -> (f64, bool) {
+        match self.at_rest_m {
+            Some(at_rest_m) if self.own_m + at_rest_m + wall.gap_m <= wall.least_m() => {
+                (wall.least_m() - at_rest_m, false)
+            }
+            _ => (self.own_m + wall.gap_m, true),
+        }
+    }
+}
+
+impl Barrier {
+    /// The room that is left at rest in any case, m.
+    fn least_m(&self) -> f64 {
+        0.5 * self.potential.softness_m
+    }
+}
+
 impl Supports {
     /// The scenario's walls and springs on its mesh (cut open, as [`Scenario::body`] leaves it).
     pub(super) fn new(sharing: &Sharing, scenario: &Scenario, at: &Numbering) -> Result<Self, FemError> {
@@ -142,7 +162,6 @@ impl Supports {
             stiffness: contact.stiffness_pa_per_mm / METRES_PER_MM,
             softness_m: contact.softness_mm * METRES_PER_MM,
         };
-        let least = 0.5 * potential.softness_m;
         // A plane stands where it stands.
         let plane = matches!(contact.wall, Wall::Plane { .. });
         let gap = if plane { 0.0 } else { contact.gap_mm * METRES_PER_MM };
@@ -168,26 +187,23 @@ impl Supports {
             }
             let x = at.nodes_m[node as usize];
             let mut field_slope = 1.0;
-            let (before, room_m, follows_gap) = match &contact.wall {
+            let (before, own_m, at_rest_m) = match &contact.wall {
                 Wall::Plane { point_mm, normal } => {
                     let n = Vector3::from(*normal).normalize();
                     let room = n.dot(&(Vector3::from(x) - Vector3::from(metres(*point_mm))));
-                    (Before::Plane(n), room, true)
+                    (Before::Plane(n), room, None)
                 }
-                Wall::OwnSurface | Wall::Sheet if gap > least => (Before::Plane(-normal), 0.0, true),
-                Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), least, false),
+                Wall::OwnSurface | Wall::Sheet => (Before::Plane(-normal), 0.0, Some(0.0)),
                 Wall::Field { even, .. } => {
                     let at = field.as_ref().map(|f| f.at(millimetres(x))).unwrap_or_default();
                     if *even {
                         field_slope = Vector3::from(at.gradient).norm().clamp(LEAST_SLOPE, 1.0);
                     }
                     let seen = at.value * METRES_PER_MM / field_slope;
-                    let own = if *even { -seen } else { 0.0 };
-                    let follows = own + seen + gap > least;
-                    (Before::Field, if follows { own } else { least - seen }, follows)
+                    (Before::Field, if *even { -seen } else { 0.0 }, Some(seen))
                 }
             };
-            self.standing.push(Standing { node, row, wall, before, area_m2, room_m, follows_gap, field_slope });
+            self.standing.push(Standing { node, row, wall, before, area_m2, own_m, at_rest_m, field_slope });
         }
         if all_held {
             self.idle.push(FemWarning::NoEffect { set: contact.set.clone(), idle: Idle::Contact });
@@ -196,10 +212,10 @@ impl Supports {
         Ok(())
     }
 
-    /// Gives the wall of this number another gap, mm; it begins no nearer than half its soft layer, as when it was made.
+    /// Gives the wall of this number another gap, mm, as if it had been made with it.
     pub(super) fn set_gap(&mut self, wall: usize, gap_mm: f64) {
         if let Some(wall) = self.walls.get_mut(wall) {
-            wall.gap_m = (gap_mm * METRES_PER_MM).max(0.5 * wall.potential.softness_m);
+            wall.gap_m = gap_mm * METRES_PER_MM;
         }
     }
 
@@ -225,7 +241,7 @@ impl Supports {
     fn gap(&self, s: &Standing, u: &[[f64; 3]], nodes_m: &[[f64; 3]]) -> Gap {
         let moved = Vector3::from(u[s.node as usize]);
         let wall = &self.walls[s.wall as usize];
-        let room_m = s.room_m + if s.follows_gap { wall.gap_m } else { 0.0 };
+        let (room_m, _) = s.room_m(wall);
         match s.before {
             Before::Plane(n) => (room_m + n.dot(&moved), n, Matrix3::zeros()),
             Before::Field => {
@@ -365,7 +381,7 @@ impl Supports {
             return None;
         }
         let parts = self.each(u, nodes_m, 1.0, |s, potential, (gap, normal, _)| {
-            let moves = s.wall as usize == wall && s.follows_gap;
+            let moves = s.wall as usize == wall && s.room_m(&self.walls[wall]).1;
             if moves { -s.area_m2 * potential.at(gap)[2] * METRES_PER_MM * normal } else { Vector3::zeros() }
         });
         let mut forces = vec![[0.0; 3]; u.len()];

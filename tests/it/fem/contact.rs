@@ -5,7 +5,9 @@ use super::walls::{
     GREY, ROOMS, energy_kept_in_a_bounce, even_pressure, height_of_the_lowest, leaning, sensitivities_off,
     slid_apart_along_a_sheet, slid_down_a_slope, solved,
 };
-use hgm::fem::{Model, Scenario};
+use hgm::fem::{Contact, Model, Scenario, Wall};
+use hgm::geometry::SmoothField;
+use std::sync::Arc;
 
 /// Every node on the wall carries the same pressure, to the residual, on a face whose facets and the wall know nothing of
 /// each other.
@@ -124,6 +126,41 @@ fn a_wall_that_is_moved_away_is_the_wall_put_there() {
     assert!(moved.contact[0].area_mm2 > 0.0);
     assert!(apart(&moved.displacement_mm, &there.displacement_mm) < 1e-9);
     assert!(apart(&moved.displacement_mm, &before.displacement_mm) > 0.2);
+}
+
+/// Where a scan shows less room than the gap that is taken away, the body would be squeezed with nothing pulling at it.
+#[test]
+fn a_wall_of_uneven_room_that_comes_nearer_does_not_press_a_body_at_rest() {
+    let mesh = cube(4, 40.0);
+    // Below the lowest face from .8 mm too little to 1 mm of room.
+    let places = (0..13 * 13 * 13).map(|n| [n % 13, n / 13 % 13, n / 169].map(|i| 5.0 * f64::from(i) - 10.0));
+    let samples = places.map(|x| (x[2] + 0.045 * x[0] - 0.8) as f32).collect();
+    let field = SmoothField::new([-10.0; 3], [5.0; 3], [13; 3], samples).unwrap();
+    let before = |gap_mm: f64, g: f64| {
+        let text =
+            format!("fixed = ['x1']\n{GREY}[loads]\ngravity_m_per_s2 = [0, 0, {g}]\ndensity_kg_per_m3 = 200.0\n");
+        let mut scenario = Scenario::from_toml(&text).unwrap();
+        let wall = Wall::Field { name: "skull".into(), even: false, distance_mm: Some(Arc::new(field.clone())) };
+        scenario.contact.push(Contact::new("z0", wall, gap_mm));
+        scenario
+    };
+    let solved = |model: &Model, of: &Scenario| model.solve(&of.materials, None, &|_| ()).unwrap().0;
+    for gap_mm in [0.3, 0.01] {
+        let moved = |g: f64| {
+            let far = before(1.0, g);
+            let mut model = Model::new(&mesh, &far).unwrap();
+            model.set_gap(0, gap_mm);
+            solved(&model, &far)
+        };
+        let largest = |u: &[[f64; 3]]| u.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+        assert!(largest(&moved(0.0).displacement_mm) < 1e-9, "{gap_mm}");
+        let (found, near) = (moved(-9.81), before(gap_mm, -9.81));
+        let there = solved(&Model::new(&mesh, &near).unwrap(), &near);
+        assert!(there.contact[0].area_mm2 > 0.0);
+        for (a, b) in found.displacement_mm.iter().flatten().zip(there.displacement_mm.iter().flatten()) {
+            assert!((a - b).abs() < 1e-9, "{gap_mm}: {a} {b}");
+        }
+    }
 }
 
 /// A foretold start has nodes far behind the wall.
