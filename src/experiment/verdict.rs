@@ -248,7 +248,7 @@ pub enum Reason {
     LoadsAssumed,
     /// The descent was not finished.
     NotConverged,
-    /// How the body answers to a shape a little other than it was taken to be could not be found.
+    /// How the body answers to a shape a little other than it was taken to be was not found.
     ShapeTakenAsExact {
         /// How many of the amounts by which it may be off.
         amounts: usize,
@@ -337,7 +337,7 @@ impl Reason {
             }
             Self::NotConverged => "the search ended before the minimum was reached".to_owned(),
             Self::ShapeTakenAsExact { amounts } => format!(
-                "{amounts} of the amounts by which outline and supports may be off could not be solved: the intervals take them as exact"
+                "what {amounts} of the amounts by which outline and supports may be off do was not found: the moduli take them as exact"
             ),
             Self::NotCompared { model } => {
                 format!("{model} could not be solved to the end: whether it explains the shift as well is not known")

@@ -13,6 +13,7 @@ use super::re_registration::{Instrument, MovedNode, without_own_error};
 use super::rigid_remainder::{RIGID, RigidModes};
 use super::shape::{Shape, ShapeColumns, ShapeFound};
 use super::softest::softest;
+use super::unseen::{Share, above_noise, least_share_above_noise, share_of, without_rigid};
 use super::{
     Convergence, Descent, EstimateError, EstimateSettings, Forward, Linearisation, LogPrior, estimate, information,
 };
@@ -44,6 +45,17 @@ const SETTLING: usize = 3;
 /// is about a tenth of what it is shown.
 const AGAIN: usize = 2;
 
+/// What a fit has beside the model and what was seen.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Beside<'s> {
+    /// The measurement, and how many times its own error is to be taken out.
+    pub instrument: Option<(&'s Instrument<'s>, usize)>,
+    /// The body's shape, where it is not known exactly.
+    pub shape: Option<&'s Shape<'s>>,
+    /// Whether the measurement's rigid half follows the brain: then what moves rigidly is not seen.
+    pub rigid_follows: bool,
+}
+
 /// A fit under way: the model, the places looked at, and the points where it was linearised.
 struct Fit<'b, 'a> {
     body: &'b mut Body<'a>,
@@ -52,6 +64,7 @@ struct Fit<'b, 'a> {
     nuisance: Nuisance,
     /// What is not known of that.
     shape: Option<ShapeColumns>,
+    beside: Beside<'b>,
     /// Priors of the model's own parameters and of those amounts behind them.
     prior: Vec<LogPrior>,
     own: usize,
@@ -122,6 +135,36 @@ impl Fit<'_, '_> {
         Ok(here)
     }
 
+    /// The same, and again with what the shape does found anew where that has led to another body.
+    fn settle_with_shape(
+        &mut self,
+        from: Descent,
+        noise: Process,
+        settings: &EstimateSettings,
+    ) -> Result<Descent, ProblemError> {
+        let settled = self.settle(from, noise, settings)?;
+        match self.shape_found_anew(&settled)? {
+            Some(from) => self.settle(from, noise, settings),
+            None => Ok(settled),
+        }
+    }
+
+    /// The same point with what the shape does to the body there, where that is another body than it was found for: of a stiffer
+    /// one it is less, and outline and falx would pass for as much better known. Where it cannot be found for all the amounts
+    /// what was found before stays.
+    fn shape_found_anew(&mut self, here: &Descent) -> Result<Option<Descent>, ProblemError> {
+        let own = &here.log_parameters[..self.own];
+        let are_moduli = self.body.are_moduli();
+        let Some(before) = self.shape.as_ref().filter(|shape| shape.is_of_another_body(own, &are_moduli)) else {
+            return Ok(None);
+        };
+        let anew = self.beside.shape.and_then(|shape| shape.columns(own, &self.places_mm));
+        let Some(anew) = anew.filter(|anew| anew.of_same_amounts(before)) else { return Ok(None) };
+        self.nuisance.columns_mm.columns_mut(RIGID, anew.columns_mm.ncols()).copy_from(&anew.columns_mm);
+        self.shape = Some(anew);
+        self.at(&here.log_parameters).map(Some)
+    }
+
     /// The most probable errors around a point.
     fn errors(&self, at: &Descent, measured: Process) -> Result<Evidence, ProblemError> {
         Ok(self.linear(at).with_discrepancy(measured).ok_or(EstimateError::Covariance)?)
@@ -149,7 +192,7 @@ pub(super) fn fit(
     errors: &CorrelatedErrors,
     prior: &[LogPrior],
     start: &[f64],
-    (instrument, shape): (Option<(&Instrument<'_>, usize)>, Option<&Shape<'_>>),
+    beside: Beside<'_>,
     settings: &EstimateSettings,
 ) -> Result<Fitted, ProblemError> {
     // What has not moved is not descended for: its evidence would be of no number.
@@ -170,23 +213,23 @@ pub(super) fn fit(
     let seen_mm = DVector::from_iterator(3 * seen_there.len(), seen_there.iter().flat_map(|(_, u)| *u));
     let moved = above_noise(&seen_mm, errors.noise);
     let nuisance = Nuisance::rigid(&rigid);
-    let shape = shape.filter(|_| moved).and_then(|shape| shape.columns(start, &places_mm));
+    let shape = beside.shape.filter(|_| moved).and_then(|shape| shape.columns(start, &places_mm));
     let nuisance = match &shape {
         Some(shape) => nuisance.with(&shape.columns_mm, shape.priors()),
         None => nuisance,
     };
     let prior: Vec<LogPrior> = prior.iter().chain(&nuisance.priors).cloned().collect();
     let amounts = nuisance.count();
-    let mut fit = Fit { body, places_mm, nuisance, shape, prior, own };
+    let mut fit = Fit { body, places_mm, nuisance, shape, beside, prior, own };
 
     let iterations = settings.iterations.min(ROUGH_ITERATIONS);
     let rough = EstimateSettings { decrement_tolerance: ROUGH, iterations, ..settings.clone() };
     let from: Vec<f64> = start.iter().copied().chain(std::iter::repeat_n(0.0, amounts)).collect();
     let start = fit.at(&from)?;
     // What has not moved says nothing of how the registration sees what moves, and a bound needs no minimum.
-    let instrument = instrument.filter(|(_, rounds)| moved && *rounds > 0);
+    let instrument = beside.instrument.filter(|(_, rounds)| moved && *rounds > 0);
     let mut descent = if moved {
-        fit.settle(start, errors.noise, &rough)?
+        fit.settle_with_shape(start, errors.noise, &rough)?
     } else {
         Descent { convergence: Convergence::NotSought, ..start }
     };
@@ -203,7 +246,7 @@ pub(super) fn fit(
             taken_out_rms_mm = root_mean_square(&differences(&seen, &corrected.nodes));
             fit.body.observe(Observation::Nodes(pick(&corrected.nodes)));
             taken_up = Some(corrected.taken_up);
-            descent = fit.settle(descent, errors.noise, &rough)?;
+            descent = fit.settle_with_shape(descent, errors.noise, &rough)?;
             shown = Some(known);
         }
     }
@@ -244,29 +287,6 @@ pub(super) fn fit(
         correlated: Some(findings),
         descent: Descent { linearisation: plain, ..descent },
     })
-}
-
-/// Whether what was seen moves by more than the measurement's noise, on the whole or, by three standard deviations, in more
-/// than one place of a hundred. The size of a smooth process is no measure of that: one longer than the head may have any.
-fn above_noise(seen_mm: &DVector<f64>, noise: Process) -> bool {
-    let on_the_whole = root_mean_square(seen_mm.as_slice()).is_some_and(|size| size > noise.sd_mm);
-    let far = CONTRADICTION_SD * 3f64.sqrt() * noise.sd_mm;
-    let places = seen_mm.as_slice().chunks(3);
-    let (all, beyond) = places.fold((0, 0), |(all, beyond), u| {
-        (all + 1, beyond + usize::from(u.iter().map(|v| v * v).sum::<f64>().sqrt() > far))
-    });
-    on_the_whole || 100 * beyond > all
-}
-
-/// The smallest multiple of what the body would do that [`above_noise`] takes for a movement; infinite where it does nothing.
-fn least_share_above_noise(pattern_mm: &DVector<f64>, noise: Process) -> f64 {
-    let on_the_whole = noise.sd_mm / root_mean_square(pattern_mm.as_slice()).unwrap_or(0.0);
-    let mut sizes: Vec<f64> =
-        pattern_mm.as_slice().chunks(3).map(|u| u.iter().map(|v| v * v).sum::<f64>().sqrt()).collect();
-    sizes.sort_by(|a, b| b.total_cmp(a));
-    // More than one of a hundred.
-    let place = sizes.get(sizes.len() / 100).copied().unwrap_or(0.0);
-    on_the_whole.min(CONTRADICTION_SD * 3f64.sqrt() * noise.sd_mm / place)
 }
 
 /// Root mean square distance between two states over the nodes that were seen, mm.
@@ -322,7 +342,7 @@ impl Fit<'_, '_> {
         // Model, any movement and none are held against the same: what was seen without the instrument's own error. As it was
         // seen that error would speak for a movement, and only the model would have been spared it.
         let seen_mm = flat(&|n| self.body.observed_nodes()[n].1);
-        let (rigid, precision) = (self.rigid(), self.rigid_precision());
+        let (rigid, precision, follows) = (self.rigid(), self.rigid_precision(), self.beside.rigid_follows);
         let [nothing, anything] = self.without_mechanics(&seen_mm, errors.noise)?;
         let model = evidence.log_evidence.max(exact.log_evidence);
         let odds = Odds {
@@ -342,25 +362,28 @@ impl Fit<'_, '_> {
         // Beside a shift, "noise alone" is the shift itself: then what was measured beforehand counts.
         let noise = if seen_at_all { errors.noise } else { nothing.unexplained.noise };
         let factor = Factor::new(&self.places_mm, &[noise]).ok_or(EstimateError::Covariance)?;
-        let columns = DMatrix::from_fn(rows, 1 + RIGID, |r, c| if c == 0 { pattern[r] } else { rigid[(r, c - 1)] });
-        let white = factor.whiten(&columns);
-        let target = factor.whiten(&DMatrix::from_column_slice(rows, 1, seen_mm.as_slice()));
-        let mut normal = white.transpose() * &white;
-        (0..RIGID).for_each(|k| normal[(1 + k, 1 + k)] += precision[k]);
+        // Where rigid registration follows the brain it takes up the rigid part of whatever moves, which says nothing then.
+        let (told, precision) =
+            if follows { (without_rigid(&pattern, &rigid), vec![0.0; RIGID]) } else { (pattern, precision) };
+        let size = share_of(&told, &seen_mm, &rigid, &precision, &factor);
         let largest_mm = pattern_mm.iter().map(|u| u.iter().map(|v| v * v).sum::<f64>().sqrt()).fold(0.0, f64::max);
-        let size = normal.cholesky().map(|normal| {
-            let share = normal.solve(&(white.transpose() * target))[(0, 0)];
-            (share, normal.inverse()[(0, 0)].sqrt())
-        });
         // What may pass for noise is not ruled out, however little of it the seen displacement looks like.
-        let passes_for_noise = least_share_above_noise(&pattern, errors.noise);
-        let largest_share =
-            size.filter(|_| !seen_at_all).map(|(share, sd)| passes_for_noise.max(share.max(0.0) + Z_95_ONE_SIDED * sd));
-        let changes = |s: &Vec<[f64; 3]>| pattern.dot(&flat(&|n| s[seen[n].0 as usize])) / pattern.norm_squared();
+        let passes_for_noise = least_share_above_noise(&told, errors.noise);
+        let largest_share = size
+            .filter(|_| !seen_at_all)
+            .map(|Share { share, sd }| passes_for_noise.max(share.max(0.0) + Z_95_ONE_SIDED * sd));
+        let changes = |s: &Vec<[f64; 3]>| told.dot(&flat(&|n| s[seen[n].0 as usize])) / told.norm_squared();
+        // What the shape makes of a size is the usual body's.
+        let in_question = self.beside.shape.filter(|_| largest_share.is_some());
+        let in_question = in_question.and_then(|shape| shape.columns(&at, &self.places_mm));
+        let of_shape_log_sd = in_question.as_ref().map_or(0.0, |shape| shape.log_sd_of_size(&told));
         let softest = largest_share.map_or_else(Vec::new, |share| {
             let slopes: Vec<f64> = sensitivities.iter().map(changes).collect();
-            softest(share, &at, &slopes, &self.prior[..self.own], &self.body.are_moduli())
+            softest(share, &at, &slopes, &self.prior[..self.own], &self.body.are_moduli(), of_shape_log_sd)
         });
+        // A shift of a size that is not ruled out, and was not seen, would not have been.
+        let not_ruled_out = largest_share.filter(|_| follows).unwrap_or(0.0);
+        let would_be_seen = |sd: f64| passes_for_noise.max(CONTRADICTION_SD * sd).max(not_ruled_out);
         let (remainder, of_shape) = descent.log_parameters[self.own..].split_at(RIGID);
         let remainder = rigid * DVector::from_column_slice(remainder);
         let residuals = &descent.linearisation.residuals_mm;
@@ -378,7 +401,10 @@ impl Fit<'_, '_> {
             measured_noise: errors.noise,
             odds,
             rigid_remainder_mm: rms(&remainder),
-            shape: self.shape.as_ref().map_or_else(ShapeFound::default, |shape| shape.found(of_shape)),
+            shape: ShapeFound {
+                unsolved: in_question.as_ref().or(self.shape.as_ref()).map_or(0, ShapeColumns::unsolved),
+                ..self.shape.as_ref().map_or_else(ShapeFound::default, |shape| shape.found(of_shape))
+            },
             softest,
             seen_mean_mm: std::array::from_fn(|axis| {
                 seen_mm.iter().skip(axis).step_by(3).sum::<f64>() / seen.len().max(1) as f64
@@ -391,7 +417,7 @@ impl Fit<'_, '_> {
                 } else {
                     0.0
                 },
-                would_be_seen_mm: size.map_or(0.0, |(_, sd)| largest_mm * passes_for_noise.max(CONTRADICTION_SD * sd)),
+                would_be_seen_mm: size.map_or(0.0, |Share { sd, .. }| largest_mm * would_be_seen(sd)),
                 largest_share,
             },
         })
@@ -400,20 +426,96 @@ impl Fit<'_, '_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{ShapeError, Shown, Unknown};
     use super::*;
-    use proptest::prelude::*;
+    use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::sample::Tissue;
+    use crate::fem::Scenario;
+    use std::iter::repeat_n;
 
-    proptest! {
-        #[test]
-        fn what_passes_for_noise_ends_where_movement_begins(
-            pattern in prop::collection::vec(-3.0..3.0f64, 6..900), one_place in 0.0..40.0f64, sd_mm in 0.05..0.5f64,
-        ) {
-            let mut pattern = DVector::from_vec(pattern[..pattern.len() / 3 * 3].to_vec());
-            pattern[0] += one_place;
-            let noise = Process { sd_mm, length_mm: 20.0 };
-            let share = least_share_above_noise(&pattern, noise);
-            prop_assert!(above_noise(&(&pattern * (share * (1.0 + 1e-9))), noise));
-            prop_assert!(!above_noise(&(&pattern * (share * (1.0 - 1e-9))), noise));
+    /// A block that is pushed from above, and what is estimated of it.
+    fn pushed() -> (Scenario, Vec<Unknown>) {
+        let settings = PhantomSettings {
+            tissues: 2,
+            two_tissue_force_n: [0.0, 0.0, -0.1],
+            fixed: vec!["base".to_owned()],
+            ..PhantomSettings::default()
+        };
+        (settings.scenario(), Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect())
+    }
+
+    /// The rigid registration of scans without a skull follows the brain: nothing is seen of what moves rigidly.
+    #[test]
+    fn what_rigid_registration_follows_counts_neither_for_what_would_be_seen_nor_for_how_stiff_a_brain_is() {
+        let (mesh, (scenario, unknowns)) = (block(4), pushed());
+        let usual = [1100f64.ln(); 2];
+        let prior: Vec<LogPrior> = unknowns.iter().map(|unknown| unknown.prior(usual[0], 0.4)).collect();
+        let body = |seen| Body::new(&mesh, &scenario, unknowns.clone(), 0.45, Observation::Nodes(seen)).unwrap();
+        let pattern = body(Vec::new()).equilibrium(&usual).unwrap().displacement_mm;
+        let rigid = RigidModes::new(mesh.nodes_mm(), 0.1).columns_mm;
+        let left =
+            |u: &[[f64; 3]]| without_rigid(&DVector::from_iterator(3 * u.len(), u.iter().flatten().copied()), &rigid);
+        let stripped = |u: &[[f64; 3]]| -> Vec<MovedNode> {
+            let left = left(u);
+            (0..u.len()).map(|n| (n as u32, [0, 1, 2].map(|a| left[3 * n + a]))).collect()
+        };
+        let instrument = |u: &[[f64; 3]]| Ok(Shown::from(stripped(u)));
+        let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
+        let errors = CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 1000 };
+        let passes_for_noise = least_share_above_noise(&left(&pattern), noise);
+        let largest_mm = pattern.iter().map(|u| u.iter().map(|v| v * v).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        for times in [0.3, 0.9, 0.99, 1.2, 1.5] {
+            let share = times * passes_for_noise;
+            let moved: Vec<[f64; 3]> = pattern.iter().map(|u| u.map(|v| share * v)).collect();
+            let beside = Beside { instrument: Some((&instrument, 1)), shape: None, rigid_follows: true };
+            let mut body = body(stripped(&moved));
+            let found = fit(&mut body, &errors, &prior, &usual, beside, &EstimateSettings::default()).unwrap();
+            let found = found.correlated.unwrap();
+            assert!(!found.shift.seen || times > 1.0, "{times}: {:?}", found.shift);
+            if found.shift.seen {
+                continue;
+            }
+            assert!(share * largest_mm <= found.shift.would_be_seen_mm, "{times}: {share} {:?}", found.shift);
+            for bound in &found.softest {
+                let log_pa = bound.unwrap().log_bound(0.0);
+                assert!(log_pa <= usual[0] - share.ln(), "{times}: {log_pa} {share}");
+            }
         }
+    }
+
+    #[test]
+    fn what_the_shape_does_is_found_anew_where_the_descent_has_come_to_another_body() {
+        let (mesh, (scenario, unknowns)) = (block(4), pushed());
+        let error = ShapeError { outline_mm: 0.5, ..ShapeError::default() };
+        let shape = Shape { mesh: &mesh, template: &scenario, unknowns: &unknowns, poisson_ratio: 0.45, error };
+        let seen: Vec<MovedNode> = (0..mesh.nodes_mm().len() as u32).step_by(5).map(|n| (n, [0.0; 3])).collect();
+        let places_mm: Vec<[f64; 3]> = seen.iter().map(|(n, _)| mesh.nodes_mm()[*n as usize]).collect();
+        let mut body = Body::new(&mesh, &scenario, unknowns.clone(), 0.45, Observation::Nodes(seen)).unwrap();
+        let of = |pa: f64| shape.columns(&[pa.ln(); 2], &places_mm).unwrap();
+        let (stiff, soft) = (of(4000.0), of(1100.0).columns_mm);
+        let nuisance = Nuisance::rigid(&RigidModes::new(&places_mm, 0.1)).with(&stiff.columns_mm, stiff.priors());
+        let own = unknowns.iter().map(|unknown| unknown.prior(7.0, 0.4));
+        let mut fit = Fit {
+            prior: own.chain(nuisance.priors.clone()).collect(),
+            body: &mut body,
+            places_mm: places_mm.clone(),
+            nuisance,
+            shape: Some(stiff),
+            beside: Beside { shape: Some(&shape), ..Beside::default() },
+            own: 2,
+        };
+        let before = fit.nuisance.clone();
+        let at = |pa: f64| -> Vec<f64> { repeat_n(pa.ln(), 2).chain(repeat_n(0.1, before.count())).collect() };
+        let near = fit.at(&at(3000.0)).unwrap();
+        assert!(fit.shape_found_anew(&near).unwrap().is_none());
+        assert_eq!(fit.nuisance.columns_mm, before.columns_mm);
+        let far = fit.at(&at(1100.0)).unwrap();
+        let again = fit.shape_found_anew(&far).unwrap().unwrap();
+        assert_eq!(again.log_parameters, far.log_parameters);
+        assert_eq!(again.linearisation.jacobian_mm.columns(2 + RIGID, soft.ncols()), soft);
+        assert_eq!(fit.nuisance.columns_mm.columns(0, RIGID), before.columns_mm.columns(0, RIGID));
+        assert!(soft.norm() > 2.0 * before.columns_mm.columns(RIGID, soft.ncols()).norm());
+        // Of this body it is known now.
+        assert!(fit.shape_found_anew(&again).unwrap().is_none());
     }
 }

@@ -82,7 +82,8 @@ pub struct Shift {
     /// Share of it that the model explains; zero where nothing was seen to move.
     pub explained_share: f64,
     /// The shift, at its largest place, that would have been seen, mm: three standard deviations of its size, and more than
-    /// passes for the measurement's noise.
+    /// passes for the measurement's noise. Where rigid registration follows the brain, by what is left of a movement without its
+    /// rigid part, and no less than the size that what was seen does not rule out.
     pub would_be_seen_mm: f64,
     /// Where nothing was seen to move: largest size (95 %, one-sided, and no less than passes for noise) of what the prior's
     /// most probable body would do under the load, as a share of it.

@@ -31,6 +31,7 @@ mod solve;
 mod spread;
 mod support_edge;
 mod unknown;
+mod unseen;
 mod verdict_of_fit;
 
 pub use body::{Body, BodyError, Observation, Solved, material};

@@ -40,10 +40,14 @@ pub struct Problem<'a> {
     pub model_log_sd: f64,
     /// Standard deviation of ln(modulus) that labels and supports add; 0 for a body known exactly.
     pub body_log_sd: f64,
-    /// How far its shape may be off; only taken where there is a coarser mesh to find out what that does.
+    /// How far its shape may be off; only taken where there is a coarser mesh to find out what that does, and told to be taken as exact
+    /// where there is none.
     pub shape: ShapeError,
     /// The same body in a coarser mesh: what mesh, element and shape add is found from it, case by case.
     pub coarser: Option<&'a TetMesh>,
+    /// Whether the rigid half of what measures displacements follows the brain, as where a scan shows no skull: then nothing is seen
+    /// of what moves rigidly.
+    pub rigid_follows: bool,
     /// Whether body and load are known exactly (a phantom's): then nothing is held against what is known of tissue.
     pub body_known: bool,
     /// Where to start; the prior's mean when empty.
@@ -72,9 +76,90 @@ impl<'a> Problem<'a> {
             body_log_sd: 0.0,
             shape: ShapeError::default(),
             coarser: None,
+            rigid_follows: false,
             body_known: true,
             start: Vec::new(),
             instrument: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::estimate::{Estimate, EstimateSettings, Process, solve_problem};
+    use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::sample::Tissue;
+    use crate::experiment::sweep::scenario_of;
+    use crate::experiment::verdict::{Claim, Finding, Reason};
+    use crate::fem::simulate;
+
+    const SHAPE: ShapeError = ShapeError { outline_mm: 1.0, falx_mm: 0.0, support_edges_mm: 0.0 };
+
+    fn settings() -> PhantomSettings {
+        PhantomSettings {
+            tissues: 2,
+            two_tissue_force_n: [0.0, 0.0, -0.1],
+            fixed: vec!["base".to_owned()],
+            ..PhantomSettings::default()
+        }
+    }
+
+    fn known(mean_pa: f64, sd: f64) -> Vec<(Unknown, LogPrior)> {
+        let unknowns = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus);
+        unknowns.map(|unknown| (unknown.clone(), unknown.prior(mean_pa.ln(), sd))).collect()
+    }
+
+    fn taken_as_exact(found: &Estimate) -> Option<usize> {
+        found.outcome.verdict.reasons.iter().find_map(|reason| match reason {
+            Reason::ShapeTakenAsExact { amounts } => Some(*amounts),
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn a_shape_without_a_mesh_to_find_out_what_it_does_is_told_to_be_taken_as_exact() {
+        let (mesh, settings) = (block(4), settings());
+        let scenario = settings.scenario();
+        let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
+        let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
+        let told = |shape| {
+            let nodes = u.iter().enumerate().map(|(n, u)| (n as u32, *u)).collect();
+            let seen = (Observation::Nodes(nodes), Errors::Independent { share: 1.0 });
+            let start = vec![2299f64.ln(), 1195f64.ln()];
+            let problem = Problem { shape, start, ..Problem::new(&mesh, &scenario, known(1100.0, 2.0), 0.45, seen) };
+            let precise = EstimateSettings { noise_mm: 1e-3, ..EstimateSettings::default() };
+            let found = solve_problem(problem, &precise).unwrap();
+            assert!(found.outcome.verdict.finding.has_stiffness(), "{:?}", found.outcome.verdict);
+            taken_as_exact(&found)
+        };
+        assert_eq!([told(ShapeError::default()), told(SHAPE)], [None, Some(4)]);
+    }
+
+    #[test]
+    fn bounds_without_a_shift_leave_room_for_the_shape_or_say_that_they_do_not() {
+        let (mesh, coarse, scenario) = (block(4), block(3), settings().scenario());
+        let bounds = |shape, coarser| {
+            // Less than the noise.
+            let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.01 * v);
+            let nodes = mesh.nodes_mm().iter().enumerate().map(|(n, x)| (n as u32, wave(x))).collect();
+            let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
+            let errors = CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 };
+            let seen = (Observation::Nodes(nodes), Errors::Correlated(errors));
+            let posed = Problem::new(&mesh, &scenario, known(1100.0, 0.4), 0.45, seen);
+            let problem = Problem { shape, coarser, body_known: false, ..posed };
+            let found = solve_problem(problem, &EstimateSettings::default()).unwrap();
+            assert_eq!(found.outcome.verdict.finding, Finding::NoShift, "{:?}", found.outcome.verdict);
+            let bound = |(_, claim): &(String, Claim)| match claim {
+                Claim::Above { bound_pa } => *bound_pa,
+                other => panic!("{other:?}"),
+            };
+            let all: Vec<f64> = found.outcome.verdict.moduli.iter().map(bound).collect();
+            (all, taken_as_exact(&found))
+        };
+        let (exact, none) = bounds(ShapeError::default(), Some(&coarse));
+        let (unknown, found) = bounds(SHAPE, Some(&coarse));
+        assert!(exact.iter().zip(&unknown).all(|(exact, unknown)| unknown < exact), "{exact:?} {unknown:?}");
+        assert_eq!([none, found, bounds(SHAPE, None).1], [None, None, Some(4)]);
     }
 }

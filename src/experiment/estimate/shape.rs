@@ -18,7 +18,7 @@ use super::{LogPrior, Scale};
 use crate::fem::Scenario;
 use crate::mesh::TetMesh;
 use crate::tag::BASE;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 /// Where an amount is counted: everywhere the same, or what changes along an axis of the frame.
@@ -35,6 +35,9 @@ pub type EdgeAmounts = [f64; 2];
 
 /// How many steps are tried at most: to either side, halved after both.
 const TRIES: i32 = 12;
+
+/// A modulus that is so many times another one moves a body by another amount than what was found of that.
+const ANOTHER_BODY: f64 = 1.5;
 
 /// A part of the body that may lie elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,11 +127,37 @@ pub struct ShapeColumns {
     unsolved: usize,
     amounts: Vec<Amount>,
     sd_mm: Vec<f64>,
+    /// The body's parameters that this was found at.
+    at: Vec<f64>,
     /// Three rows a place, a column an amount: per mm of it.
     pub columns_mm: DMatrix<f64>,
 }
 
 impl ShapeColumns {
+    /// Whether a body of these parameters is another one than this was found for. A body half as stiff moves twice as far, and so
+    /// does what its shape makes of that.
+    pub fn is_of_another_body(&self, parameters: &[f64], are_moduli: &[bool]) -> bool {
+        let apart = self.at.iter().zip(parameters).zip(are_moduli);
+        apart.into_iter().any(|((at, now), is)| *is && (now - at).abs() > ANOTHER_BODY.ln())
+    }
+
+    /// Whether it is of the same amounts.
+    pub fn of_same_amounts(&self, other: &Self) -> bool {
+        self.amounts == other.amounts
+    }
+
+    /// How many amounts nobody knows the effect of.
+    pub fn unsolved(&self) -> usize {
+        self.unsolved
+    }
+
+    /// What the amounts make of the logarithm of a pattern's size, one standard deviation.
+    pub fn log_sd_of_size(&self, pattern_mm: &DVector<f64>) -> f64 {
+        let square = pattern_mm.norm_squared();
+        let columns = self.columns_mm.column_iter().zip(&self.sd_mm);
+        columns.map(|(column, sd)| (pattern_mm.dot(&column) / square * sd).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// What is known of the amounts beforehand, in mm.
     pub fn priors(&self) -> impl Iterator<Item = LogPrior> {
         self.amounts.iter().zip(&self.sd_mm).map(|(amount, sd)| LogPrior {
@@ -159,7 +188,46 @@ impl ShapeColumns {
     }
 }
 
+/// The parts of a body that may lie elsewhere, where it has them.
+struct Parts {
+    surface: Option<Surface>,
+    sheet: Option<Sheet>,
+    falx_edge: Option<SupportEdge>,
+    base_edge: Option<SupportEdge>,
+}
+
+impl Parts {
+    /// What may be off of them.
+    fn amounts(&self) -> Vec<Amount> {
+        let there = |part: &Part| match part {
+            Part::Outline => self.surface.is_some(),
+            Part::Falx => self.sheet.is_some(),
+            Part::FalxEdge => self.falx_edge.is_some(),
+            Part::BaseEdge => self.base_edge.is_some(),
+        };
+        let parts = Part::ALL.into_iter().filter(there);
+        parts.flat_map(|part| part.axes().iter().map(move |axis| Amount(part, *axis))).collect()
+    }
+}
+
 impl Shape<'_> {
+    fn parts(&self) -> Parts {
+        let ShapeError { outline_mm, falx_mm, support_edges_mm } = self.error;
+        // On a brain that slides they told nothing (docs/evidence/estimate.md).
+        let edges = support_edges_mm > 0.0 && self.template.fixed.iter().any(|set| set == BASE);
+        Parts {
+            surface: (outline_mm > 0.0).then(|| Surface::new(self.mesh)).flatten(),
+            sheet: (falx_mm > 0.0).then(|| Sheet::new(self.mesh)).flatten(),
+            falx_edge: edges.then(|| SupportEdge::of_falx(self.mesh)).flatten(),
+            base_edge: edges.then(|| SupportEdge::of_base(self.mesh)).flatten(),
+        }
+    }
+
+    /// How many amounts may be off.
+    pub fn amounts(&self) -> usize {
+        self.parts().amounts().len()
+    }
+
     /// What the amounts do to the places at these parameters; `None` where nothing may be off. Amounts with which the body has no
     /// equilibrium are left out, and counted.
     pub fn columns(&self, parameters: &[f64], places_mm: &[[f64; 3]]) -> Option<ShapeColumns> {
@@ -170,21 +238,8 @@ impl Shape<'_> {
             Some(at_places(mesh, &found.displacement_mm, places_mm))
         };
         let ShapeError { outline_mm, falx_mm, support_edges_mm } = self.error;
-        // On a brain that slides they told nothing (docs/evidence/estimate.md).
-        let edges = support_edges_mm > 0.0 && self.template.fixed.iter().any(|set| set == BASE);
-        let surface = (outline_mm > 0.0).then(|| Surface::new(self.mesh)).flatten();
-        let sheet = (falx_mm > 0.0).then(|| Sheet::new(self.mesh)).flatten();
-        let falx_edge = edges.then(|| SupportEdge::of_falx(self.mesh)).flatten();
-        let base_edge = edges.then(|| SupportEdge::of_base(self.mesh)).flatten();
-        let there = |part: &Part| match part {
-            Part::Outline => surface.is_some(),
-            Part::Falx => sheet.is_some(),
-            Part::FalxEdge => falx_edge.is_some(),
-            Part::BaseEdge => base_edge.is_some(),
-        };
-        let parts = Part::ALL.into_iter().filter(there);
-        let amounts: Vec<Amount> =
-            parts.flat_map(|part| part.axes().iter().map(move |axis| Amount(part, *axis))).collect();
+        let parts = self.parts();
+        let amounts = parts.amounts();
         if amounts.is_empty() {
             return None;
         }
@@ -196,10 +251,10 @@ impl Shape<'_> {
         let moved = |Amount(part, axis): Amount, step_mm: f64| {
             let by_mm = |x| step_mm * share(axis, x);
             match part {
-                Part::Outline => surface.as_ref()?.moved(self.mesh, by_mm),
-                Part::Falx => sheet.as_ref()?.moved(self.mesh, by_mm),
-                Part::FalxEdge => falx_edge.as_ref()?.moved(self.mesh, by_mm),
-                Part::BaseEdge => base_edge.as_ref()?.moved(self.mesh, by_mm),
+                Part::Outline => parts.surface.as_ref()?.moved(self.mesh, by_mm),
+                Part::Falx => parts.sheet.as_ref()?.moved(self.mesh, by_mm),
+                Part::FalxEdge => parts.falx_edge.as_ref()?.moved(self.mesh, by_mm),
+                Part::BaseEdge => parts.base_edge.as_ref()?.moved(self.mesh, by_mm),
             }
         };
         let sd_of = |amount: &Amount| match amount.0 {
@@ -218,10 +273,10 @@ impl Shape<'_> {
             || at(self.mesh),
             || amounts.par_iter().map(|amount| Some((*amount, moved_by(amount)?))).collect::<Vec<_>>(),
         );
-        let all = amounts.len();
+        let (all, at) = (amounts.len(), parameters.to_vec());
         let Some(still) = still else {
             let columns_mm = DMatrix::zeros(3 * places_mm.len(), 0);
-            return Some(ShapeColumns { unsolved: all, amounts: Vec::new(), sd_mm: Vec::new(), columns_mm });
+            return Some(ShapeColumns { unsolved: all, amounts: Vec::new(), sd_mm: Vec::new(), at, columns_mm });
         };
         let (amounts, found): (Vec<Amount>, Vec<_>) = moved.into_iter().flatten().unzip();
         let columns_mm = DMatrix::from_fn(3 * places_mm.len(), amounts.len(), |row, k| {
@@ -229,7 +284,7 @@ impl Shape<'_> {
             (there[row / 3][row % 3] - still[row / 3][row % 3]) / step_mm
         });
         let unsolved = all - amounts.len();
-        Some(ShapeColumns { unsolved, sd_mm: amounts.iter().map(sd_of).collect(), amounts, columns_mm })
+        Some(ShapeColumns { unsolved, sd_mm: amounts.iter().map(sd_of).collect(), amounts, at, columns_mm })
     }
 }
 
@@ -332,6 +387,26 @@ mod tests {
         let found = both.found(&[1.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         assert_eq!((found.outline, found.falx), (Some([1.0, 0.0, 3.0, 4.0]), Some([5.0, 6.0, 7.0])));
         assert_eq!(found.unsolved, 1);
+    }
+
+    #[test]
+    fn what_the_shape_does_is_of_another_body_from_half_as_stiff_again_on_whatever_else_has_changed() {
+        let found = hung(ShapeError { falx_mm: 1.0, ..ShapeError::default() }).1.unwrap();
+        let apart = |grey: f64, other: f64, are_moduli: [bool; 2]| {
+            found.is_of_another_body(&[(1370.0 * grey).ln(), (990.0 * other).ln()], &are_moduli)
+        };
+        assert!(!apart(1.4, 0.7, [true, true]) && !apart(1.0, 5.0, [true, false]));
+        assert!(apart(1.6, 1.0, [true, true]) && apart(1.0, 0.6, [true, true]));
+    }
+
+    #[test]
+    fn amounts_that_nobody_knows_of_add_in_the_square_to_what_is_not_known_of_a_size() {
+        let mut found = hung(ShapeError { falx_mm: 2.0, ..ShapeError::default() }).1.unwrap();
+        let pattern = DVector::from_vec(vec![0.0, 0.1, -0.4, 0.0, 0.2, -0.3]);
+        // Per mm a twentieth more of it, a tenth less, and nothing that is like it.
+        let across = DVector::from_vec(vec![7.0, 0.0, 0.0, 3.0, 0.0, 0.0]);
+        found.columns_mm = DMatrix::from_columns(&[&pattern * 0.05, &pattern * -0.1, across]);
+        assert!((found.log_sd_of_size(&pattern) - 0.1f64.hypot(0.2)).abs() < 1e-12);
     }
 
     #[test]

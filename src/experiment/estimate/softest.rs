@@ -24,20 +24,22 @@ impl Softest {
 ///
 /// A body of linear stiffness moves as 1 / modulus if all its tissues are stiffer alike. Of a single one less is known: the others
 /// may be stiffer than the prior has them beside it, and other unknowns (the load, the room at the skull) may be such that everything
-/// moves less. Each is taken at its one-sided 95 %. `slopes` is d ln(displacement) / d parameter.
+/// moves less. Each is taken at its one-sided 95 %. `slopes` is d ln(displacement) / d parameter, `of_shape` what the body's shape may
+/// make of that logarithm, one standard deviation.
 pub(super) fn softest(
     share: f64,
     at: &[f64],
     slopes: &[f64],
     prior: &[LogPrior],
     are_moduli: &[bool],
+    of_shape: f64,
 ) -> Vec<Option<Softest>> {
     let sd = |n: usize| prior[n].sd.unwrap_or(f64::INFINITY);
     // The part of the displacement that goes with each tissue's compliance.
     let part: Vec<f64> = slopes.iter().zip(are_moduli).map(|(s, is)| if *is { (-s).max(0.0) } else { 0.0 }).collect();
     let whole: f64 = part.iter().sum();
     let others = slopes.iter().zip(are_moduli).enumerate().filter(|(_, (slope, is))| !**is && **slope != 0.0);
-    let spread = others.map(|(n, (slope, _))| (slope * sd(n)).powi(2)).sum::<f64>().sqrt();
+    let spread = others.map(|(n, (slope, _))| (slope * sd(n)).powi(2)).sum::<f64>().sqrt().hypot(of_shape);
     let apart = |n: usize, other: usize| {
         let together = prior_correlation(prior, n, other);
         let both = if together == 0.0 { 0.0 } else { 2.0 * together * sd(n) * sd(other) };
@@ -62,7 +64,7 @@ mod tests {
 
     /// Bounds of a body that is what it is taken to be.
     fn softest(share: f64, at: &[f64], slopes: &[f64], prior: &[LogPrior], are_moduli: &[bool]) -> Vec<Option<f64>> {
-        let found = super::softest(share, at, slopes, prior, are_moduli).into_iter();
+        let found = super::softest(share, at, slopes, prior, are_moduli, 0.0).into_iter();
         found.map(|bound| bound.map(|bound| bound.log_bound(0.0))).collect()
     }
 
@@ -70,11 +72,21 @@ mod tests {
     fn what_labels_and_mesh_may_be_off_bounds_less() {
         let bound = |sd, error: f64| {
             let priors = [prior(0.5, vec![]), prior(sd, vec![])];
-            let found = super::softest(0.25, &[7.0, 4.6], &[-1.0, 1.0], &priors, &[true, false]);
+            let found = super::softest(0.25, &[7.0, 4.6], &[-1.0, 1.0], &priors, &[true, false], 0.0);
             found[0].unwrap().log_bound(error)
         };
         assert!((bound(0.0, 0.2) - bound(0.0, 0.0) + Z_95_ONE_SIDED * 0.2).abs() < 1e-12);
         // Beside a load that is not known it adds in the square.
+        assert!((bound(0.3, 0.4) - bound(0.0, 0.5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_shape_with_which_it_may_all_move_less_bounds_less() {
+        let bound = |of_shape, error: f64| {
+            let found = super::softest(0.25, &[7.0], &[-1.0], &[prior(0.5, vec![])], &[true], of_shape);
+            found[0].unwrap().log_bound(error)
+        };
+        assert!((bound(0.0, 0.0) - bound(0.2, 0.0) - Z_95_ONE_SIDED * 0.2).abs() < 1e-12);
         assert!((bound(0.3, 0.4) - bound(0.0, 0.5)).abs() < 1e-12);
     }
 

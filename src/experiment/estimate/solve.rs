@@ -1,7 +1,7 @@
 //! From a posed problem to the estimate that is reported.
 
 use super::body::{Body, Observation, Solved};
-use super::correlated;
+use super::correlated::{self, Beside};
 use super::findings::ProblemError;
 use super::fluid::FluidOutcome;
 use super::independent::fit_independent;
@@ -48,17 +48,19 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         body = body.within(AS_SEEN, AS_SEEN);
     }
     let start = body.start(&start);
-    let shape = problem.coarser.map(|mesh| Shape {
-        mesh,
+    let shape = Shape {
+        mesh: problem.coarser.unwrap_or(problem.mesh),
         template: problem.template,
         unknowns: &unknown,
         poisson_ratio: problem.poisson_ratio,
         error: problem.shape,
-    });
+    };
+    let known = problem.coarser.map(|_| &shape);
     let fitted = match &problem.errors {
         Errors::Correlated(errors) => {
-            let others = (problem.instrument, shape.as_ref());
-            correlated::fit(&mut body, errors, &prior, &start, others, settings)?
+            let Problem { instrument, rigid_follows, .. } = problem;
+            let beside = Beside { instrument, shape: known, rigid_follows };
+            correlated::fit(&mut body, errors, &prior, &start, beside, settings)?
         }
         Errors::Independent { share } => {
             fit_independent(&mut body, *share, &prior, &start, problem.instrument, settings)?
@@ -104,11 +106,13 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         }
         _ => posterior,
     });
+    let unsolved = known.and(fitted.correlated.as_ref()).map(|found| found.shape.unsolved);
     let posed = Posed {
         prior: &prior,
         tissues: &tissues,
         assumed,
         model_error: &model_error,
+        shape_as_exact: unsolved.unwrap_or_else(|| shape.amounts()),
         gravity_m_per_s2: problem.template.loads.gravity_m_per_s2,
         body_known: problem.body_known,
     };

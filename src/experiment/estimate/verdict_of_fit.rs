@@ -20,6 +20,8 @@ pub(super) struct Posed<'a> {
     pub assumed: Option<Reason>,
     /// What labels, supports and mesh make wrong of the logarithm of each parameter, one standard deviation.
     pub model_error: &'a [f64],
+    /// How many amounts by which the body's shape may be off were left out: nobody knows what they do.
+    pub shape_as_exact: usize,
     /// Gravity as assumed, m/s2.
     pub gravity_m_per_s2: [f64; 3],
     /// Whether load and supports are known, as a phantom's are: then nothing contradicts them.
@@ -33,7 +35,7 @@ pub(super) fn verdict_of_fit(
     posterior: &Posterior,
     posed: &Posed<'_>,
 ) -> Verdict {
-    let Posed { prior, tissues, ref assumed, model_error, gravity_m_per_s2, body_known } = *posed;
+    let Posed { prior, tissues, ref assumed, model_error, shape_as_exact, gravity_m_per_s2, body_known } = *posed;
     let mut unexplained = Vec::new();
     let mut still = None;
     let mut share = None;
@@ -110,7 +112,7 @@ pub(super) fn verdict_of_fit(
         }
         _ => Claim::Withheld,
     };
-    let moduli = named().map(|(n, tissue)| (tissue, answer(n))).collect();
+    let moduli: Vec<(String, Claim)> = named().map(|(n, tissue)| (tissue, answer(n))).collect();
     // Of what has not moved there is nothing to be explained, well or badly.
     let mut reasons: Vec<Reason> = match still {
         Some(still) => vec![still],
@@ -126,8 +128,10 @@ pub(super) fn verdict_of_fit(
     }
     if finding.has_stiffness() {
         reasons.extend(assumed.clone());
-        let unsolved = fitted.correlated.as_ref().map_or(0, |found| found.shape.unsolved);
-        reasons.extend((unsolved > 0).then_some(Reason::ShapeTakenAsExact { amounts: unsolved }));
+    }
+    // A bound leaves room for the shape as an interval does.
+    if shape_as_exact > 0 && moduli.iter().any(|(_, claim)| *claim != Claim::Withheld) {
+        reasons.push(Reason::ShapeTakenAsExact { amounts: shape_as_exact });
     }
     Verdict::new(finding, share, moduli, reasons)
 }

@@ -134,15 +134,19 @@ impl HeldBody {
 
     /// The same body with its cortex stuck to the skull where it faces down.
     pub fn stuck(&self) -> Self {
-        let gravity = self.scenario.loads.gravity_m_per_s2;
-        let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
         Self {
             settings: self.settings.clone(),
-            mesh: with_stuck_set(self.mesh.clone(), &skull, gravity),
+            mesh: self.stuck_mesh(self.mesh.clone()),
             reference: self.reference.clone(),
             levels: self.levels.clone(),
             scenario: with_stuck_cortex(&self.scenario),
         }
+    }
+
+    /// A mesh of it with what sticks to the skull then.
+    fn stuck_mesh(&self, mesh: TetMesh) -> TetMesh {
+        let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
+        with_stuck_set(mesh, &skull, self.scenario.loads.gravity_m_per_s2)
     }
 
     /// What it assumes, in words.
@@ -190,6 +194,13 @@ pub(crate) struct EstimateInput<'a> {
     pub rigid_error_mm: f64,
     /// The ventricles' volume on the scans, before and after, cm3.
     pub ventricles_cc: Option<[f64; 2]>,
+}
+
+impl EstimateInput<'_> {
+    /// Whether rigid registration has followed the brain: it does where a scan shows no skull.
+    fn rigid_follows(&self) -> bool {
+        self.shift.is_some_and(|shift| !shift.registration().skull_is_shown)
+    }
 }
 
 /// The stage with its settings and inputs.
@@ -358,6 +369,7 @@ impl Bodies {
         let (_, errors, noise_mm) = self.observation(body, input, options);
         let nodes = options.displacement.observed(bare, |x| moved_by(&shift.seen, x));
         let problem = Problem {
+            rigid_follows: input.rigid_follows(),
             body_known: !matches!(body.reference, Reference::Surfaces(_)),
             ..Problem::new(&coarse, &scenario, unknowns, input.poisson_ratio, (Observation::Nodes(nodes), errors))
         };
@@ -395,6 +407,7 @@ impl Bodies {
             body_log_sd: if patient { body.log_sd(options) } else { 0.0 },
             shape: if patient { options.shape_error() } else { ShapeError::default() },
             coarser: coarser.as_ref(),
+            rigid_follows: input.rigid_follows(),
             body_known: !patient,
             start: rough.map_or_else(Vec::new, |found| found.numbers),
             instrument: instrument.as_ref().map(|show| (show as &Instrument<'_>, believed.re_registrations)),
@@ -420,10 +433,14 @@ impl Bodies {
         let (unknowns, scenario) = Self::posed(work, &body, tissues, prior)?;
         let (_, errors, noise_mm) = self.observation(&body, input, options);
         let seen = (Observation::Nodes(seen.to_vec()), errors);
+        let coarser = self.coarser_of(&body)?.map(|mesh| body.stuck_mesh(mesh));
         let problem = Problem {
             body_known: false,
             model_log_sd: options.model_log_sd,
             body_log_sd: body.log_sd(options),
+            shape: options.shape_error(),
+            coarser: coarser.as_ref(),
+            rigid_follows: input.rigid_follows(),
             ..Problem::new(&body.mesh, &scenario, unknowns, input.poisson_ratio, seen)
         };
         let settings = EstimateSettings { noise_mm, ..options.descent.clone() };
