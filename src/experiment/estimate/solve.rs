@@ -58,8 +58,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     let known = problem.coarser.map(|_| &shape);
     let fitted = match &problem.errors {
         Errors::Correlated(errors) => {
-            let Problem { instrument, rigid_follows, .. } = problem;
-            let beside = Beside { instrument, shape: known, rigid_follows };
+            let beside = Beside { instrument: problem.instrument, shape: known, rigid_follows: problem.rigid_follows };
             correlated::fit(&mut body, errors, &prior, &start, beside, settings)?
         }
         Errors::Independent { share } => {
@@ -79,8 +78,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         let nothing = Observation::Nodes(Vec::new());
         let there = Body::new(coarse, problem.template, unknown.clone(), problem.poisson_ratio, nothing)
             .and_then(|mut body| body.solve(&fitted.descent.log_parameters));
-        // A coarse mesh without an equilibrium, or a difference that nothing makes up for in numbers, says nothing of the finer
-        // mesh: then what is expected of meshes stands.
+        // Without an equilibrium on it, or a change that parameters make up for, what is expected of meshes stands.
         if let Ok(there) = there {
             let there = at_places(coarse, &there.outcome.displacement_mm, &found.places_mm);
             let change =
