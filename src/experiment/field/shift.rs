@@ -4,6 +4,7 @@ use super::harmonic::{Place, continued};
 use super::inverse::inverse;
 use super::jacobian::mended;
 use super::raster::{InTetrahedra, in_tetrahedra};
+use super::reach::reach_95;
 use super::settings::FieldSettings;
 use super::vectors::Cell;
 use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
@@ -26,7 +27,7 @@ pub struct Moved<'a> {
     pub displacement_mm: &'a [[f64; 3]],
     /// Standard deviation of each (root of the trace of its covariance), mm.
     pub sd_mm: &'a [f64],
-    /// The 95 % reach of each, mm.
+    /// The 95 % reach of each, mm: the size that 95 % of what it may have moved by do not exceed.
     pub reach95_mm: &'a [f64],
 }
 
@@ -92,7 +93,7 @@ pub fn shift_field(
             }
             let u = turned(seen(mni_from_pre.apply(grid.centre(grid.voxel(n))).mm.into()));
             (0..3).for_each(|a| value[a] = u[a] as f32);
-            value[4] = (length(&u) + 1.96 / 3f64.sqrt() * f64::from(value[3])) as f32;
+            value[4] = reach_95(length(&u), f64::from(value[3])) as f32;
         });
     }
     let brain = cut(&around.brain, first, &grid);
@@ -281,6 +282,13 @@ mod tests {
 
     /// A block of tissue in a larger head, moved as a function says, with a piece taken out.
     fn field(u: impl Fn([f64; 3]) -> [f64; 3]) -> (ShiftField, Surroundings) {
+        field_seen(u, None)
+    }
+
+    type Seen<'a> = Option<&'a (dyn Fn([f64; 3]) -> [f64; 3] + Sync)>;
+
+    /// The same where the images say what moved.
+    fn field_seen(u: impl Fn([f64; 3]) -> [f64; 3], seen: Seen<'_>) -> (ShiftField, Surroundings) {
         let mesh = block(6);
         let displacement: Vec<[f64; 3]> = mesh.nodes_mm().iter().map(|x| u(*x)).collect();
         let nodes = mesh.nodes_mm().len();
@@ -307,7 +315,19 @@ mod tests {
             sd_mm: &vec![0.5; nodes],
             reach95_mm: &vec![3.0; nodes],
         };
-        (shift_field(&state, None, &to_pre, &around, &FieldSettings::default()), around)
+        (shift_field(&state, seen, &to_pre, &around, &FieldSettings::default()), around)
+    }
+
+    #[test]
+    fn the_reach_of_what_is_seen_to_stay_is_that_of_an_error_in_every_direction() {
+        let (field, _) = field_seen(|_| [0.0; 3], Some(&|_| [0.0; 3]));
+        let inner = erode(&Mask::from_data(field.forward.grid, field.believed.clone()), 5.0);
+        assert!(inner.count() > 1000);
+        for (n, _) in inner.data.iter().enumerate().filter(|(_, b)| **b) {
+            // 2.795 standard deviations of a component.
+            let expected = 2.795_48 * 0.5 / 3f32.sqrt();
+            assert!((field.reach95_mm[n] - expected).abs() < 0.005, "{}", field.reach95_mm[n]);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::registration::transforms;
 use crate::experiment::depth::depth_mm;
 use crate::experiment::estimate::{CorrelatedErrors, EstimateOutcome, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
-    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused,
+    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused, reach_95,
     shift_field,
 };
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
@@ -54,6 +54,13 @@ struct Model {
     /// What the rigid registration follows of the state; `None` where it was never shown that, and its own error is in what was seen.
     taken_up: Option<RigidTransform<Mni, Mni>>,
     fused: OnceCell<Fused>,
+}
+
+impl Model {
+    /// An estimate at rest says that nothing was seen to move.
+    fn is_at_rest(&self) -> bool {
+        self.name == ESTIMATE && self.nodes.displacement_mm.iter().flatten().all(|u| *u == 0.0)
+    }
 }
 
 /// How far what the images show is believed.
@@ -250,6 +257,10 @@ impl<'a> CaseShift<'a> {
         let Nodes { displacement_mm, sd_mm, reach95_mm } = &model.nodes;
         // The spread of moduli is not the error of a field: what the model leaves of the seen displacement counts too.
         let found = self.put_right(model);
+        if model.is_at_rest() {
+            // No way is the shift's own there: its error is alike in all of them.
+            return self.field(&model.mesh, displacement_mm, (sd_mm, &reaches(displacement_mm, sd_mm)), None);
+        }
         if found.left.is_none() {
             return self.field(&model.mesh, displacement_mm, (sd_mm, reach95_mm), None);
         }
@@ -313,10 +324,8 @@ impl<'a> CaseShift<'a> {
     /// The model put right by what was seen.
     fn put_right<'m>(&self, model: &'m Model) -> &'m Fused {
         let Nodes { displacement_mm, sd_mm, .. } = &model.nodes;
-        // An estimate at rest says that nothing was seen to move.
-        let at_rest = model.name == ESTIMATE && displacement_mm.iter().flatten().all(|u| *u == 0.0);
         model.fused.get_or_init(|| {
-            if at_rest {
+            if model.is_at_rest() {
                 return Fused::at_rest(sd_mm, self.believed.errors.rigid_mm);
             }
             let seen = self.seen_nodes(model);
@@ -331,9 +340,9 @@ impl<'a> CaseShift<'a> {
     }
 }
 
-/// The 95 % reach of every node along its mean, of a spread that is alike in all directions, mm.
+/// The 95 % reach of every node, of a spread that is alike in all directions, mm.
 fn reaches(displacement_mm: &[[f64; 3]], sd_mm: &[f64]) -> Vec<f64> {
-    displacement_mm.iter().zip(sd_mm).map(|(u, sd)| length(u) + 1.96 / 3f64.sqrt() * sd).collect()
+    displacement_mm.iter().zip(sd_mm).map(|(u, sd)| reach_95(length(u), *sd)).collect()
 }
 
 fn length(u: &[f64; 3]) -> f64 {
