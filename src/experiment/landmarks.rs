@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The radius that holds 95 % of a Gaussian in three dimensions, in standard deviations of one component: the root of the
+/// The radius of the sphere that holds 95 % of a Gaussian alike in all three dimensions, in standard deviations of one component: the root of the
 /// chi-squared distribution's 95th percentile for three degrees of freedom.
 const RADIUS_95: f64 = 2.795_483_482_915_107_4;
 
@@ -48,7 +48,8 @@ pub struct StateErrors {
     pub median_mm: f64,
     /// 95th percentile of the error, mm.
     pub percentile_95_mm: f64,
-    /// Share of those with a predicted spread that lie inside their 95 % ellipsoid.
+    /// Share of those with a predicted spread that lie inside their 95 % sphere: the error is taken to be alike in all directions, a
+    /// component's standard deviation that of the landmark over the root of 3, and the radius is 2.795 of those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside_95_share: Option<f64>,
 }
@@ -130,7 +131,7 @@ mod tests {
     use crate::material::random::CounterRng;
 
     #[test]
-    fn errors_of_a_known_spread_lie_inside_their_ellipsoid_nineteen_times_in_twenty() {
+    fn errors_of_a_known_spread_lie_inside_their_sphere_nineteen_times_in_twenty() {
         let count = 4000;
         let gauss = |n: u64, a: u64| (0..12).map(|k| CounterRng::new(2, n).uniform(100 * a + k)).sum::<f64>() - 6.0;
         let found = vec![[1.0, 2.0, 3.0]; count];

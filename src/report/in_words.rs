@@ -29,7 +29,7 @@ pub fn warped(output: &Path, kind: &str, state: &str, points: Option<[usize; 3]>
 
 /// A row for each way of carrying landmarks, then one for each landmark.
 pub fn landmark_table(found: &Evaluation) -> String {
-    let mut text = String::from("carried by     landmarks  mean (mm)  median  95 %   inside 95 % ellipsoid\n");
+    let mut text = String::from("carried by     landmarks  mean (mm)  median  95 %   inside 95 % sphere\n");
     for s in &found.summary {
         let inside = s.inside_95_share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
         text += &format!(

@@ -108,7 +108,7 @@ fn explained(e: &Explained) -> String {
 }
 
 fn of_landmarks(found: &Evaluation) -> Markup {
-    let head = ["Carried by", "Landmarks", "Mean (mm)", "Median (mm)", "95 % below (mm)", "Inside 95 % ellipsoid"]
+    let head = ["Carried by", "Landmarks", "Mean (mm)", "Median (mm)", "95 % below (mm)", "Inside 95 % sphere"]
         .map(str::to_owned);
     let rows: Vec<Row> = found
         .summary
@@ -121,12 +121,22 @@ fn of_landmarks(found: &Evaluation) -> Markup {
             (false, words([s.state.clone(), s.landmarks.to_string()].into_iter().chain(figures).chain([inside])))
         })
         .collect();
-    html! { h3 { "Landmarks" } (table("Target registration error", &head, &rows)) }
+    html! {
+        h3 { "Landmarks" }
+        (table("Target registration error", &head, &rows))
+        @if found.summary.iter().any(|s| s.inside_95_share.is_some()) {
+            p {
+                "The sphere is the one that holds 95 % of an error of the predicted size where it is alike in all directions (2.795 \
+                 standard deviations of a component); an error that has a direction of its own is not looked at by it."
+            } "\n"
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::landmarks::StateErrors;
 
     fn state() -> StateShift {
         StateShift {
@@ -175,6 +185,24 @@ mod tests {
         assert!(said.contains("cannot be told") && !said.contains("not moved"), "{said}");
         let html = section(&of(none), None, None).into_string();
         assert_eq!(html.matches("<td>\u{2013}</td>").count(), 3, "{html}");
+    }
+
+    #[test]
+    fn landmarks_are_held_against_a_sphere_and_its_error_is_said_to_have_no_direction() {
+        let row = |inside_95_share| StateErrors {
+            state: "fused".to_owned(),
+            landmarks: 20,
+            mean_mm: 1.0,
+            median_mm: 1.0,
+            percentile_95_mm: 2.0,
+            inside_95_share,
+        };
+        let page = |inside| {
+            of_landmarks(&Evaluation { summary: vec![row(inside)], ..Evaluation::default() }).into_string()
+        };
+        let told = page(Some(0.9));
+        assert!(told.contains("Inside 95 % sphere") && told.contains("alike in all directions"), "{told}");
+        assert!(!told.contains("ellipsoid") && !page(None).contains("alike in all directions"));
     }
 
     #[test]
