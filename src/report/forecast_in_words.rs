@@ -47,10 +47,13 @@ pub fn evaluation_table(found: &PredictionEvaluation) -> String {
     for h in found.heads.iter().filter(|h| !h.landmark.is_empty()) {
         text += &format!("\nlandmark (head {})  lies in   seen (mm)  expected  SD     off by  inside 95 %\n", h.head);
         for l in &h.landmark {
-            let inside = if l.inside_95 { "yes" } else { "no" };
+            let dash = || "-".to_owned();
+            let inside = l.inside_95.map_or_else(dash, |inside| if inside { "yes" } else { "no" }.to_owned());
+            let [expected, sd, error] =
+                [l.expected_mm, l.sd_mm, l.error_mm].map(|x| x.map_or_else(dash, |x| format!("{x:.2}")));
             text += &format!(
-                "{:<22} {:<9} {:>9.2}  {:>8.2}  {:>5.2}  {:>6.2}  {inside}\n",
-                l.name, l.place, l.seen_mm, l.expected_mm, l.sd_mm, l.error_mm
+                "{:<22} {:<9} {:>9.2}  {expected:>8}  {sd:>5}  {error:>6}  {inside}\n",
+                l.name, l.place, l.seen_mm
             );
         }
     }
@@ -101,6 +104,8 @@ mod tests {
         for words in ["4.25", "landmarks", "tip", "without error", "7 places"] {
             assert!(text.contains(words), "{words}: {text}");
         }
+        let row = text.lines().find(|line| line.starts_with("tip")).unwrap();
+        assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["tip", "tissue", "0.00", "-", "-", "-", "-"], "{text}");
     }
 
     #[test]

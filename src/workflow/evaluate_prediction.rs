@@ -15,13 +15,17 @@ use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::landmarks::Evaluation;
 use crate::experiment::predict::{
     Compared, Found, HeadEvaluation, LandmarkForecast, Locator, Modes, OtherWayRound, Prediction, PredictionEvaluation,
-    Scatter, TakenAgainstPlan, TargetPlace, scores,
+    TakenAgainstPlan, TargetPlace, scores,
 };
 use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
 use crate::image::Mask;
-use crate::layout::{EVALUATION_JSON, NATIVE_RESECTED, PRE_NATIVE_BRAIN, PREDICTION_JSON};
+use crate::image::nifti::{ReadOptions, decode_labels};
+use crate::layout::{
+    EVALUATION_JSON, NATIVE_RESECTED, OUTCOME, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PREDICTION_JSON,
+};
 use crate::overlay::PointState;
 use crate::register::transform_text::rigid_from_text;
+use crate::segment::label::is_tissue;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -108,6 +112,7 @@ pub fn evaluate_prediction(folder: &Path, seen: &SeenAfterwards) -> Result<Predi
         let state = seen.state.as_deref().unwrap_or(OBSERVED);
         field = Some((state, Map::of_case(later, Some(state), WarpTo::Deformed, Part::Points)?.0));
         evaluation.against.push(state.to_owned());
+        evaluation.later_sha256 = sha256_hex(&later.read(OUTCOME)?);
         evaluation.taken = Some(taken_against_plan(&case, later)?);
     }
     evaluation.other_way_round = marked.as_ref().and_then(|marked| marked.other_way_round);
@@ -166,13 +171,23 @@ fn later_case(prediction: &Case, against: &Path) -> Result<Case, WorkflowError> 
     Ok(later)
 }
 
+/// Of the brain's tissue alone: what a plan marks outside it or in fluid can neither be taken nor be seen to be.
 fn taken_against_plan(prediction: &Case, later: &Case) -> Result<TakenAgainstPlan, WorkflowError> {
-    let grid = grid_of::<Pre>(prediction, PRE_NATIVE_BRAIN)?;
-    let planned: Mask<Pre> = mask_of(prediction, NATIVE_RESECTED, &grid)?;
-    let taken: Mask<Pre> = mask_of(later, NATIVE_RESECTED, &grid)?;
-    let cc = |voxels: usize| (voxels as f64 * grid.voxel_volume_mm3() / 1000.0 * 1e3).round() / 1e3;
-    let shared = planned.data.iter().zip(&taken.data).filter(|(a, b)| **a && **b).count();
-    Ok(TakenAgainstPlan::new(cc(planned.count()), cc(taken.count()), cc(shared)))
+    let (labels, _) =
+        decode_labels(&prediction.read(PRE_NATIVE_LABELS)?, PRE_NATIVE_LABELS, &ReadOptions::default())?;
+    let tissue: Mask<Pre> = labels.relabelled::<Pre>().map(is_tissue);
+    let grid = tissue.grid;
+    let of = |case: &Case| -> Result<Vec<bool>, WorkflowError> {
+        let mask: Mask<Pre> = mask_of(case, NATIVE_RESECTED, &grid)?;
+        Ok(mask.data.iter().zip(&tissue.data).map(|(marked, tissue)| *marked && *tissue).collect())
+    };
+    let (planned, taken) = (of(prediction)?, of(later)?);
+    let shared: Vec<bool> = planned.iter().zip(&taken).map(|(a, b)| *a && *b).collect();
+    let cc = |voxels: &[bool]| {
+        let count = voxels.iter().filter(|voxel| **voxel).count();
+        (count as f64 * grid.voxel_volume_mm3() / 1000.0 * 1e3).round() / 1e3
+    };
+    Ok(TakenAgainstPlan::new(cc(&planned), cc(&taken), cc(&shared)))
 }
 
 /// Landmarks in the frame of the scan before.
@@ -269,7 +284,9 @@ impl Foretold {
                 _ => (TargetPlace::Tissue.name(), true),
             };
             let seen = Seen { place, moved_mm: *moved_mm, sd_mm: 0.0 };
-            row.landmark.push(forecast_of(name, lies, &self.compared(&seen)));
+            // The nearest node is no forecast of what is taken or belongs to no brain.
+            let compared = counts.then(|| self.compared(&seen));
+            row.landmark.push(LandmarkForecast::of((name, lies), moved_mm, compared.as_ref()));
             if counts {
                 counted.push(seen);
             }
@@ -282,24 +299,43 @@ impl Foretold {
     }
 }
 
-fn forecast_of(name: &str, place: &str, compared: &Compared) -> LandmarkForecast {
-    let rounded = |x: f64| (x * 1e3).round() / 1e3 + 0.0;
-    let scatter = Scatter::of(&compared.draws);
-    let (mean, seen) = (Vector3::from(scatter.mean_mm()), Vector3::from(compared.seen_mm));
-    LandmarkForecast {
-        name: name.to_owned(),
-        place: place.to_owned(),
-        seen_mm: rounded(seen.norm()),
-        expected_mm: rounded(mean.norm()),
-        sd_mm: rounded(scatter.sd_mm()),
-        error_mm: rounded((mean - seen).norm()),
-        inside_95: scatter.distance(&compared.seen_mm) <= scatter.radius(0.95),
-    }
-}
-
 /// Displacements in another frame.
 fn turn(modes: &mut Modes, rotation: &UnitQuaternion<f64>) {
     for u in modes.modes_mm.iter_mut().flatten().chain(&mut modes.mean_mm) {
         *u = (rotation * Vector3::from(*u)).into();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::nifti::{encode_mask, encode_u8};
+    use crate::image::{Grid, LabelMap};
+    use crate::segment::label::{BACKGROUND, CSF, WHITE_MATTER};
+
+    #[test]
+    fn what_a_plan_marks_outside_the_tissue_is_neither_planned_nor_missed() {
+        let grid = Grid::<Pre>::axis_aligned([40; 3], [1.0; 3], [0.0; 3]);
+        let at = |n: usize| grid.voxel(n)[0];
+        let labels = LabelMap::from_fn(grid, |n| match at(n) {
+            0..10 => BACKGROUND,
+            10..14 => CSF,
+            _ => WHITE_MATTER,
+        });
+        // Drawn generously over the brain's edge, and taken exactly.
+        let planned = Mask::from_fn(grid, |n| (2..20).contains(&at(n)));
+        let taken = Mask::from_fn(grid, |n| (14..20).contains(&at(n)));
+        let folder = tempfile::tempdir().unwrap();
+        let case = |name: &str, mask: &Mask<Pre>| {
+            let case = Case::at(&folder.path().join(name));
+            for (file, bytes) in [(PRE_NATIVE_LABELS, encode_u8(&labels)), (NATIVE_RESECTED, encode_mask(mask))] {
+                std::fs::create_dir_all(case.path(file).parent().unwrap()).unwrap();
+                std::fs::write(case.path(file), bytes).unwrap();
+            }
+            case
+        };
+        let found = taken_against_plan(&case("plan", &planned), &case("case", &taken)).unwrap();
+        assert_eq!((found.planned_cc, found.taken_cc, found.dice), (9.6, 9.6, 1.0));
+        assert!(!found.is_other());
     }
 }

@@ -1,7 +1,9 @@
 //! A prediction against what was seen afterwards, as `sim/evaluation.json` keeps it.
 
-use super::score::Scores;
+use super::ellipsoid::Scatter;
+use super::score::{Compared, Scores};
 use crate::experiment::landmarks::fits_far_better;
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -12,6 +14,9 @@ use thiserror::Error;
 pub struct PredictionEvaluation {
     /// SHA-256 of the `sim/prediction.json` that was evaluated.
     pub prediction_sha256: String,
+    /// SHA-256 of the `sim/outcome.json` of the later case, as that was when this was made; empty without such a case.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub later_sha256: String,
     /// What it was compared with: `observed`, `fused` (states of the later case), `landmarks`.
     pub against: Vec<String>,
     /// What was taken against what was to be taken, where the later case says so.
@@ -54,18 +59,47 @@ pub struct HeadEvaluation {
 pub struct LandmarkForecast {
     /// Its name or number.
     pub name: String,
-    /// Where it lies: `tissue`, `fluid`, `removed`. What lies in tissue that was to be taken is listed and not counted.
+    /// Where it lies: `tissue`, `fluid`, `removed`, `outside`. What lies in tissue that was to be taken, or far from the brain, is listed
+    /// and not counted: nothing was foretold of it.
     pub place: String,
     /// How far it was seen to move, mm: its error where nothing is foretold.
     pub seen_mm: f64,
-    /// How far it was expected to move, mm.
-    pub expected_mm: f64,
+    /// How far it was expected to move, mm. This and what follows is absent where nothing was foretold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_mm: Option<f64>,
     /// Standard deviation of that (root of the trace of the covariance), mm.
-    pub sd_mm: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd_mm: Option<f64>,
     /// Distance between the two places, mm.
-    pub error_mm: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
     /// Whether it was seen inside the ellipsoid that holds 95 % of the draws.
-    pub inside_95: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside_95: Option<bool>,
+}
+
+impl LandmarkForecast {
+    /// A landmark (name, where it lies) that was seen to move so, mm, and what was foretold of it, where anything was.
+    pub fn of((name, place): (&str, &str), moved_mm: &[f64; 3], foretold: Option<&Compared>) -> Self {
+        let rounded = |x: f64| (x * 1e3).round() / 1e3 + 0.0;
+        let seen = Vector3::from(*moved_mm);
+        let told = Self {
+            name: name.to_owned(),
+            place: place.to_owned(),
+            seen_mm: rounded(seen.norm()),
+            ..Self::default()
+        };
+        let Some(foretold) = foretold else { return told };
+        let scatter = Scatter::of(&foretold.draws);
+        let mean = Vector3::from(scatter.mean_mm());
+        Self {
+            expected_mm: Some(rounded(mean.norm())),
+            sd_mm: Some(rounded(scatter.sd_mm())),
+            error_mm: Some(rounded((mean - seen).norm())),
+            inside_95: Some(scatter.distance(moved_mm) <= scatter.radius(0.95)),
+            ..told
+        }
+    }
 }
 
 /// A rigid motion that seems to be the other way round.
@@ -86,13 +120,13 @@ impl OtherWayRound {
     }
 }
 
-/// What was taken against the plan, in the pre-operative scan's grid.
+/// What was taken against the plan, in the pre-operative scan's grid: of the brain's tissue as the prediction's labels have it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TakenAgainstPlan {
-    /// What was to be taken, cc.
+    /// Tissue that was to be taken, cc.
     pub planned_cc: f64,
-    /// What was taken, cc.
+    /// Tissue that was taken, cc.
     pub taken_cc: f64,
     /// How far the two agree: twice what they share over their sum.
     pub dice: f64,
@@ -194,6 +228,18 @@ impl PredictionEvaluation {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_foretold_of_a_landmark_that_is_taken() {
+        let draws = (0..8).map(|n| (0.125, [0, 1, 2].map(|a| f64::from((n >> a) & 1) + 1.0))).collect();
+        let compared = Compared { draws, seen_mm: [1.5; 3], seen_sd_mm: 0.0 };
+        let told = LandmarkForecast::of(("a", "tissue"), &[1.5; 3], Some(&compared));
+        assert_eq!((told.inside_95, told.error_mm, told.expected_mm), (Some(true), Some(0.0), Some(2.598)), "{told:?}");
+        let taken = LandmarkForecast::of(("a", "removed"), &[1.5; 3], None);
+        assert_eq!((taken.seen_mm, taken.inside_95, taken.sd_mm), (2.598, None, None));
+        let json = serde_json::to_string(&taken).unwrap();
+        assert!(!json.contains("expected_mm") && !json.contains("inside_95") && !json.contains("error_mm"), "{json}");
+    }
 
     #[test]
     fn another_operation_and_a_fused_truth_are_said_in_words_and_one_as_planned_is_not() {

@@ -3,6 +3,7 @@
 use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
 use crate::experiment::predict::{HeadEvaluation, PredictionEvaluation, Scores};
+use crate::layout;
 use maud::{Markup, html};
 
 /// The section's body.
@@ -23,6 +24,13 @@ pub fn section(evaluation: &PredictionEvaluation) -> Markup {
         @if !landmarks.is_empty() { (sizes("Over the landmarks", &landmarks)) (cover(&landmarks)) }
         @for head in evaluation.heads.iter().filter(|head| !head.landmark.is_empty()) { (rows_of(head)) }
         ul { @for limit in &evaluation.limits { li { (limit) } } } "\n"
+        @if !evaluation.later_sha256.is_empty() {
+            p {
+                "Held against the later case as its " code { (layout::OUTCOME) } " (SHA-256 "
+                (evaluation.later_sha256.chars().take(12).collect::<String>())
+                "\u{2026}) had it: where that case has been made again since, evaluate again."
+            } "\n"
+        }
     }
 }
 
@@ -111,8 +119,10 @@ fn rows_of(head: &HeadEvaluation) -> Markup {
         .landmark
         .iter()
         .map(|l| {
-            let figures = [l.seen_mm, l.expected_mm, l.sd_mm, l.error_mm].map(|x| fixed(x, 2));
-            let inside = if l.inside_95 { "yes" } else { "no" }.to_owned();
+            let dash = || "\u{2013}".to_owned();
+            let figures = [Some(l.seen_mm), l.expected_mm, l.sd_mm, l.error_mm]
+                .map(|x| x.map_or_else(dash, |x| fixed(x, 2)));
+            let inside = l.inside_95.map_or_else(dash, |inside| if inside { "yes" } else { "no" }.to_owned());
             (false, words([l.name.clone(), l.place.clone()].into_iter().chain(figures).chain([inside])))
         })
         .collect();
@@ -134,11 +144,12 @@ mod tests {
             energy_score_rest_mm: 4.0,
             ..Scores::default()
         };
-        let landmark = LandmarkForecast { name: "<1>".to_owned(), inside_95: true, ..LandmarkForecast::default() };
+        let landmark = LandmarkForecast { name: "<1>".to_owned(), inside_95: Some(true), ..Default::default() };
+        let taken = LandmarkForecast { name: "2".to_owned(), place: "removed".to_owned(), ..Default::default() };
         let head = HeadEvaluation {
             head: "supine".to_owned(),
             field: Some(scores),
-            landmark: vec![landmark],
+            landmark: vec![landmark, taken],
             ..HeadEvaluation::default()
         };
         PredictionEvaluation {
@@ -165,5 +176,16 @@ mod tests {
         for words in ["0.86 of 1", "CRPS", "draws alone", "&lt;1&gt;", "Many patients do", "yes"] {
             assert!(page.contains(words), "{words}");
         }
+        // Nothing is foretold of a landmark in what was to be taken: no size, no "no".
+        let taken = page.split("<td>removed</td>").nth(1).unwrap();
+        assert_eq!(taken.split("</tr>").next().unwrap().matches("\u{2013}").count(), 4, "{taken}");
+        assert!(!page.contains("<td>no</td>"));
+    }
+
+    #[test]
+    fn the_state_of_the_later_case_that_it_was_held_against_is_named() {
+        assert!(!section(&evaluation(1.0)).into_string().contains("SHA-256"));
+        let found = PredictionEvaluation { later_sha256: "0123456789abcdef".to_owned(), ..evaluation(1.0) };
+        assert!(section(&found).into_string().contains("0123456789ab"));
     }
 }
