@@ -164,6 +164,7 @@ pub fn assumptions(
         format!("The head lies as it is said to, within about {:.0} degrees.", settings.direction_sd_deg),
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
+    said.extend(prior.spread_of(&settings.tissue_list()));
     if let Some(sd) = settings.poisson_log_sd {
         let at = |z: f64| Scale::LameRatio.value(Scale::LameRatio.number(own.poisson_ratio) + z * sd);
         said.push(format!(
@@ -281,6 +282,7 @@ mod tests {
         let sliding = told(Supports::Sliding, &settings);
         for words in [
             "stiff this brain is",
+            "not the spread from person to person",
             "fluid drains",
             "depend on how much tissue is taken",
             "within about 10 degrees",

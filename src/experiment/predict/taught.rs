@@ -6,6 +6,8 @@ use crate::experiment::population::Kind;
 use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::Tissue;
+use crate::material::generative::GenerativeModel;
+use crate::material::law::Estimated;
 use thiserror::Error;
 
 /// What a cohort's moduli are called, before the tissue's name.
@@ -83,6 +85,40 @@ impl PriorSettings {
         let names = |of: &[&Tissue]| of.iter().map(|t| t.name.replace('_', " ")).collect::<Vec<_>>().join(" and ");
         format!("{shown} ({}) and {studies} ({})", names(&cohort), names(&others))
     }
+
+    /// What the spread of that stiffness is the spread of, a sentence each.
+    pub(super) fn spread_of(&self, tissues: &[Tissue]) -> Vec<String> {
+        let literature = tissues.iter().filter(|tissue| !self.taught_tissues().any(|name| name == tissue.name)).count();
+        let mut said = Vec::new();
+        if literature > 0 {
+            said.push(self.spread_of_studies(literature > 1));
+        }
+        if literature < tissues.len() {
+            said.push(
+                "The cohort's moduli were learnt under one load for all of its patients, so what their loads differed by is in the spread of the moduli; \
+                 the load is drawn beside it all the same, which makes the spread too wide rather than too narrow."
+                    .to_owned(),
+            );
+        }
+        said
+    }
+
+    fn spread_of_studies(&self, several: bool) -> String {
+        if self.for_predictions().model == Some(GenerativeModel::StudyLevel) {
+            return "The spread of the studies' stiffness is that from person to person, as far as studies tell it apart from what \
+                    laboratories differ by."
+                .to_owned();
+        }
+        let of = match self.law.estimated() {
+            Estimated::Shaped(_) => "what one more study would report",
+            Estimated::Modulus | Estimated::Not => "how well their average is known",
+        };
+        let apart = if several { ", each tissue drawn by itself" } else { "" };
+        format!(
+            "The spread of the studies' stiffness is {of}{apart}; it is not the spread from person to person, which is wider and which \
+             `model = \"study-level\"` of the table [prior] draws from."
+        )
+    }
 }
 
 fn in_words(tissues: &[String]) -> String {
@@ -94,6 +130,8 @@ mod tests {
     use super::super::known_level::KnownLevel;
     use super::*;
     use crate::experiment::population::{LearntPrior, PopulationPrior};
+    use crate::experiment::prior::law_priors;
+    use crate::material::meta_model::MetaModel;
 
     fn taught(names: &[&str]) -> PriorSettings {
         let learnt = |name: &&str| LearntPrior { name: format!("{MODULUS}{name}"), log_mean: 6.3, log_sd: 0.2 };
@@ -124,6 +162,31 @@ mod tests {
         let of = |names: &[&str]| taught(names).source_of(&two.tissue_list());
         assert!(!of(&[]).contains("cohort") && !of(&["grey_matter", "white_matter"]).contains("studies"));
         assert!(of(&["grey_matter"]).contains("cohort have shown (grey matter) and what published studies"));
+    }
+
+    #[test]
+    fn which_spread_the_stiffness_has_is_said_and_what_a_cohort_counts_twice() {
+        let tissues = PredictSettings::default().tissue_list();
+        let of = |prior: &PriorSettings| prior.spread_of(&tissues).join(" ");
+        let usual = PriorSettings::default();
+        let average = of(&usual);
+        for words in ["how well their average is known", "each tissue drawn by itself", "not the spread from person to person"] {
+            assert!(average.contains(words), "{words}: {average}");
+        }
+        let person = of(&PriorSettings { model: Some(GenerativeModel::StudyLevel), ..usual.clone() });
+        assert!(person.contains("is that from person to person") && !person.contains("average"), "{person}");
+        let shaped = of(&PriorSettings { law: MetaModel::OGDEN, ..usual });
+        assert!(shaped.contains("one more study would report"), "{shaped}");
+        // The setting that the sentence names makes the spread wider indeed, and ties the tissues.
+        let priors = |prior: &PriorSettings| law_priors(&tissues, &prior.for_predictions()).unwrap();
+        let [narrow, wide] = [None, Some(GenerativeModel::StudyLevel)]
+            .map(|model| priors(&PriorSettings { model, ..PriorSettings::default() }));
+        assert!(narrow.iter().zip(&wide).all(|((_, a), (_, b))| b.sd.unwrap() > 2.0 * a.sd.unwrap()));
+        assert!(narrow.iter().all(|(_, a)| a.correlation.is_empty()) && wide[1].1.correlation[0] > 0.5);
+
+        let cohort = of(&taught(&["grey_matter", "white_matter"]));
+        assert!(cohort.contains("too wide rather than too narrow") && !cohort.contains("studies'"), "{cohort}");
+        assert!(!average.contains("cohort") && of(&taught(&["grey_matter"])).contains("their average is known; it"));
     }
 
     #[test]
