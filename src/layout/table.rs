@@ -272,7 +272,12 @@ pub const TABLE: &[Entry] = &[
         None,
     ),
     file(SHIFT_SD.0, "standard deviation of the brain shift, mm", Space::Pre, Maker::Fields),
-    file(SHIFT_REACH.0, "its 95 % reach, mm: the size that 95 % of the possible displacements do not exceed", Space::Pre, Maker::Fields),
+    file(
+        SHIFT_REACH.0,
+        "its 95 % reach, mm: the size that 95 % of the possible displacements do not exceed",
+        Space::Pre,
+        Maker::Fields,
+    ),
     file(SHIFT_MASK.0, "where it is believed", Space::Pre, Maker::Fields),
     file(SHIFT_JSON, "the brain shift in numbers", Space::None, Maker::Fields),
     file(

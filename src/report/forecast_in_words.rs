@@ -1,7 +1,7 @@
 //! A prediction against what was seen, and plans side by side, in a few lines of text.
 
 use super::page::evaluation_in_a_sentence;
-use crate::experiment::predict::{PlanComparison, PredictionEvaluation, Scores};
+use crate::experiment::predict::{PlanComparison, PlanFigures, PredictionEvaluation, Scores};
 
 /// The headline, rows of scores and coverage for each head, one for each landmark, and what the figures do not say.
 pub fn evaluation_table(found: &PredictionEvaluation) -> String {
@@ -61,13 +61,14 @@ pub fn evaluation_table(found: &PredictionEvaluation) -> String {
     text
 }
 
-/// For each head the answer, then a row for each plan.
+/// What a quality gate refused, then for each head the answer and a row for each plan.
 pub fn plans_table(found: &PlanComparison) -> String {
     let mut text = String::new();
+    found.plans.iter().filter_map(PlanFigures::refusal_in_words).for_each(|said| text += &(said + "\n"));
     for head in &found.heads {
         text += &format!("{}\n", head.sentence);
         text += &format!(
-            "plan         given as        taken (cc)  over {} mm (cc)  95 % between          more than {} (cc)  95 % between\n",
+            "plan         given as        taken (cc)  over {} mm (cc)  95 % between          of what all leave  more than {} (cc)  95 % between\n",
             found.threshold_mm, head.least
         );
         for row in &head.plans {
@@ -75,19 +76,23 @@ pub fn plans_table(found: &PlanComparison) -> String {
             let (given, cc) = of.map_or(("", 0.0), |plan| (plan.given.as_str(), plan.resected_cc));
             let ([low, high], [less, more]) = (row.interval_95_cc, row.more_interval_95_cc);
             text += &format!(
-                "{:<12} {given:<14} {cc:>11.1}  {:>14.1}  {low:>8.1} to {high:<8.1}  {:>22.1}  {less:>8.1} to {more:<8.1}\n",
-                row.plan, row.over_threshold_cc, row.more_than_least_cc
+                "{:<12} {given:<14} {cc:>11.1}  {:>14.1}  {low:>8.1} to {high:<8.1}  {:>17.1}  {:>22.1}  {less:>8.1} to {more:<8.1}\n",
+                row.plan, row.over_threshold_cc, row.left_by_all_over_cc, row.more_than_least_cc
             );
         }
         text += "\n";
     }
+    text += &format!(
+        "(plans are compared by the {:.0} cc of tissue that all of them leave: what a plan takes cannot move)\n",
+        found.left_by_all_cc
+    );
     text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::predict::{HeadEvaluation, LandmarkForecast, PlanFigures, PlanOfHead, PlansOfHead};
+    use crate::experiment::predict::{HeadEvaluation, LandmarkForecast, PlanOfHead, PlansOfHead};
 
     #[test]
     fn every_row_of_an_evaluation_and_every_limit_is_printed() {
@@ -112,10 +117,18 @@ mod tests {
     fn plans_are_printed_with_what_they_are_and_what_they_differ_by() {
         let row = PlanOfHead { plan: "plan-1".to_owned(), more_than_least_cc: 6.5, ..PlanOfHead::default() };
         let head = PlansOfHead { plans: vec![row], sentence: "Cannot be told.".to_owned(), ..PlansOfHead::default() };
-        let plan = PlanFigures { plan: "plan-1".to_owned(), given: "label 5".to_owned(), resected_cc: 12.5 };
-        let text = plans_table(&PlanComparison { threshold_mm: 2.0, plans: vec![plan], heads: vec![head] });
-        for words in ["Cannot be told.", "label 5", "12.5", "6.5", "over 2 mm"] {
+        let plan = PlanFigures {
+            plan: "plan-1".to_owned(),
+            given: "label 5".to_owned(),
+            resected_cc: 12.5,
+            refusals: vec!["the margin is empty".to_owned()],
+            ..PlanFigures::default()
+        };
+        let (plans, heads) = (vec![plan], vec![head]);
+        let text = plans_table(&PlanComparison { threshold_mm: 2.0, left_by_all_cc: 987.6, plans, heads });
+        for words in ["Cannot be told.", "label 5", "12.5", "6.5", "over 2 mm", "the 988 cc of tissue"] {
             assert!(text.contains(words), "{words}: {text}");
         }
+        assert!(text.find("refused plan-1: the margin").unwrap() < text.find("Cannot be told.").unwrap(), "{text}");
     }
 }

@@ -20,9 +20,7 @@ use crate::experiment::predict::{
 use crate::geometry::{Mni, Position, Post, Pre, RigidTransform};
 use crate::image::Mask;
 use crate::image::nifti::{ReadOptions, decode_labels};
-use crate::layout::{
-    EVALUATION_JSON, NATIVE_RESECTED, OUTCOME, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PREDICTION_JSON,
-};
+use crate::layout::{EVALUATION_JSON, NATIVE_RESECTED, OUTCOME, PRE_NATIVE_BRAIN, PRE_NATIVE_LABELS, PREDICTION_JSON};
 use crate::overlay::PointState;
 use crate::register::transform_text::rigid_from_text;
 use crate::segment::label::is_tissue;
@@ -173,8 +171,7 @@ fn later_case(prediction: &Case, against: &Path) -> Result<Case, WorkflowError> 
 
 /// Of the brain's tissue alone: what a plan marks outside it or in fluid can neither be taken nor be seen to be.
 fn taken_against_plan(prediction: &Case, later: &Case) -> Result<TakenAgainstPlan, WorkflowError> {
-    let (labels, _) =
-        decode_labels(&prediction.read(PRE_NATIVE_LABELS)?, PRE_NATIVE_LABELS, &ReadOptions::default())?;
+    let (labels, _) = decode_labels(&prediction.read(PRE_NATIVE_LABELS)?, PRE_NATIVE_LABELS, &ReadOptions::default())?;
     let tissue: Mask<Pre> = labels.relabelled::<Pre>().map(is_tissue);
     let grid = tissue.grid;
     let of = |case: &Case| -> Result<Vec<bool>, WorkflowError> {

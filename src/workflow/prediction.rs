@@ -16,9 +16,9 @@ use super::targets::Targets;
 use super::work::{Made, Place, Work};
 use crate::artefact::{Manifest, sha256_hex};
 use crate::experiment::outcome::{ExperimentKind, ExperimentOutcome};
-use crate::experiment::predict::{Prediction, PredictionEvaluation, twice};
+use crate::experiment::predict::{PlanComparison, Prediction, PredictionEvaluation, twice};
 use crate::experiment::resection::ResectionSettings;
-use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PREDICTION_JSON, REST_MESH};
+use crate::layout::{EVALUATION_JSON, PLAN_CASE, PLANS_JSON, PLANS_PAGE, PREDICTION_JSON, REST_MESH};
 use crate::mesh::format::vtu;
 use crate::report::refusal::{as_scanned, posed};
 
@@ -41,7 +41,9 @@ pub fn predict(
     inputs.check_apart_from(&work.case, &[&inputs.resection])?;
     let scan = PlannedScan::read(inputs, &work)?;
     let targets = targets_of(inputs)?;
-    predict_scan(&work, &scan, targets.as_ref())
+    let found = predict_scan(&work, &scan, targets.as_ref())?;
+    drop_other_comparison(&found.0)?;
+    Ok(found)
 }
 
 /// Refuses what no prediction can be made with.
@@ -153,6 +155,25 @@ fn drop_other_evaluation(case: &Case) -> Result<(), WorkflowError> {
     Ok(())
 }
 
+/// Takes away a comparison of plans beside this folder that names it, where that was made of another prediction than it holds now.
+fn drop_other_comparison(case: &Case) -> Result<(), WorkflowError> {
+    // `plan-1` and `.` have no folder around them by their words.
+    let Ok(folder) = case.folder().canonicalize() else { return Ok(()) };
+    let (Some(around), Some(name)) = (folder.parent(), folder.file_name().and_then(|name| name.to_str())) else {
+        return Ok(());
+    };
+    let Ok(text) = std::fs::read_to_string(around.join(PLANS_JSON)) else { return Ok(()) };
+    // What is no comparison of hgm's is somebody else's file; of an earlier version's the sum is empty.
+    let Ok(comparison) = serde_json::from_str::<PlanComparison>(&text) else { return Ok(()) };
+    let sum = sha256_hex(&case.read(PREDICTION_JSON)?);
+    if comparison.plans.iter().any(|plan| plan.plan == name && plan.prediction_sha256 != sum) {
+        for file in [PLANS_JSON, PLANS_PAGE] {
+            std::fs::remove_file(around.join(file)).ok();
+        }
+    }
+    Ok(())
+}
+
 /// Another scan is another patient's, unless it is meant.
 fn check_scan(work: &Work<'_>, sum: &String) -> Result<(), WorkflowError> {
     let recorded = Manifest::of_stage(work.case.folder(), &StageName::Pose.to_string());
@@ -182,5 +203,38 @@ mod tests {
         std::fs::write(case.path(PREDICTION_JSON), "{ }").unwrap();
         drop_other_evaluation(&case).unwrap();
         assert!(!case.path(EVALUATION_JSON).exists());
+    }
+
+    #[test]
+    fn a_comparison_goes_with_the_prediction_of_a_plan_that_it_was_made_of() {
+        use crate::experiment::predict::PlanFigures;
+
+        let folder = tempfile::tempdir().unwrap();
+        let case = Case::at(&folder.path().join("plan-1"));
+        for file in [PREDICTION_JSON, ".stages/pose.manifest.json"] {
+            std::fs::create_dir_all(case.path(file).parent().unwrap()).unwrap();
+            std::fs::write(case.path(file), "{}").unwrap();
+        }
+        let (json, page) = (folder.path().join(PLANS_JSON), folder.path().join(PLANS_PAGE));
+        let compare = |plan: &str, sum: &str| {
+            let figures =
+                PlanFigures { plan: plan.to_owned(), prediction_sha256: sum.to_owned(), ..PlanFigures::default() };
+            let comparison = PlanComparison { plans: vec![figures], ..PlanComparison::default() };
+            std::fs::write(&json, serde_json::to_string(&comparison).unwrap()).unwrap();
+            std::fs::write(&page, "page").unwrap();
+            drop_other_comparison(&case).unwrap();
+            assert_eq!(json.exists(), page.exists());
+            json.exists()
+        };
+        // The same prediction again, and one that was made anew; a comparison of others, and one of an earlier version.
+        let sum = sha256_hex(b"{}");
+        assert!(compare("plan-1", &sum));
+        assert!(!compare("plan-1", "another"));
+        assert!(compare("plan-2", "another"));
+        assert!(!compare("plan-1", ""));
+        // A file of that name that is not hgm's.
+        std::fs::write(&json, r#"{"plans": ["mine"]}"#).unwrap();
+        drop_other_comparison(&case).unwrap();
+        assert!(json.exists());
     }
 }

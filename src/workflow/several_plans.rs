@@ -8,12 +8,14 @@ use super::prediction::{can_be_done, predict_scan, targets_of};
 use super::progress::Progress;
 use super::settings::Settings;
 use super::stage_name::Subject;
-use super::stages::read_table;
+use super::stages::{Predicted, grid_of, mask_of, read_draws};
 use super::warning::Warning;
 use super::work::{Place, Work, facts};
-use crate::artefact::write_whole;
-use crate::experiment::predict::{PlanComparison, PlanDraws, PlanFigures, Prediction, compared_plans};
-use crate::layout::{PLAN_CASE, PLANS_JSON, PLANS_PAGE};
+use crate::artefact::{sha256_hex, write_whole};
+use crate::experiment::predict::{LeftByAll, PlanComparison, PlanDraws, PlanFigures, Prediction, compared_plans};
+use crate::geometry::Mni;
+use crate::image::Mask;
+use crate::layout::{PLAN_CASE, PLANS_JSON, PLANS_PAGE, PREDICTION_JSON, RESECTED};
 use crate::report::page::plans::plans_page;
 use std::path::Path;
 
@@ -88,23 +90,55 @@ fn compared(
     done: &[(String, Case, Prediction)],
     threshold_mm: f64,
 ) -> Result<PlanComparison, WorkflowError> {
-    let figures = plans.iter().zip(done).map(|(plan, (name, _, prediction))| PlanFigures {
-        plan: name.clone(),
-        given: plan.kind(),
-        resected_cc: prediction.plan.resected_cc,
-    });
-    let mut comparison = PlanComparison { threshold_mm, plans: figures.collect(), heads: Vec::new() };
+    let mut figures = Vec::new();
+    for (plan, (name, case, prediction)) in plans.iter().zip(done) {
+        figures.push(PlanFigures {
+            plan: name.clone(),
+            given: plan.kind(),
+            resected_cc: prediction.plan.resected_cc,
+            refusals: refusals(case)?,
+            prediction_sha256: sha256_hex(&case.read_made(PREDICTION_JSON)?),
+        });
+    }
+    let mut comparison = PlanComparison { threshold_mm, plans: figures, ..PlanComparison::default() };
+    let taken = done.iter().map(|(_, case, _)| taken_by(case)).collect::<Result<Vec<_>, _>>()?;
+    let mut left: Option<LeftByAll> = None;
     let heads = done.first().map_or(0, |(_, _, prediction)| prediction.heads.len());
     for number in 0..heads {
+        let read =
+            |(_, case, prediction): &(String, Case, Prediction)| read_draws(case, &prediction.heads[number].state);
+        let drawn = done.iter().map(read).collect::<Result<Vec<Predicted>, _>>()?;
+        // A plan's mesh is the same however the head lies.
+        let left =
+            left.get_or_insert_with(|| LeftByAll::of(&drawn.iter().map(|d| &d.mesh).collect::<Vec<_>>(), &taken));
         let mut of_head = Vec::new();
-        for (name, case, prediction) in done {
-            let head = &prediction.heads[number];
-            let draws = read_table(case, &head.state)?;
-            of_head.push(PlanDraws { plan: name.clone(), largest_mm: head.largest_mm, draws });
+        for (n, (drawn, (name, _, prediction))) in drawn.into_iter().zip(done).enumerate() {
+            of_head.push(PlanDraws {
+                plan: name.clone(),
+                largest_mm: prediction.heads[number].largest_mm,
+                of_all_cc: left.over_threshold_cc(n, &drawn.modes, threshold_mm),
+                draws: drawn.modes.draws,
+                refused: !comparison.plans[n].refusals.is_empty(),
+            });
         }
         comparison.heads.push(compared_plans(&done[0].2.heads[number].head, &of_head));
     }
+    comparison.left_by_all_cc = left.map_or(0.0, |left| (left.cc * 1e3).round() / 1e3);
     Ok(comparison)
+}
+
+/// What a plan takes, in the frame of its mesh.
+fn taken_by(case: &Case) -> Result<Mask<Mni>, WorkflowError> {
+    mask_of(case, RESECTED, &grid_of(case, RESECTED)?)
+}
+
+/// What a quality gate has against a case, a sentence each.
+fn refusals(case: &Case) -> Result<Vec<String>, WorkflowError> {
+    match case.quality_gate() {
+        Ok(()) => Ok(Vec::new()),
+        Err(WorkflowError::QualityGate(sentences)) => Ok(sentences),
+        Err(error) => Err(error),
+    }
 }
 
 #[cfg(test)]

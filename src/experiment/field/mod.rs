@@ -24,7 +24,7 @@ pub use harmonic::{Place, continued};
 pub use inverse::inverse;
 pub use jacobian::{Mended, jacobian_min, mended};
 pub use outcome::{BrainShift, Discrepancy, StateShift};
-pub use raster::{InTetrahedra, in_tetrahedra};
+pub use raster::{InTetrahedra, in_tetrahedra, of_voxels};
 pub use reach::reach_95;
 pub use settings::{FieldSettings, Source};
 pub use shift::{Moved, ShiftField, Surroundings, shift_field};

@@ -29,6 +29,22 @@ pub fn in_tetrahedra<const N: usize, F: Frame>(
     values: &[[f64; N]],
     grid: &Grid<F>,
 ) -> InTetrahedra<N> {
+    let (inside, values) = of_voxels(tets, nodes_mm, grid, [0f32; N], |t, weight| {
+        let tet = tets[t as usize];
+        std::array::from_fn(|c| tet.iter().zip(weight).map(|(&n, w)| w * values[n as usize][c]).sum::<f64>() as f32)
+    });
+    InTetrahedra { inside, values }
+}
+
+/// What `at` says, by the tetrahedron's number and the weights of its corners, at the voxels whose centre lies in one; `none`
+/// elsewhere. Where tetrahedra touch, the first in the list speaks.
+pub fn of_voxels<T: Copy + Send + Sync, F: Frame>(
+    tets: &[[u32; 4]],
+    nodes_mm: &[[f64; 3]],
+    grid: &Grid<F>,
+    none: T,
+    at: impl Fn(u32, [f64; 4]) -> T + Sync,
+) -> (Vec<bool>, Vec<T>) {
     let voxels: Vec<Point3<f64>> =
         nodes_mm.par_iter().map(|x| grid.voxel_from_mm().transform_point(&Point3::from(*x))).collect();
     let [nx, ny, nz] = grid.dims;
@@ -44,7 +60,7 @@ pub fn in_tetrahedra<const N: usize, F: Frame>(
             of_plane[k].push(t as u32);
         }
     }
-    let (mut inside, mut found) = (vec![false; grid.len()], vec![[0f32; N]; grid.len()]);
+    let (mut inside, mut found) = (vec![false; grid.len()], vec![none; grid.len()]);
     let plane = (nx * ny).max(1);
     let planes = inside.par_chunks_mut(plane).zip(found.par_chunks_mut(plane)).zip(&of_plane);
     planes.enumerate().for_each(|(k, ((inside, found), list))| {
@@ -64,15 +80,13 @@ pub fn in_tetrahedra<const N: usize, F: Frame>(
                     let weight = [1.0 - b.sum(), b.x, b.y, b.z];
                     if weight.iter().all(|&w| w >= -1e-9) {
                         inside[place] = true;
-                        found[place] = std::array::from_fn(|c| {
-                            tet.iter().zip(weight).map(|(&n, w)| w * values[n as usize][c]).sum::<f64>() as f32
-                        });
+                        found[place] = at(t, weight);
                     }
                 }
             }
         }
     });
-    InTetrahedra { inside, values: found }
+    (inside, found)
 }
 
 #[cfg(test)]

@@ -83,12 +83,8 @@ impl LandmarkForecast {
     pub fn of((name, place): (&str, &str), moved_mm: &[f64; 3], foretold: Option<&Compared>) -> Self {
         let rounded = |x: f64| (x * 1e3).round() / 1e3 + 0.0;
         let seen = Vector3::from(*moved_mm);
-        let told = Self {
-            name: name.to_owned(),
-            place: place.to_owned(),
-            seen_mm: rounded(seen.norm()),
-            ..Self::default()
-        };
+        let told =
+            Self { name: name.to_owned(), place: place.to_owned(), seen_mm: rounded(seen.norm()), ..Self::default() };
         let Some(foretold) = foretold else { return told };
         let scatter = Scatter::of(&foretold.draws);
         let mean = Vector3::from(scatter.mean_mm());

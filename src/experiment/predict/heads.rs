@@ -43,7 +43,14 @@ pub fn compared_heads(heads: &[HeadDraws]) -> Option<HeadComparison> {
         let sentence = "With which head least moves is not said: the skull does not hold the brain in the same ways with all of them.";
         return Some(HeadComparison { sentence: sentence.to_owned(), ..HeadComparison::default() });
     }
-    let of = |h: &HeadDraws| PlanDraws { plan: h.head.clone(), largest_mm: 0.0, draws: h.draws.clone() };
+    // The same tissue is left however the head lies.
+    let of = |h: &HeadDraws| PlanDraws {
+        plan: h.head.clone(),
+        largest_mm: 0.0,
+        draws: h.draws.clone(),
+        of_all_cc: h.draws.iter().map(|draw| draw.over_threshold_cc).collect(),
+        refused: false,
+    };
     let found = compared_plans("", &heads.iter().map(of).collect::<Vec<_>>());
     let (least, not_told_from) = (found.least, found.not_told_from);
     let sentence = if not_told_from.is_empty() {

@@ -1,7 +1,8 @@
 //! Several plans of one patient side by side: which lets the brain move least, and whether that can be told.
 //!
 //! A draw of a number is the same patient under every plan (the same stiffness, load, pose of the head), so plans are compared
-//! draw by draw: what all plans share does not count against telling them apart.
+//! draw by draw: what all plans share does not count against telling them apart. They are compared by the tissue that all of them
+//! leave ([`super::left_by_all`]): what a plan takes cannot move, and is no merit of it.
 
 use super::modes::DrawnState;
 use super::score::rounded;
@@ -10,12 +11,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Several plans. Volumes are of tissue that moves by more than the threshold.
+/// Several plans. Volumes are of tissue that moves by more than the threshold. Which plan moves least is said of the tissue that all
+/// plans leave: over its own tissue a plan would be the better the more it takes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanComparison {
     /// What counts as a shift, mm.
     pub threshold_mm: f64,
+    /// Tissue that all plans leave, cc: what they are compared by.
+    #[serde(default)]
+    pub left_by_all_cc: f64,
     /// The plans in the order they were given.
     pub plans: Vec<PlanFigures>,
     /// Each way of lying.
@@ -32,6 +37,12 @@ pub struct PlanFigures {
     pub given: String,
     /// Tissue that is to be taken, cc.
     pub resected_cc: f64,
+    /// What a quality gate has against it, a sentence each: its figures, and what is said of it beside others, are not to be relied on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refusals: Vec<String>,
+    /// SHA-256 of the `sim/prediction.json` that was compared.
+    #[serde(default)]
+    pub prediction_sha256: String,
 }
 
 /// Every plan with the head lying in one way.
@@ -42,7 +53,7 @@ pub struct PlansOfHead {
     pub head: String,
     /// A row for each plan.
     pub plans: Vec<PlanOfHead>,
-    /// The plan that moves least on average.
+    /// The plan that on average moves least of the tissue that all plans leave.
     pub least: String,
     /// Plans that it cannot be told from: the difference is within its spread. Empty where it is told from all.
     pub not_told_from: Vec<String>,
@@ -56,17 +67,21 @@ pub struct PlansOfHead {
 pub struct PlanOfHead {
     /// Its case folder.
     pub plan: String,
-    /// Tissue that is expected to move by more than the threshold, cc.
+    /// Tissue that the plan leaves and that is expected to move by more than the threshold, cc. A plan that takes more leaves less to
+    /// move: plans are not compared by this.
     pub over_threshold_cc: f64,
     /// 95 % of the draws lie between, cc.
     pub interval_95_cc: [f64; 2],
     /// Largest mean displacement of a node, mm.
     pub largest_mm: f64,
-    /// How much more than the least one, draw by draw, cc; 0 for that one itself.
+    /// Of the tissue that all plans leave, what is expected to move by more than the threshold, cc.
+    #[serde(default)]
+    pub left_by_all_over_cc: f64,
+    /// How much more of that than with the least one, draw by draw, cc; 0 for that one itself.
     pub more_than_least_cc: f64,
     /// 95 % of those differences lie between, cc.
     pub more_interval_95_cc: [f64; 2],
-    /// Share of the draws in which it moves less than the least one.
+    /// Share of the draws in which it moves less of that than the least one.
     pub less_than_least: f64,
 }
 
@@ -79,6 +94,10 @@ pub struct PlanDraws {
     pub largest_mm: f64,
     /// The draws.
     pub draws: Vec<DrawnState>,
+    /// What moves by more than the threshold in each of them, cc, of the tissue that all plans leave.
+    pub of_all_cc: Vec<f64>,
+    /// A quality gate has refused it.
+    pub refused: bool,
 }
 
 type Drawn<'a> = BTreeMap<(&'a str, usize), (f64, f64)>;
@@ -87,8 +106,12 @@ type Drawn<'a> = BTreeMap<(&'a str, usize), (f64, f64)>;
 pub fn compared_plans(head: &str, plans: &[PlanDraws]) -> PlansOfHead {
     let drawn: Vec<Drawn<'_>> = plans
         .iter()
-        .map(|p| p.draws.iter().map(|d| ((d.supports.as_str(), d.number), (d.over_threshold_cc, d.weight))).collect())
+        .map(|p| {
+            let each = p.draws.iter().zip(&p.of_all_cc);
+            each.map(|(d, cc)| ((d.supports.as_str(), d.number), (*cc, d.weight))).collect()
+        })
         .collect();
+    let own = |n: usize| plans[n].draws.iter().map(|d| (d.over_threshold_cc, d.weight)).collect::<Vec<_>>();
     let values = |n: usize| drawn[n].values().copied().collect::<Vec<_>>();
     // A plan may have lost a way of supporting the brain that another has: only what all have decides.
     let of_all = |n: usize| {
@@ -107,9 +130,10 @@ pub fn compared_plans(head: &str, plans: &[PlanDraws]) -> PlansOfHead {
         let less: f64 = more.iter().filter(|d| d.0 < 0.0).map(|d| d.1).sum();
         PlanOfHead {
             plan: plans[n].plan.clone(),
-            over_threshold_cc: rounded(mean(&values(n))),
-            interval_95_cc: interval(&mut values(n)).map(rounded),
+            over_threshold_cc: rounded(mean(&own(n))),
+            interval_95_cc: interval(&mut own(n)).map(rounded),
             largest_mm: plans[n].largest_mm,
+            left_by_all_over_cc: rounded(mean(&values(n))),
             more_than_least_cc: rounded(mean(&more)),
             more_interval_95_cc: interval(&mut more).map(rounded),
             less_than_least: rounded(less / all),
@@ -122,7 +146,25 @@ pub fn compared_plans(head: &str, plans: &[PlanDraws]) -> PlansOfHead {
     let least = plans.get(least).map(|p| p.plan.clone()).unwrap_or_default();
     let mut found = PlansOfHead { head: head.to_owned(), plans: rows, least, not_told_from, sentence: String::new() };
     found.sentence = found.in_words();
+    let refused: Vec<&str> = plans.iter().filter(|p| p.refused).map(|p| p.plan.as_str()).collect();
+    if !refused.is_empty() {
+        found.sentence +=
+            &format!(" A quality gate has refused {}: do not rely on what is said of it.", refused.join(" and "));
+    }
     found
+}
+
+impl PlanFigures {
+    /// What a reader of the comparison must know before its answer, where a quality gate has refused the plan.
+    pub fn refusal_in_words(&self) -> Option<String> {
+        let (plan, why) = (&self.plan, self.refusals.join("; "));
+        let told = || {
+            format!(
+                "A quality gate has refused {plan}: {why}. What is said of it beside others is not to be relied on."
+            )
+        };
+        (!self.refusals.is_empty()).then(told)
+    }
 }
 
 impl PlansOfHead {
@@ -130,12 +172,13 @@ impl PlansOfHead {
         let (head, least) = (&self.head, &self.least);
         if self.not_told_from.is_empty() {
             return format!(
-                "With the head {head}, {least} moves least: in more than 95 of 100 draws less than each other plan."
+                "With the head {head}, {least} moves least of the tissue that all plans leave: in more than 95 of 100 draws less than each \
+                 other plan."
             );
         }
         format!(
-            "With the head {head}, which plan moves least cannot be told: {least} does on average, but its difference from {} is within \
-             its spread.",
+            "With the head {head}, which plan moves least of the tissue that all plans leave cannot be told: {least} does on average, but \
+             its difference from {} is within its spread.",
             self.not_told_from.join(" and ")
         )
     }
@@ -160,7 +203,39 @@ mod tests {
             over_threshold_cc: 200.0 + volume + 50.0 * normals(n, 0, 1)[0] + own * normals(n, dimension, 1)[0],
             coordinates: Vec::new(),
         };
-        PlanDraws { plan: name.to_owned(), largest_mm: 3.0, draws: (0..200).map(draw).collect() }
+        of_draws(name, (0..200).map(draw).collect())
+    }
+
+    /// Of plans that take nothing from each other.
+    fn of_draws(name: &str, draws: Vec<DrawnState>) -> PlanDraws {
+        let of_all_cc = draws.iter().map(|draw| draw.over_threshold_cc).collect();
+        PlanDraws { plan: name.to_owned(), largest_mm: 3.0, draws, of_all_cc, refused: false }
+    }
+
+    #[test]
+    fn plans_are_compared_by_what_all_leave_and_their_own_tissue_is_told_beside_it() {
+        let mut small = plan("plan-1", 30.0, 0.0, 1);
+        small.of_all_cc = plan("plan-1", -10.0, 0.0, 1).of_all_cc;
+        let found = compared_plans("supine", &[small, plan("plan-2", 0.0, 1.0, 1)]);
+        assert!(found.least == "plan-1" && found.not_told_from.is_empty(), "{found:?}");
+        let [small, wide] = [&found.plans[0], &found.plans[1]];
+        assert!((small.over_threshold_cc - wide.over_threshold_cc - 30.0).abs() < 0.2, "{found:?}");
+        assert!((wide.left_by_all_over_cc - small.left_by_all_over_cc - 10.0).abs() < 0.2, "{found:?}");
+        assert!(found.sentence.contains("of the tissue that all plans leave"), "{}", found.sentence);
+    }
+
+    #[test]
+    fn a_plan_that_a_gate_refused_is_said_to_be_with_the_answer() {
+        let mut plans = [plan("plan-1", 10.0, 0.0, 1), plan("plan-2", 0.0, 0.0, 1)];
+        assert!(!compared_plans("supine", &plans).sentence.contains("refused"));
+        plans[1].refused = true;
+        let said = compared_plans("supine", &plans).sentence;
+        assert!(said.contains("plan-2 moves least") && said.contains("has refused plan-2"), "{said}");
+        let refusals = vec!["the margin is empty".to_owned()];
+        let figures = PlanFigures { plan: "plan-2".to_owned(), refusals, ..PlanFigures::default() };
+        let said = figures.refusal_in_words().unwrap();
+        assert!(said.contains("plan-2: the margin is empty. What"), "{said}");
+        assert_eq!(PlanFigures::default().refusal_in_words(), None);
     }
 
     #[test]
@@ -186,12 +261,12 @@ mod tests {
     fn a_plan_against_itself_is_never_told_and_lost_supports_are_left_out() {
         let same = compared_plans("supine", &[plan("plan-1", 0.0, 3.0, 1), plan("plan-2", 0.0, 3.0, 1)]);
         assert_eq!(same.not_told_from, ["plan-2"]);
-        let mut more = plan("plan-2", 0.0, 3.0, 1);
-        more.draws.extend(plan("plan-2", 500.0, 0.0, 1).draws.into_iter().map(|mut d| {
+        let mut more = plan("plan-2", 0.0, 3.0, 1).draws;
+        more.extend(plan("plan-2", 500.0, 0.0, 1).draws.into_iter().map(|mut d| {
             d.supports = "sliding".to_owned();
             d
         }));
-        let found = compared_plans("supine", &[plan("plan-1", 0.0, 3.0, 1), more]);
+        let found = compared_plans("supine", &[plan("plan-1", 0.0, 3.0, 1), of_draws("plan-2", more)]);
         assert_eq!(found.plans[1].more_interval_95_cc, [0.0, 0.0], "only draws that both have are compared: {found:?}");
     }
 }

@@ -197,9 +197,8 @@ mod tests {
             percentile_95_mm: 2.0,
             inside_95_share,
         };
-        let page = |inside| {
-            of_landmarks(&Evaluation { summary: vec![row(inside)], ..Evaluation::default() }).into_string()
-        };
+        let page =
+            |inside| of_landmarks(&Evaluation { summary: vec![row(inside)], ..Evaluation::default() }).into_string();
         let told = page(Some(0.9));
         assert!(told.contains("Inside 95 % sphere") && told.contains("alike in all directions"), "{told}");
         assert!(!told.contains("ellipsoid") && !page(None).contains("alike in all directions"));

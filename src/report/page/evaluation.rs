@@ -120,8 +120,8 @@ fn rows_of(head: &HeadEvaluation) -> Markup {
         .iter()
         .map(|l| {
             let dash = || "\u{2013}".to_owned();
-            let figures = [Some(l.seen_mm), l.expected_mm, l.sd_mm, l.error_mm]
-                .map(|x| x.map_or_else(dash, |x| fixed(x, 2)));
+            let figures =
+                [Some(l.seen_mm), l.expected_mm, l.sd_mm, l.error_mm].map(|x| x.map_or_else(dash, |x| fixed(x, 2)));
             let inside = l.inside_95.map_or_else(dash, |inside| if inside { "yes" } else { "no" }.to_owned());
             (false, words([l.name.clone(), l.place.clone()].into_iter().chain(figures).chain([inside])))
         })

@@ -2,7 +2,7 @@
 
 use super::super::html::{fixed, number};
 use super::results::{Row, table, words};
-use super::{Frame, Section};
+use super::{Frame, Section, notice};
 use crate::experiment::predict::{PlanComparison, PlanFigures, PlansOfHead};
 use crate::layout;
 use maud::{Markup, html};
@@ -18,7 +18,9 @@ pub fn plans_page(comparison: &PlanComparison) -> String {
         Section { id: "least", heading: "Which moves least", body: answer(comparison) },
         Section { id: "plans", heading: "Plans", body: plans(&comparison.plans) },
     ];
+    let refusals: Vec<String> = comparison.plans.iter().filter_map(PlanFigures::refusal_in_words).collect();
     let above = html! {
+        @if !refusals.is_empty() { (notice("warn", "Not to be relied on", &refusals)) }
         @for head in &comparison.heads { p class="verdict" { (head.sentence) } "\n" }
     };
     frame.html(&above, &sections, "The page makes no request to any other place.", &html! {})
@@ -26,7 +28,12 @@ pub fn plans_page(comparison: &PlanComparison) -> String {
 
 fn answer(comparison: &PlanComparison) -> Markup {
     html! {
-        @for head in &comparison.heads { (of_head(head, comparison.threshold_mm)) }
+        @for head in &comparison.heads { (of_head(head, comparison)) }
+        p {
+            "Plans are compared by the tissue that all of them leave (" (number(comparison.left_by_all_cc, 3)) " cc), the four columns at \
+             the right. What a plan takes cannot move: over its own tissue the plan that takes most has least left to move, and is not the \
+             better for it."
+        } "\n"
         p {
             "A draw is one possible patient: how stiff, how much fluid drains, how exactly the head lies. The same draw is \
              taken under every plan, and plans are compared draw by draw. Research software: not for surgical planning."
@@ -34,12 +41,13 @@ fn answer(comparison: &PlanComparison) -> Markup {
     }
 }
 
-fn of_head(head: &PlansOfHead, threshold_mm: f64) -> Markup {
+fn of_head(head: &PlansOfHead, comparison: &PlanComparison) -> Markup {
     let columns = [
         "Plan".to_owned(),
-        format!("Tissue over {} mm (cc)", number(threshold_mm, 2)),
+        format!("Its own tissue over {} mm (cc)", number(comparison.threshold_mm, 2)),
         "95 % between".to_owned(),
         "Largest mean shift (mm)".to_owned(),
+        "Of what all leave (cc)".to_owned(),
         format!("More than {} (cc)", head.least),
         "95 % between".to_owned(),
         "Draws in which it moves less".to_owned(),
@@ -56,11 +64,13 @@ fn of_head(head: &PlansOfHead, threshold_mm: f64) -> Markup {
                 number(row.over_threshold_cc, 3),
                 between(row.interval_95_cc),
                 number(row.largest_mm, 3),
+                number(row.left_by_all_over_cc, 3),
                 dash(number(row.more_than_least_cc, 3)),
                 dash(between(row.more_interval_95_cc)),
                 dash(format!("{} %", fixed(100.0 * row.less_than_least, 0))),
             ];
-            (least && head.not_told_from.is_empty(), words(cells))
+            let refused = comparison.plans.iter().any(|plan| plan.plan == row.plan && !plan.refusals.is_empty());
+            (least && head.not_told_from.is_empty() && !refused, words(cells))
         })
         .collect();
     table(&format!("Head {}", head.head), &columns, &rows)
@@ -85,7 +95,7 @@ mod tests {
     fn the_page_answers_first_and_marks_no_winner_where_none_can_be_told() {
         let row =
             |plan: &str, cc: f64| PlanOfHead { plan: plan.to_owned(), over_threshold_cc: cc, ..PlanOfHead::default() };
-        let of = |not_told_from: Vec<String>| {
+        let of = |not_told_from: Vec<String>, refusals: &[&str]| {
             let head = PlansOfHead {
                 head: "supine".to_owned(),
                 plans: vec![row("plan-1", 31.0), row("plan-2", 12.0)],
@@ -93,12 +103,27 @@ mod tests {
                 not_told_from,
                 sentence: "The <answer>.".to_owned(),
             };
-            let figures = PlanFigures { plan: "plan-1".to_owned(), given: "mask".to_owned(), resected_cc: 9.5 };
-            plans_page(&PlanComparison { threshold_mm: 2.0, plans: vec![figures], heads: vec![head] })
+            let given = |plan: &str| PlanFigures { plan: plan.to_owned(), ..PlanFigures::default() };
+            let refused =
+                PlanFigures { refusals: refusals.iter().map(|&why| why.to_owned()).collect(), ..given("plan-2") };
+            plans_page(&PlanComparison {
+                threshold_mm: 2.0,
+                left_by_all_cc: 987.6,
+                plans: vec![given("plan-1"), refused],
+                heads: vec![head],
+            })
         };
-        let (told, not) = (of(Vec::new()), of(vec!["plan-1".to_owned()]));
+        let (told, not) = (of(Vec::new(), &[]), of(vec!["plan-1".to_owned()], &[]));
         assert!(told.contains("class=\"best\"") && !not.contains("class=\"best\""));
         assert!(told.contains("The &lt;answer&gt;.") && told.contains("href=\"plan-1/report.html\""));
         assert!(told.find("&lt;answer").unwrap() < told.find("<table").unwrap());
+        assert!(
+            told.contains("the tissue that all of them leave (988 cc)") && !told.contains("quality gate"),
+            "{told}"
+        );
+        // A plan that a gate has refused is no winner, and that is read before the answer.
+        let refused = of(Vec::new(), &["the margin is empty"]);
+        assert!(!refused.contains("class=\"best\""));
+        assert!(refused.find("the margin is empty").unwrap() < refused.find("&lt;answer").unwrap());
     }
 }

@@ -37,7 +37,7 @@ pub(crate) use mesh::{LARGE_ISLAND_MM3, coarser_mesh, mesh, mesh_before_resectio
 pub(crate) use plan::{PlanFacts, PlannedHead, plan, plan_stage};
 pub(crate) use pose::{PoseFacts, pose, pose_stage};
 pub(crate) use predict::{PredictInput, fluid_of_head, predict};
-pub(crate) use predicted_draws::{Predicted, read_draws, read_table};
+pub(crate) use predicted_draws::{Predicted, read_draws};
 pub(crate) use reading::WithReading;
 pub(crate) use reference::{
     error_at_rest, known_state, observed_surfaces, phantom_reference, phantom_reference_stage, reference,

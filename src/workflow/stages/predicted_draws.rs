@@ -46,10 +46,7 @@ pub(crate) fn read_draws(case: &Case, state: &str) -> Result<Predicted, Workflow
 }
 
 /// The table of a state's draws alone.
-///
-/// # Errors
-/// As [`read_draws`].
-pub(crate) fn read_table(case: &Case, state: &str) -> Result<Vec<DrawnState>, WorkflowError> {
+fn read_table(case: &Case, state: &str) -> Result<Vec<DrawnState>, WorkflowError> {
     let table = PREDICTED_DRAWS.of(state);
     if !case.path(&table).exists() {
         return Err(PredictError::NoDraws { folder: case.folder().to_path_buf(), file: table }.into());

@@ -4,8 +4,8 @@ use super::registration::transforms;
 use crate::experiment::depth::depth_mm;
 use crate::experiment::estimate::{CorrelatedErrors, EstimateOutcome, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
-    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused, reach_95,
-    shift_field,
+    BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused,
+    reach_95, shift_field,
 };
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
