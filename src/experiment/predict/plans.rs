@@ -2,7 +2,7 @@
 //!
 //! A draw of a number is the same patient under every plan (the same stiffness, load, pose of the head), so plans are compared
 //! draw by draw: what all plans share does not count against telling them apart. They are compared by the tissue that all of them
-//! leave ([`super::left_by_all`]): what a plan takes cannot move, and is no merit of it.
+//! leave (`left_by_all.rs`): what a plan takes cannot move, and is no merit of it.
 
 use super::modes::DrawnState;
 use super::score::rounded;
