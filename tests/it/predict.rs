@@ -420,6 +420,13 @@ fn slow_of_several_plans_each_is_a_case_and_the_one_that_moves_least_is_named_on
     assert_eq!(head["sentence"].as_str().unwrap().contains("cannot be told"), !told, "{head}");
     let text = std::fs::read_to_string(all.join("plans.json")).unwrap();
     assert!(!text.contains("resected_pre"), "no name of the user's in what is kept");
+    // What all leave is a part of what each leaves, counted at voxels instead of in tetrahedra.
+    assert!(found["left_by_all_cc"].as_f64().unwrap() > 100.0, "{found}");
+    for row in head["plans"].as_array().unwrap() {
+        let [all, own] = ["left_by_all_over_cc", "over_threshold_cc"].map(|name| row[name].as_f64().unwrap());
+        assert!(all <= 1.02 * own + 0.1, "{row}");
+    }
+    assert_eq!(found["plans"][0]["prediction_sha256"].as_str().unwrap().len(), 64);
     let page = std::fs::read_to_string(all.join("plans.html")).unwrap();
     assert!(page.contains(head["sentence"].as_str().unwrap()));
     for plan in ["plan-1", "plan-2"] {
