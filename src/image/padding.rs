@@ -25,9 +25,13 @@ pub struct Padding {
     plane: [f64; 3],
 }
 
-/// A plane that so much of the scan begins at, mm2 for each mm of a voxel's depth, is no rounded head's: of a ball of 90 mm a third of
-/// that lies as near to a plane.
+/// A plane that so much of the scan begins at is no rounded head's, mm2: of a ball of 90 mm a third of that lies as near to a plane
+/// in voxels of a millimetre.
 const LEAST_MM2: f64 = 2500.0;
+/// So much more for each mm that its voxels are deeper than one, mm2. [`NEAR`] holds two slices at most, and two of a rounded head have
+/// 4 pi r for each mm of their depth less what its curving takes: of a ball of 100 mm that is below this line for slices of any depth,
+/// and a field of view that ends well within a head lies above it.
+const MORE_MM2_PER_MM: f64 = 1000.0;
 /// How far from the plane what begins at it may begin, voxels: it passes between voxels.
 const NEAR: f64 = 0.75;
 /// Share of that many columns that may begin before it: what an interpolation leaves at a corner.
@@ -107,7 +111,10 @@ impl Side {
     }
 
     fn padding(&self) -> Option<Padding> {
-        self.commonest_slopes().into_iter().find_map(|slopes| self.behind_slopes(slopes))
+        // Slopes as they are counted are rough: what lies near is looked for in a wider layer at first. Of thick slices such a layer
+        // holds so much of a head behind the plane that the fit leaves it.
+        let near = |slopes| [4.0 * NEAR, NEAR].into_iter().find_map(|first_near| self.behind_slopes(slopes, first_near));
+        self.commonest_slopes().into_iter().find_map(near)
     }
 
     /// Slopes (mm per mm) that most columns have to those some way off, the commonest first.
@@ -136,8 +143,8 @@ impl Side {
         order.into_iter().take(CANDIDATES).map(|n| [slope(n / BINS), slope(n % BINS)]).collect()
     }
 
-    /// The plane of about these slopes that the scan begins at, where it is one.
-    fn behind_slopes(&self, [b, c]: [f64; 2]) -> Option<Padding> {
+    /// The plane of about these slopes that the scan begins at, where it is one; the first fit is to what lies so near, voxels.
+    fn behind_slopes(&self, [b, c]: [f64; 2], first_near: f64) -> Option<Padding> {
         let [along, wide, high] = self.spacing;
         let mut plane = [0.0, b * wide / along, c * high / along];
         let shown = || {
@@ -151,8 +158,7 @@ impl Side {
         plane[0] = runs[0] as f64;
         let beyond = |plane: [f64; 3], (u, v, d): (f64, f64, f64)| d - plane[0] - plane[1] * u - plane[2] * v;
         for fit in 0..FITS {
-            // The first slopes are rough: what lies near is looked for in a wider layer.
-            let near = if fit == 0 { 4.0 * NEAR } else { NEAR };
+            let near = if fit == 0 { first_near } else { NEAR };
             let (mut matrix, mut right) = (Matrix3::<f64>::zeros(), Vector3::zeros());
             for column in shown().filter(|column| beyond(plane, *column).abs() <= near) {
                 let row = Vector3::new(1.0, column.0, column.1);
@@ -171,7 +177,8 @@ impl Side {
                 before += 1;
             }
         }
-        let is_plane = on as f64 * wide * high >= LEAST_MM2 * along.max(1.0) && before as f64 <= BEFORE * on as f64;
+        let least_mm2 = LEAST_MM2 + MORE_MM2_PER_MM * (along - 1.0).max(0.0);
+        let is_plane = on as f64 * wide * high >= least_mm2 && before as f64 <= BEFORE * on as f64;
         let is_deep = depth / on.max(1) as f64 >= LEAST_DEPTH;
         let Self { axis, across, at_end, length, .. } = *self;
         (is_plane && is_deep).then_some(Padding { axis, across, at_end, length: length as f64, plane })
@@ -215,6 +222,30 @@ mod tests {
         assert_eq!(padding(&ball(false)), []);
         assert_eq!(padding(&ball(true)), []);
         assert_eq!(padding(&ball(true).map(|_| 0.0f32)), []);
+    }
+
+    /// A ball of so many mm in empty air, in thick slices, the first of them so far above its middle that so many mm of it are cut off.
+    fn in_thick_slices(radius_mm: f64, slice_mm: f64, cut_mm: f64, offset_mm: f64) -> Volume<f32, Native> {
+        let grid = Grid::axis_aligned([80, 80, (240.0 / slice_mm) as usize], [3.0, 3.0, slice_mm], [0.0; 3]);
+        Volume::from_voxels(grid, |[i, j, k]| {
+            let from = [i as f64 * 3.0 - 119.0, j as f64 * 3.0 - 118.0, k as f64 * slice_mm - 120.0 + offset_mm];
+            let inside = from.iter().map(|x| x * x).sum::<f64>() < radius_mm * radius_mm;
+            f32::from(u8::from(inside && from[2] <= radius_mm - cut_mm))
+        })
+    }
+
+    #[test]
+    fn the_field_of_view_of_thick_slices_is_found_where_it_cuts_a_head_and_nowhere_else() {
+        for (slice_mm, offsets) in [(3.0, 3), (5.0, 5), (6.0, 6)] {
+            for offset_mm in (0..offsets).map(f64::from) {
+                let found = padding(&in_thick_slices(80.0, slice_mm, 20.0, offset_mm));
+                assert!(matches!(found[..], [Padding { axis: 2, at_end: true, .. }]), "{slice_mm} {offset_mm}: {found:?}");
+                for radius_mm in [70.0, 80.0, 100.0] {
+                    let whole = padding(&in_thick_slices(radius_mm, slice_mm, 0.0, offset_mm));
+                    assert_eq!(whole, [], "{radius_mm} {slice_mm} {offset_mm}");
+                }
+            }
+        }
     }
 
     proptest! {
