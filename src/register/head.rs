@@ -1,7 +1,7 @@
 //! Where the head is in an image: a lenient foreground, its centre, and its range of values.
 
 use crate::geometry::Native;
-use crate::image::{Mask, Volume, morphology};
+use crate::image::{Mask, Volume, coprime_stride, morphology};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
@@ -52,7 +52,7 @@ pub(super) fn otsu(values: &[f32]) -> [f32; 2] {
 
 /// Two quantiles of the values, always apart; at most about 200 000 values are looked at.
 pub(super) fn range_of(values: &[f32], low: f64, high: f64) -> [f32; 2] {
-    let stride = values.len().div_ceil(200_000).max(1);
+    let stride = coprime_stride(values.len().div_ceil(200_000), values.len());
     let mut values: Vec<f32> = values.iter().copied().step_by(stride).collect();
     if values.is_empty() {
         return [0.0, 1.0];
@@ -71,7 +71,8 @@ pub(super) fn range_inside(image: &Volume<f32, Native>, region: &Mask<Native>) -
 /// Two quantiles of the values inside a region (given on any grid).
 pub(super) fn range_within(image: &Volume<f32, Native>, region: &Mask<Native>, low: f64, high: f64) -> [f32; 2] {
     let to_region = region.grid.voxel_from_mm() * image.grid.mm_from_voxel;
-    let stride = (image.grid.len() / 400_000).max(1);
+    let [nx, ny, _] = image.grid.dims;
+    let stride = coprime_stride(image.grid.len() / 400_000, nx * ny);
     let inside = |index: usize| {
         let [i, j, k] = image.grid.voxel(index);
         let p = to_region.transform_point(&Point3::new(i as f64, j as f64, k as f64));
@@ -97,4 +98,23 @@ pub(super) fn centre_mm(region: &Mask<Native>) -> Vector3<f64> {
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { Vector3::zeros() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Grid;
+
+    #[test]
+    fn the_range_is_the_images_where_a_row_is_as_long_as_the_step() {
+        // A column of air, which each step of a row's length meets: by the number of voxels that is the step of one, then of the other.
+        for slices in [12_500, 25_000] {
+            let grid = Grid::<Native>::axis_aligned([16, 16, slices], [1.0; 3], [0.0; 3]);
+            let image = Volume::from_fn(grid, |n| if n % 16 == 0 { 0.0 } else { 100.0 + (n % 7) as f32 });
+            let [low, high] = range_of(&image.data, 0.5, 1.0);
+            assert!(low > 99.0 && high > 105.0, "{low} {high}");
+            let [low, high] = range_within(&image, &image.map(|_| true), 0.5, 1.0);
+            assert!(low > 99.0 && high > 105.0, "{low} {high}");
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! Scans in units of another size than scanners write.
 
+use crate::image::sampling::coprime_stride;
+
 /// What 99 of 100 positive intensities lie below is expected between these: eight bits to sixteen, and float beyond that.
 const USUAL: std::ops::Range<f32> = 4.0..131_072.0;
 /// Where it is brought to, within a factor of two.
@@ -26,7 +28,7 @@ pub(super) fn brought_to_a_usual_size(data: &mut [f32]) -> Option<f32> {
 /// Enough of the values above `least` to tell quantiles by, in order.
 pub(super) fn some_above(data: &[f32], least: f32) -> Vec<f32> {
     const ENOUGH: usize = 200_000;
-    let stride = data.len().div_ceil(ENOUGH).max(1);
+    let stride = coprime_stride(data.len().div_ceil(ENOUGH), data.len());
     let mut some: Vec<f32> = data.iter().copied().step_by(stride).filter(|&x| x > least).collect();
     some.sort_unstable_by(f32::total_cmp);
     some
@@ -51,6 +53,13 @@ mod tests {
             let top = scaled.iter().copied().fold(0.0, f32::max);
             assert!((TARGET / 2.0..2.0 * TARGET).contains(&top), "{power}: {top}");
         }
+    }
+
+    #[test]
+    fn a_row_as_long_as_the_step_is_no_scan_of_air() {
+        // Two voxels of air to a row of 60, and a step of 60 by their number.
+        let scan: Vec<f32> = (0..11_999_940).map(|n| if n % 60 < 2 { 0.0 } else { (n % 7) as f32 + 1.0 }).collect();
+        assert!(some_above(&scan, 0.0).len() > 150_000);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::workflow::work::{Made, Work, facts};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const NAME: StageName = StageName::Pose;
 
 /// What the report says of the fit.

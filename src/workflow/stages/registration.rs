@@ -21,7 +21,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const NAME: StageName = StageName::Registration;
 /// What the pose is called, and how what is odd about it begins.
 pub(crate) const OF_POSE: &str = "pre to MNI";
