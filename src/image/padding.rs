@@ -113,7 +113,8 @@ impl Side {
     fn padding(&self) -> Option<Padding> {
         // Slopes as they are counted are rough: what lies near is looked for in a wider layer at first. Of thick slices such a layer
         // holds so much of a head behind the plane that the fit leaves it.
-        let near = |slopes| [4.0 * NEAR, NEAR].into_iter().find_map(|first_near| self.behind_slopes(slopes, first_near));
+        let near =
+            |slopes| [4.0 * NEAR, NEAR].into_iter().find_map(|first_near| self.behind_slopes(slopes, first_near));
         self.commonest_slopes().into_iter().find_map(near)
     }
 
@@ -239,7 +240,10 @@ mod tests {
         for (slice_mm, offsets) in [(3.0, 3), (5.0, 5), (6.0, 6)] {
             for offset_mm in (0..offsets).map(f64::from) {
                 let found = padding(&in_thick_slices(80.0, slice_mm, 20.0, offset_mm));
-                assert!(matches!(found[..], [Padding { axis: 2, at_end: true, .. }]), "{slice_mm} {offset_mm}: {found:?}");
+                assert!(
+                    matches!(found[..], [Padding { axis: 2, at_end: true, .. }]),
+                    "{slice_mm} {offset_mm}: {found:?}"
+                );
                 for radius_mm in [70.0, 80.0, 100.0] {
                     let whole = padding(&in_thick_slices(radius_mm, slice_mm, 0.0, offset_mm));
                     assert_eq!(whole, [], "{radius_mm} {slice_mm} {offset_mm}");

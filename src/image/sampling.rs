@@ -18,7 +18,7 @@ mod tests {
 
     #[test]
     fn a_step_meets_every_column_of_an_image_of_any_size() {
-        for [nx, ny, nz] in [[256, 416, 480], [256, 256, 192], [131, 163, 147], [240, 240, 155], [7, 5, 3]] {
+        for [nx, ny, nz] in [[256usize, 416, 480], [256, 256, 192], [131, 163, 147], [240, 240, 155], [7, 5, 3]] {
             let values = nx * ny * nz;
             let least = values.div_ceil(200_000);
             let stride = coprime_stride(least, values);
