@@ -4,11 +4,11 @@ use super::belief::{Doubt, Evidence};
 use super::cavity_pair::CavityPair;
 use super::sets::{both, either, without};
 use crate::geometry::Mni;
+use crate::image::Mask;
 use crate::image::components::{Connectivity, components, fill_holes, largest_component};
 use crate::image::distance::distance_mm;
 use crate::image::gaussian::gaussian;
 use crate::image::morphology::{close, dilate, erode, open};
-use crate::image::{LabelMap, Mask};
 use crate::segment::label;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,30 @@ impl Default for CavitySettings {
     }
 }
 
+impl CavitySettings {
+    /// Refuses settings that mean nothing, by name: a boundary that grows without end, a filter of negative width.
+    ///
+    /// # Errors
+    /// [`ResectError::Setting`].
+    pub fn check(&self) -> Result<(), ResectError> {
+        let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 9] = [
+            ("bias_sigma_mm", self.bias_sigma_mm, 5.0..=200.0, "5 to 200 mm"),
+            ("rim_mm", self.rim_mm, 0.0..=10.0, "0 to 10 mm"),
+            ("opening_mm", self.opening_mm, 0.0..=10.0, "0 to 10 mm"),
+            ("growth_mm", self.growth_mm, 0.0..=50.0, "0 to 50 mm"),
+            ("blood_mm", self.blood_mm, 0.0..=50.0, "0 to 50 mm"),
+            ("folds_kept", self.folds_kept, 0.0..=1.0, "0 to 1"),
+            ("surroundings_mm", self.surroundings_mm, 0.0..=20.0, "0 to 20 mm"),
+            ("closing_mm", self.closing_mm, 0.0..=20.0, "0 to 20 mm"),
+            ("smallest_cc", self.smallest_cc, 0.01..=100.0, "0.01 to 100 cc"),
+        ];
+        match rules.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
+            Some((name, value, _, rule)) => Err(ResectError::Setting { name, value, rule }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Hemisphere of the cavity's centre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -95,11 +119,11 @@ pub enum ResectError {
         }
     )]
     NoOperation {
-        /// The largest candidate.
+        /// The part that the doubt is about; the largest where none is large enough.
         largest_cc: f64,
         /// What would have counted.
         smallest_cc: f64,
-        /// Why the largest candidate is not believed, where it is large enough.
+        /// Why the largest part that was looked at is not believed.
         doubt: Option<Doubt>,
         /// Share of the brain that the post-operative scan does not show, in percent.
         unseen_percent: f64,
@@ -115,14 +139,33 @@ pub enum ResectError {
         /// Largest part that is tissue on pre and fluid on post.
         after_cc: f64,
     },
-    /// A given cavity lies elsewhere.
+    /// A given mask lies elsewhere.
     #[error(
-        "the cavity or resected mask lies outside the brain: only {percent:.0} % of it was tissue before; check the \
+        "the cavity or resected mask lies outside the brain: only {percent:.0} % of it was brain before; check the \
          masks and their grids"
     )]
     OutsideBrain {
-        /// Share of the cavity that was tissue on the pre-operative scan.
+        /// Share of the mask that was brain on the pre-operative scan: without the ventricles for a cavity.
         percent: f64,
+    },
+    /// A given mask marks no tissue.
+    #[error(
+        "the cavity or resected mask lies in fluid: only {percent:.0} % of what it takes was tissue before, the rest sulci, cisterns or \
+         ventricles; check the mask and its grid, or give a mask of the resected tissue"
+    )]
+    OnlyFluid {
+        /// Share of what is taken that was tissue on the pre-operative scan.
+        percent: f64,
+    },
+    /// A setting has no meaning.
+    #[error("`{name}` is {value}: it must be {rule}")]
+    Setting {
+        /// The setting's name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
     },
 }
 
@@ -163,26 +206,26 @@ pub fn find_cavity(pair: &CavityPair<'_>, settings: &CavitySettings) -> Result<C
     if before_cc >= settings.smallest_cc.max(seed.volume_cc()) {
         return Err(ResectError::Swapped { before_cc, after_cc: seed.volume_cc() });
     }
-    let largest_cc = seed.volume_cc();
-    let mut doubt = None;
+    let volume_cc = |part: usize| parts.voxels[part - 1] as f64 * grid.voxel_volume_mm3() / 1000.0;
+    let mut doubted: Option<(f64, Doubt)> = None;
     let mut believed = None;
-    for candidate in order.into_iter().take(MOST_CANDIDATES) {
-        let candidate = part_of(candidate);
-        if candidate.volume_cc() < settings.smallest_cc {
-            continue;
-        }
+    for part in order.into_iter().filter(|&part| volume_cc(part) >= settings.smallest_cc).take(MOST_CANDIDATES) {
+        let candidate = part_of(part);
         let evidence = Evidence::of(&candidate, pair);
         match evidence.doubt() {
             None => {
                 believed = Some((candidate, evidence));
                 break;
             }
-            Some(why) => doubt = doubt.or(Some(why)),
+            Some(why) if doubted.is_none_or(|(cc, _)| cc < volume_cc(part)) => doubted = Some((volume_cc(part), why)),
+            Some(_) => {}
         }
     }
     let Some((seed, evidence)) = believed else {
         let seen = both(pair.pre_brain, pair.post_known).count() as f64 / pair.pre_brain.count().max(1) as f64;
         let unseen_percent = 100.0 * (1.0 - seen);
+        let largest_cc = (1..scores.len()).map(volume_cc).fold(0.0, f64::max);
+        let (largest_cc, doubt) = doubted.map_or((largest_cc, None), |(cc, why)| (cc, Some(why)));
         return Err(ResectError::NoOperation { largest_cc, smallest_cc: settings.smallest_cc, doubt, unseen_percent });
     };
 
@@ -212,34 +255,6 @@ pub(super) fn with_fluid_of(lost: &Mask<Mni>, tissue: &Mask<Mni>, sigma_mm: f64)
     Mask::from_fn(lost.grid, belongs)
 }
 
-/// The finding of a mask (or two) given by hand; what is missing is the other one within the brain.
-///
-/// # Errors
-/// [`ResectError::OutsideBrain`] when less than half of the cavity was brain before.
-pub fn subtract(
-    cavity: Option<Mask<Mni>>,
-    resected: Option<Mask<Mni>>,
-    pre_brain: &Mask<Mni>,
-    pre_labels: &LabelMap<Mni>,
-) -> Result<Option<CavityFinding>, ResectError> {
-    let ventricle = pre_labels.map(|l| l == label::VENTRICLE);
-    let (cavity, resected) = match (cavity, resected) {
-        (None, None) => return Ok(None),
-        (Some(cavity), Some(resected)) => (cavity, resected),
-        (Some(cavity), None) => {
-            let resected = without(&both(&cavity, pre_brain), &ventricle);
-            (cavity, resected)
-        }
-        (None, Some(resected)) => (resected.clone(), resected),
-    };
-    let percent = 100.0 * both(&resected, pre_brain).count() as f64 / cavity.count().max(1) as f64;
-    if percent < 50.0 {
-        return Err(ResectError::OutsideBrain { percent });
-    }
-    let side = side_of(&cavity);
-    Ok(Some(CavityFinding { cavity, resected, side, evidence: None }))
-}
-
 /// Layers of one voxel (6-neighbours) from the seed through `allowed`, as many as fit into `limit_mm`.
 pub(super) fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask<Mni> {
     let [nx, ny, nz] = seed.grid.dims;
@@ -265,6 +280,9 @@ pub(super) fn grow(seed: &Mask<Mni>, allowed: &Mask<Mni>, limit_mm: f64) -> Mask
                 }
             }
         }
+        if next.is_empty() {
+            break;
+        }
         front = next;
     }
     // What only hangs on by a thread is a sulcus that opened into the cavity.
@@ -284,13 +302,13 @@ pub fn apart_from(mask: &Mask<Mni>, other: &Mask<Mni>, margin_mm: f64) -> Mask<M
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::cavity_pair::MadePair;
     use super::*;
-    use crate::image::{Grid, Volume};
+    use crate::image::{Grid, LabelMap, Volume};
 
     /// A ball of white matter of radius 40 mm with a ventricle, and a second scan with other gain and a hole.
-    fn head(hole_radius_mm: f64) -> MadePair {
+    pub(in super::super) fn head(hole_radius_mm: f64) -> MadePair {
         let grid = Grid::axis_aligned([60, 60, 60], [1.5; 3], [-44.25; 3]);
         let at = |n: usize| grid.position(grid.voxel(n).map(|c| c as f64).into()).mm;
         let far = |n: usize, c: [f64; 3]| (at(n) - nalgebra::Point3::from(c)).norm();
@@ -409,13 +427,58 @@ mod tests {
         assert!(!seen.to_string().contains("field of view"), "{seen}");
     }
 
+    /// A head with so much darker places, and what it shows before.
+    fn with_places(places: &[([f64; 3], f64, [f32; 2])]) -> (MadePair, Mask<Mni>) {
+        let mut h = head(0.0);
+        let grid = h.pre.grid;
+        for &(centre, radius_mm, [before, after]) in places {
+            let near = |n: usize| (grid.centre(grid.voxel(n)).mm - nalgebra::Point3::from(centre)).norm() < radius_mm;
+            for n in (0..grid.len()).filter(|&n| near(n)) {
+                (h.pre.data[n], h.post.data[n]) = (before, after);
+                h.gone.data[n] = true;
+            }
+        }
+        let known = h.brain.map(|_| true);
+        (h, known)
+    }
+
     #[test]
-    fn a_mask_by_hand_must_lie_in_the_brain() {
+    fn the_size_that_is_told_is_that_of_the_part_that_is_doubted() {
+        // A small deep hole has lost more, but is too small to be looked at.
+        let hole = ([17.0, 0.0, 0.0], 5.8, [100.0, 25.0]);
+        let faint = ([0.0, -30.0, 0.0], 8.0, [85.0, 55.0]);
+        let told = |places: &[_]| {
+            let (h, known) = with_places(places);
+            match find_cavity(&h.pair(&known), &CavitySettings::default()) {
+                Err(ResectError::NoOperation { largest_cc, doubt, .. }) => (largest_cc, doubt.is_some()),
+                other => panic!("{other:?}"),
+            }
+        };
+        let (alone, both) = (told(&[hole]), told(&[hole, faint]));
+        assert!((0.5..1.0).contains(&alone.0) && !alone.1, "{alone:?}");
+        assert!((1.5..2.5).contains(&both.0) && both.1, "{both:?}");
+    }
+
+    #[test]
+    fn parts_that_are_too_small_take_no_candidates_place() {
+        let small = |axis: usize, side: f64| {
+            let mut centre = [0.0; 3];
+            centre[axis] = 17.0 * side;
+            (centre, 5.8, [100.0, 25.0])
+        };
+        let mut places: Vec<_> = (0..3).flat_map(|axis| [small(axis, -1.0), small(axis, 1.0)]).collect();
+        assert_eq!(places.len(), MOST_CANDIDATES);
+        places.push(([17.3; 3], 7.0, [100.0, 25.0]));
+        let (h, known) = with_places(&places);
+        let found = find_cavity(&h.pair(&known), &CavitySettings::default()).unwrap();
+        let (hole, _) = with_places(&places[MOST_CANDIDATES..]);
+        assert!(found.cavity.dice(&hole.gone) > 0.8, "{}", found.cavity.dice(&hole.gone));
+    }
+
+    #[test]
+    fn a_boundary_that_may_grow_without_end_ends_where_nothing_is_left_to_grow_into() {
         let h = head(12.0);
-        let outside = h.brain.map(|inside| !inside);
-        assert!(matches!(subtract(Some(outside), None, &h.brain, &h.labels), Err(ResectError::OutsideBrain { .. })));
-        let given = subtract(Some(h.gone.clone()), None, &h.brain, &h.labels).unwrap().unwrap();
-        assert!(given.resected.dice(&h.gone) > 0.99);
-        assert_eq!(subtract(None, None, &h.brain, &h.labels).unwrap().map(|f| f.side), None);
+        let seed = erode(&h.gone, 4.0);
+        assert_eq!(grow(&seed, &h.gone, 1e12), grow(&seed, &h.gone, 100.0));
     }
 }

@@ -2,6 +2,7 @@
 
 mod belief;
 mod blood;
+mod by_hand;
 mod cavity;
 mod cavity_pair;
 mod edge;
@@ -15,7 +16,8 @@ mod sets;
 mod window;
 
 pub use belief::{Doubt, Evidence};
-pub use cavity::{CavityFinding, CavitySettings, ResectError, Side, apart_from, find_cavity, subtract};
+pub use by_hand::subtract;
+pub use cavity::{CavityFinding, CavitySettings, ResectError, Side, apart_from, find_cavity};
 pub use cavity_pair::CavityPair;
 pub use intensity::on_the_scale_of;
 pub use likeness::{Likeness, likeness};

@@ -1,13 +1,14 @@
 //! A pre- and a post-operative scan taken apart together.
 
 use super::blood::{SaggedPair, with_blood};
+use super::by_hand::{filling, subtract, takes_tissue};
 use super::edge::{at_edge_percent, outside_percent};
 use super::elsewhere::{lost_elsewhere_cc, with_losses_elsewhere};
 use super::sag::{SagScans, fit_sag};
 use super::sets::both;
 use super::{
     CavityFinding, CavityPair, CavitySettings, Likeness, ResectError, apart_from, find_cavity, likeness,
-    on_the_scale_of, subtract,
+    on_the_scale_of,
 };
 use crate::geometry::{Mni, Post, Pre};
 use crate::image::{LabelMap, Mask, Volume, VoxelBox};
@@ -44,7 +45,8 @@ impl PairSettings {
     pub fn check(&self) -> Result<(), String> {
         self.deformable.check().map_err(|e| format!("[anat.deformable]: {e}"))?;
         self.sag.check().map_err(|e| format!("[anat.sag]: {e}"))?;
-        self.segment.check().map_err(|e| format!("[anat.segment]: {e}"))
+        self.segment.check().map_err(|e| format!("[anat.segment]: {e}"))?;
+        self.cavity.check().map_err(|e| format!("[anat.cavity]: {e}"))
     }
 }
 
@@ -159,7 +161,7 @@ pub enum PairError {
     Resect(#[from] ResectError),
     /// Nothing was taken out.
     #[error(
-        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain; check the cavity \
+        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain, or hardly any; check the cavity \
          mask, or give a mask of the resected tissue"
     )]
     NothingResected,
@@ -294,8 +296,9 @@ pub fn take_pair_apart(
         beside.extend(with_blood.told(settings.cavity.smallest_cc));
     }
     let filled_before = undone(&finding.cavity, &sag);
-    finding.resected = given.resected.clone().unwrap_or_else(|| both(&filled_before, &before.brain_mni));
-    if finding.resected.count() == 0 {
+    let filled = || filling(&filled_before, &before.brain_mni, &before.labels_mni);
+    finding.resected = given.resected.clone().unwrap_or_else(filled);
+    if !takes_tissue(&finding.resected, &before.labels_mni) {
         return Err(PairError::NothingResected);
     }
 
@@ -369,11 +372,13 @@ pub fn take_head_apart(
     let masks = SegmentOverrides { brain: given.brain.as_ref(), ventricle: given.ventricle.as_ref() };
     let in_pre = |source| PairError::Head { scan: "the pre-operative scan", source };
     if let Some(labels) = &given.labels {
-        let (mut before, scale) = segment_by_labels(pre, labels);
+        let (filled, gaps) = without_gaps(pre.t1).unzip();
+        let filled = filled.as_ref().map(|t1| PosedScan::new(t1, &pre.mni_from_t1));
+        let (mut before, scale) = segment_by_labels(filled.as_ref().unwrap_or(pre), labels);
         let fit = fit_template_to_labels(&before.labels_mni, &settings.deformable).map_err(|e| in_pre(e.into()))?;
         let on_template = |p| fit.atlas_from_subject.apply(p);
         let left_out = LeftOut::of(&before.brain_mni, &before.known_mni, on_template).noted(BrainSource::Labels);
-        before.warnings.extend(left_out);
+        before.warnings.extend(left_out.into_iter().chain(gaps.unwrap_or_default()));
         return Ok((before, fit, scale));
     }
     let head = segment_head(pre, &masks, &settings.deformable, &settings.segment);
@@ -501,6 +506,26 @@ mod tests {
         assert!(exchanged(drawn(100.0, 80.0)));
         assert!(!exchanged(drawn(80.0, 110.0)));
         assert!(!exchanged(drawn(90.0, 88.0)), "neither tissue is the brighter one");
+    }
+
+    #[test]
+    fn a_slice_that_a_scan_with_labels_has_lost_is_filled_and_told() {
+        let labels: LabelMap<Pre> = atlas::template().labels.clone().relabelled();
+        let lost = labels.grid.dims[2] / 2;
+        let t1 = Volume::from_fn(labels.grid, |n| {
+            let shown = [0.0, 30.0, 70.0, 100.0, 30.0].get(usize::from(labels.data[n])).copied().unwrap_or(70.0f32);
+            if labels.grid.voxel(n)[2] == lost { 0.0 } else { shown }
+        });
+        let rough = DeformableSettings { iterations: vec![1], levels_mm: vec![8.0], ..DeformableSettings::default() };
+        let settings = PairSettings { deformable: rough, ..PairSettings::default() };
+        let given = GivenMasks { labels: Some(labels.clone()), ..GivenMasks::default() };
+        let pose = RigidTransform::identity();
+        let (before, ..) = take_head_apart(&PosedScan::new(&t1, &pose), &given, &settings).unwrap();
+        let told = before.warnings.iter().filter(|w| matches!(w, SegmentWarning::BlankSlices { .. })).count();
+        assert_eq!(told, 1, "{:?}", before.warnings);
+        let dark = (0..labels.data.len()).filter(|&n| labels.grid.voxel(n)[2] == lost && before.brain_mni.data[n]);
+        let dark = dark.filter(|&n| before.t1_mni.data[n] == 0.0).count();
+        assert!(dark < 100, "{dark}");
     }
 
     #[test]

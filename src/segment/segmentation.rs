@@ -342,16 +342,26 @@ impl SegmentSettings {
     /// # Errors
     /// [`SegmentError::Setting`].
     pub fn check(&self) -> Result<(), SegmentError> {
-        let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 9] = [
+        let rules: [(&'static str, f64, std::ops::RangeInclusive<f64>, &'static str); 14] = [
             ("brain.reach_mm", self.brain.reach_mm, 0.0..=30.0, "0 to 30 mm"),
             ("brain.opening_mm", self.brain.opening_mm, 0.0..=10.0, "0 to 10 mm"),
             ("brain.closing_mm", self.brain.closing_mm, 0.0..=20.0, "0 to 20 mm"),
             ("brain.trusted_depth_mm", self.brain.trusted_depth_mm, 0.0..=30.0, "0 to 30 mm"),
             ("ventricle.reach_mm", self.ventricle.reach_mm, 0.0..=30.0, "0 to 30 mm"),
+            ("ventricle.cistern_clearance_mm", self.ventricle.cistern_clearance_mm, 0.0..=30.0, "0 to 30 mm"),
             ("ventricle.closing_mm", self.ventricle.closing_mm, 0.0..=5.0, "0 to 5 mm"),
+            ("iterations", self.iterations as f64, 1.0..=1000.0, "1 to 1000"),
             ("bias_order", self.bias_order as f64, 0.0..=3.0, "0 to 3"),
+            ("bias_starts_at", self.bias_starts_at as f64, 0.0..=1000.0, "0 to 1000"),
             ("disbelief", self.disbelief, 0.0..=1.0, "0 to 1"),
             ("neighbour_weight", self.neighbour_weight, 0.0..=5.0, "0 to 5"),
+            ("smallest_brain_cc", self.smallest_brain_cc, 0.0..=10_000.0, "0 to 10000 cc"),
+            (
+                "largest_brain_cc",
+                self.largest_brain_cc,
+                self.smallest_brain_cc..=10_000.0,
+                "smallest_brain_cc to 10000 cc",
+            ),
         ];
         for (name, value, range, rule) in rules {
             if !range.contains(&value) {

@@ -324,6 +324,37 @@ mod tests {
     }
 
     #[test]
+    fn every_number_of_the_segmentation_and_the_cavity_has_a_range_that_its_default_lies_in() {
+        let defaults: toml::Table = Settings::default().to_toml().parse().unwrap();
+        let anat = defaults["anat"].as_table().unwrap();
+        let segment = anat["segment"].as_table().unwrap();
+        let tables = [
+            ("anat.cavity", anat["cavity"].as_table().unwrap()),
+            ("anat.segment", segment),
+            ("anat.segment.brain", segment["brain"].as_table().unwrap()),
+            ("anat.segment.ventricle", segment["ventricle"].as_table().unwrap()),
+        ];
+        for (table, numbers) in tables {
+            for (name, _) in numbers.iter().filter(|(_, value)| value.is_float()) {
+                for bad in ["-1.0", "nan", "inf", "-1e9"] {
+                    let said = said(&format!("[{table}]\n{name} = {bad}\n"));
+                    assert!(
+                        said.contains("table [anat]") && said.contains(&format!("{name}`")),
+                        "{table} {name}: {said}"
+                    );
+                }
+            }
+        }
+        for (text, words) in [
+            ("[anat.cavity]\nbias_sigma_mm = 0.0\n", "5 to 200 mm"),
+            ("[anat.segment]\niterations = 0\n", "`iterations` is 0"),
+            ("[segment]\nsmallest_brain_cc = 3000.0\n", "`largest_brain_cc` is 2200"),
+        ] {
+            assert!(said(text).contains(words), "{}", said(text));
+        }
+    }
+
+    #[test]
     fn a_file_with_tables_of_many_commands_is_taken() {
         let text = "[image]\nprefer = \"sform\"\n[resection]\ntissues = 2\n[mesh.limits]\ntime_s = 10.0\n";
         assert_eq!(Settings::layer(text, "my.toml").unwrap().len(), 3);
