@@ -192,7 +192,7 @@ pub struct ResectionVolumes {
     /// The cavity on the post-operative image.
     #[serde(default)]
     pub cavity_cc: Option<f64>,
-    /// The resected tissue on the pre-operative image.
+    /// The resected tissue on the pre-operative image, without the fluid between it.
     #[serde(default)]
     pub resected_cc: Option<f64>,
     /// The ventricles before surgery.

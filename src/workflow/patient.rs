@@ -234,7 +234,7 @@ impl<'w, 'a> Patient<'w, 'a> {
         let mesh = vtu::decode(&mesh_bytes, REST_MESH)?.mesh;
         let anatomy = Anatomy::read(&work.case)?;
         let scenario = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
-        let scenario = settings.supported(&scenario, &anatomy.labels)?;
+        let scenario = settings.supported(&scenario, &anatomy.before)?;
         let (scenario, held) = stages::with_held_tissues(work, &prepared.mesh.mesh, scenario)?;
         let mesh = settings.supported_mesh(mesh, &scenario)?;
         let surfaces = stages::observed_surfaces(&anatomy);
@@ -325,13 +325,13 @@ impl<'w, 'a> Patient<'w, 'a> {
         let settings = if unknown_fluid { settings.in_fluid() } else { settings };
         let anatomy = Anatomy::read(&work.case)?;
         let template = settings.scenario(&stages::mni_from_gravity_frame(&work.case, settings.gravity_frame)?);
-        let scenario = settings.supported(&template, &anatomy.labels)?;
+        let scenario = settings.supported(&template, &anatomy.before)?;
         let (scenario, _) = stages::with_held_tissues(work, &self.prepared.mesh.mesh, scenario)?;
         let rest = vtu::decode(&self.mesh_bytes, REST_MESH)?.mesh;
         let mesh = settings.supported_mesh(rest, &scenario)?;
         let reference = Reference::Surfaces(ObservedSurfaces::new(&mesh, stages::observed_surfaces(&anatomy))?);
         let gravity = scenario.loads.gravity_m_per_s2;
-        let levels = || levels_when_drained(&anatomy.labels, gravity).and_then(FluidLevels::new).map(Arc::new);
+        let levels = || levels_when_drained(&anatomy.before, gravity).and_then(FluidLevels::new).map(Arc::new);
         let levels = unknown_fluid.then(levels).flatten();
         Ok(HeldBody { settings: Some(settings), scenario, mesh, reference, levels })
     }

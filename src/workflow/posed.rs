@@ -124,7 +124,7 @@ pub fn posed_case(
             }
             let mut scenario = own.scenario(&stages::mni_from_gravity_frame(&case, own.gravity_frame)?);
             if own.needs_labels() {
-                scenario = own.supported(&scenario, &stages::Anatomy::read(&case)?.labels)?;
+                scenario = own.supported(&scenario, &stages::Anatomy::read(&case)?.before)?;
             }
             (scenario, own.poisson_ratio)
         }

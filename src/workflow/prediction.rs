@@ -122,7 +122,7 @@ fn every_stage(
     // A level that the brain has not is refused before anything is meshed for it.
     let mni_from_pre = stages::mni_from_pre(&work.case)?;
     for way in &settings.predict.heads {
-        stages::fluid_of_head(&settings.predict, way, &head.labels, &mni_from_pre)?;
+        stages::fluid_of_head(&settings.predict, way, &head.before, &mni_from_pre)?;
     }
     let meshed: MeshFacts = stages::mesh(work, &mut made, &head.labels, Some(&head.template_from_patient), None)?;
     work.case.drop_stale();

@@ -96,7 +96,7 @@ fn posed(asked: &Asked, work: &Work<'_>) -> Result<Vec<Stage>, WorkflowError> {
     let resection = &work.settings.resection;
     let mut scenario = resection.scenario(&stages::mni_from_gravity_frame(&work.case, resection.gravity_frame)?);
     if resection.needs_labels() {
-        scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.labels)?;
+        scenario = resection.supported(&scenario, &stages::Anatomy::read(&work.case)?.before)?;
     }
     if let Some((_, mesh)) = &meshed {
         (scenario, _) = stages::with_held_tissues(work, &mesh.mesh, scenario)?;

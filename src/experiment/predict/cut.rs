@@ -81,12 +81,12 @@ pub fn planned<F: Frame>(
     if outside > MOST_OUTSIDE {
         return Err(PlannedError::Outside { plan: plan(), percent: 100.0 * outside });
     }
-    let taken = both().filter(|(m, l)| **m && label::is_tissue(**l)).count();
-    if taken == 0 {
+    let resected_cc = tissue_cc(mask, labels);
+    if resected_cc == 0.0 {
         return Err(PlannedError::NoTissue { plan: plan(), cc: marked as f64 * voxel_cc });
     }
     let tissue = labels.map(label::is_tissue);
-    let found = Planned { resected_cc: taken as f64 * voxel_cc, tissue_cc: tissue.count() as f64 * voxel_cc, outside };
+    let found = Planned { resected_cc, tissue_cc: tissue.count() as f64 * voxel_cc, outside };
     if found.resected_cc > 0.5 * found.tissue_cc {
         let (resected_cc, tissue_cc) = (found.resected_cc, found.tissue_cc);
         return Err(PlannedError::MoreThanHalf { plan: plan(), resected_cc, tissue_cc });
@@ -97,6 +97,13 @@ pub fn planned<F: Frame>(
         return Err(PlannedError::InTwo { plan: plan(), apart_cc });
     }
     Ok(found)
+}
+
+/// How much of a mask is tissue, cc: what an operation takes of the brain, without the fluid between it. Of a plan and of what a second
+/// scan shows alike.
+pub fn tissue_cc<F: Frame>(mask: &Mask<F>, labels: &LabelMap<F>) -> f64 {
+    let taken = mask.data.iter().zip(&labels.data).filter(|(m, l)| **m && label::is_tissue(**l)).count();
+    taken as f64 * labels.grid.voxel_volume_mm3() / 1000.0
 }
 
 /// Voxels that are not of the largest part: a mesh holds that one alone, however many pieces the others are.
@@ -137,6 +144,19 @@ mod tests {
         let labels = labels();
         let volume_mm3 = 4.0 / 3.0 * std::f64::consts::PI * half_axes.iter().product::<f64>();
         planned("plan.nii", volume_mm3, &ellipsoid_mask(&labels.grid, centre, half_axes), &labels)
+    }
+
+    #[test]
+    fn what_is_taken_is_the_tissue_of_a_mask_alone() {
+        // Over the fluid between the blocks and out of the brain.
+        let labels = labels();
+        let [wide, exact] = [false, true].map(|exact| {
+            let mask = ellipsoid_mask(&labels.grid, [29.5, 10.0, 10.0], [10.0; 3]);
+            Mask::from_fn(labels.grid, |n| mask.data[n] && (!exact || label::is_tissue(labels.data[n])))
+        });
+        assert!(wide.volume_cc() > 1.5 * exact.volume_cc());
+        assert!((tissue_cc(&wide, &labels) - exact.volume_cc()).abs() < 1e-9);
+        assert!((planned("p", 1.0, &wide, &labels).unwrap().resected_cc - exact.volume_cc()).abs() < 1e-9);
     }
 
     #[test]

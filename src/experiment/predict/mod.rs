@@ -33,7 +33,7 @@ mod taught;
 mod uncertain;
 
 pub use check::{Check, checked};
-pub use cut::{Planned, PlannedError, ellipsoid_mask, planned};
+pub use cut::{Planned, PlannedError, ellipsoid_mask, planned, tissue_cc};
 pub use draws_table::{DrawsTableError, draws_from_csv, draws_to_csv, mode_name};
 pub use ellipsoid::{Ellipsoid, Scatter, ellipsoid_95};
 pub use evaluation::{

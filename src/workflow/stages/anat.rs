@@ -5,6 +5,7 @@ use super::reading::WithReading;
 use super::registration::transforms;
 use crate::artefact::{Produced, Stage};
 use crate::experiment::outcome::ResectionVolumes;
+use crate::experiment::predict::tissue_cc;
 use crate::geometry::{Frame, Mni};
 use crate::image::nifti::{self, ReadOptions, encode_i16, encode_intensities, encode_mask, encode_u8, encode_vectors};
 use crate::image::{LabelMap, Mask, Padding, Volume};
@@ -52,8 +53,10 @@ pub struct AnatFacts {
 /// The masks a case's later stages start from, as its files hold them.
 #[derive(Debug)]
 pub(crate) struct Anatomy {
-    /// Labels with the resected tissue as a label of its own.
+    /// Labels with the resected tissue as a label of its own: what is meshed.
     pub labels: LabelMap<Mni>,
+    /// Labels of the scan before the operation: what tells skull and fluid, wherever a mask of what was taken ends.
+    pub before: LabelMap<Mni>,
     /// Cavity on the post-operative scan.
     pub cavity: Mask<Mni>,
     /// Ventricles on the post-operative scan, apart from the cavity.
@@ -84,8 +87,10 @@ impl Anatomy {
             let displacement = nifti::decode_displacement(&case.read(name)?, name)?;
             Ok(DisplacementField::from_displacement(&displacement.relabelled()))
         };
+        let before: LabelMap<Mni> = labels.relabelled();
         Ok(Self {
-            labels: without_resected(labels.relabelled(), &resected),
+            labels: without_resected(before.clone(), &resected),
+            before,
             cavity,
             post_ventricle,
             sag: field(SAG)?,
@@ -94,10 +99,12 @@ impl Anatomy {
     }
 }
 
-/// The labels with what is taken as a label of its own; a ventricle that is opened stays one.
+/// The labels with what is taken as a label of its own; a ventricle that is opened stays one, and what lies outside the brain stays
+/// outside: a mask that was drawn generously takes no more than an exact one. A sulcus between what is taken goes with it: it would be
+/// closed to a sheet of grey matter that stands in the cavity.
 pub(super) fn without_resected(mut labels: LabelMap<Mni>, resected: &Mask<Mni>) -> LabelMap<Mni> {
     for (l, taken) in labels.data.iter_mut().zip(&resected.data) {
-        if *taken && *l != label::VENTRICLE {
+        if *taken && *l != label::VENTRICLE && *l != label::BACKGROUND {
             *l = label::RESECTED;
         }
     }
@@ -210,7 +217,7 @@ pub(crate) fn anat(
         produced.facts = facts(&AnatFacts {
             volumes: ResectionVolumes {
                 cavity_cc: Some(native_cavity.volume_cc()),
-                resected_cc: Some(native_resected.volume_cc()),
+                resected_cc: Some(tissue_cc(&found.resected, &before.labels_mni)),
                 ventricle_before_cc: Some(before.volumes.ventricle_cc),
                 ventricle_after_cc: Some(post_ventricle.volume_cc()),
                 brain_cc: Some(before.volumes.brain_cc),
@@ -264,6 +271,17 @@ pub(super) fn whole_numbers(volume: &Volume<f32, Mni>) -> Volume<i16, Mni> {
 mod tests {
     use super::*;
     use crate::image::Grid;
+
+    #[test]
+    fn what_is_taken_is_nothing_outside_the_brain_and_no_ventricle_but_its_sulci() {
+        let grid = Grid::<Mni>::axis_aligned([6, 1, 1], [1.0; 3], [0.0; 3]);
+        let (outside, fluid, grey, white, ventricle) =
+            (label::BACKGROUND, label::CSF, label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE);
+        let labels = LabelMap::from_data(grid, vec![outside, fluid, grey, white, ventricle, white]);
+        let taken = Mask::from_data(grid, vec![true, true, true, true, true, false]);
+        let resected = label::RESECTED;
+        assert_eq!(without_resected(labels, &taken).data, [outside, resected, resected, resected, ventricle, white]);
+    }
 
     #[test]
     fn one_voxel_out_of_proportion_leaves_the_others_their_grey_levels() {

@@ -57,8 +57,10 @@ pub struct PlanFacts {
 /// What later stages start from, as the case's files hold it.
 #[derive(Debug)]
 pub(crate) struct PlannedHead {
-    /// Labels with the planned tissue as a label of its own.
+    /// Labels with the planned tissue as a label of its own: what is meshed.
     pub labels: LabelMap<Mni>,
+    /// Labels of the scan, without any plan: what tells skull and fluid.
+    pub before: LabelMap<Mni>,
     /// Where a point of the patient lies in the template.
     pub template_from_patient: DisplacementField<Mni>,
 }
@@ -71,8 +73,10 @@ impl PlannedHead {
         let (taken, _) = nifti::decode_labels(&case.read(RESECTED)?, RESECTED, &options)?;
         let taken: Mask<Mni> = taken.relabelled::<Mni>().map(|l| l > 0);
         let field = nifti::decode_displacement(&case.read(TEMPLATE_DISPLACEMENT)?, TEMPLATE_DISPLACEMENT)?;
+        let before: LabelMap<Mni> = labels.relabelled();
         Ok(Self {
-            labels: without_resected(labels.relabelled(), &taken),
+            labels: without_resected(before.clone(), &taken),
+            before,
             template_from_patient: DisplacementField::from_displacement(&field.relabelled()),
         })
     }
@@ -167,4 +171,80 @@ pub(crate) fn plan(
         targets.check_inside(&mask_of(&work.case, PRE_NATIVE_BRAIN, &scan.pre.grid)?)?;
     }
     Ok(facts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::predict::{Head, KnownLevel, PredictSettings};
+    use crate::experiment::supports::{SkullSettings, level_when_drained};
+    use crate::image::{Grid, Volume};
+    use crate::segment::label;
+
+    /// A brain of 24 mm around its ventricle, under 5 mm of fluid in front, with nothing around it.
+    fn labels() -> LabelMap<Mni> {
+        let grid = Grid::<Mni>::axis_aligned([60, 60, 60], [1.5; 3], [-44.25; 3]);
+        LabelMap::from_fn(grid, |n| {
+            let p = grid.centre(grid.voxel(n)).mm;
+            match p.coords.norm() {
+                r if r < 8.0 => label::VENTRICLE,
+                r if r < 20.0 => label::WHITE_MATTER,
+                r if r < 24.0 => label::GREY_MATTER,
+                r if r < 29.0 && p.y > 0.0 => label::CSF,
+                _ => label::BACKGROUND,
+            }
+        })
+    }
+
+    /// The case of a plan, as its stages read it.
+    fn head(taken: &Mask<Mni>) -> PlannedHead {
+        let folder = tempfile::tempdir().unwrap();
+        let still = Volume::filled(taken.grid, [0.0f32; 3]);
+        let files = [
+            (PRE_LABELS, encode_u8(&labels())),
+            (RESECTED, encode_mask(taken)),
+            (TEMPLATE_DISPLACEMENT, encode_vectors(&still)),
+        ];
+        for (file, bytes) in files {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, bytes).unwrap();
+        }
+        PlannedHead::read(&Case::at(folder.path())).unwrap()
+    }
+
+    #[test]
+    fn fluid_and_skull_are_those_of_the_scan_however_far_out_a_plan_is_drawn() {
+        let labels = labels();
+        let grid = labels.grid;
+        let box_up_to = |top_mm: f64| {
+            Mask::from_fn(grid, |n| {
+                let p = grid.centre(grid.voxel(n)).mm;
+                p.x.abs() < 6.0 && p.z.abs() < 6.0 && (12.0..top_mm).contains(&p.y)
+            })
+        };
+        // 15 mm out of the fluid, and no higher than the cortex, whose tissue is the same.
+        let [out, exact] = [44.0, 24.0].map(|top_mm| head(&box_up_to(top_mm)));
+        let down = [0.0, -9.81, 0.0];
+        let known = PredictSettings {
+            fluid_level: Some(KnownLevel { below_top_mm: 5.0, sd_mm: 2.0 }),
+            ..PredictSettings::default()
+        };
+        let found = |labels: &LabelMap<Mni>| {
+            let (fluid, top_at) = known.fluid_of_head(&Head::Supine, labels, down).unwrap().unwrap();
+            let drained = [0.2, 0.5].map(|part| level_when_drained(labels, down, part).unwrap());
+            (fluid, top_at.mm, drained)
+        };
+        let skull =
+            |labels: &LabelMap<Mni>| SkullSettings::default().distance(labels).unwrap().at([0.0, 22.0, 0.0]).value;
+        for head in [&out, &exact] {
+            assert_eq!(found(&head.before), found(&labels));
+            assert_eq!(skull(&head.before), skull(&labels));
+        }
+        // What is meshed ends where the brain does.
+        let resected = |head: &PlannedHead| head.labels.map(|l| l == label::RESECTED);
+        let inside = resected(&out);
+        assert!(inside.count() > resected(&exact).count());
+        assert!((0..grid.len()).all(|n| !inside.data[n] || labels.data[n] != label::BACKGROUND));
+    }
 }

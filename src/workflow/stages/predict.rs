@@ -175,15 +175,15 @@ impl<'a> Patient<'a> {
         let gravity = head.gravity_m_per_s2(&self.mni_from_pre);
         let one = |(supports, weight)| -> Result<Posed, WorkflowError> {
             let own = settings.predict.resection(&settings.resection, gravity, supports);
-            let scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), &self.head.labels)?;
+            let scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), &self.head.before)?;
             let (mut scenario, _) = with_held_tissues(work, self.input.mesh.2, scenario)?;
             let csf = settings.resection.csf.as_ref();
-            if let Some((level, _)) = settings.predict.known_fluid(csf, &self.head.labels, gravity) {
+            if let Some((level, _)) = settings.predict.known_fluid(csf, &self.head.before, gravity) {
                 scenario.loads.csf = Some(level);
             }
             let mesh = own.supported_mesh(self.input.mesh.0.clone(), &scenario)?;
             scenario.solver.element = settings.estimate.element;
-            let uncertainty = settings.predict.uncertainty(&own, &settings.prior, &self.head.labels)?;
+            let uncertainty = settings.predict.uncertainty(&own, &settings.prior, &self.head.before)?;
             let (supports, poisson_ratio) = (supports.name().to_owned(), own.poisson_ratio);
             Ok(Posed { supports, weight, mesh, scenario, poisson_ratio, uncertainty })
         };
@@ -338,7 +338,7 @@ impl Lying {
             told.extend(forecast.check);
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
-        let fluid = fluid_of_head(settings, head, &patient.head.labels, &patient.mni_from_pre)?;
+        let fluid = fluid_of_head(settings, head, &patient.head.before, &patient.mni_from_pre)?;
         Ok(Self { draws, named, spread, checks: told, shares, fluid, states, supports })
     }
 
