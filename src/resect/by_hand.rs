@@ -23,7 +23,9 @@ pub fn subtract(
     let ventricle = pre_labels.map(|l| l == label::VENTRICLE);
     let beside_ventricle = without(pre_brain, &ventricle);
     // Each mask by itself: a small piece may have left a large cavity, and a large one a cavity that has closed.
-    let given = [(cavity.as_ref(), &beside_ventricle), (resected.as_ref(), pre_brain)];
+    // What a cavity alone takes is all of it but the ventricle; beside a mask of what was taken it may open to one.
+    let of_cavity = if resected.is_some() { pre_brain } else { &beside_ventricle };
+    let given = [(cavity.as_ref(), of_cavity), (resected.as_ref(), pre_brain)];
     let inside = given.into_iter().filter_map(|(mask, brain)| Some(percent_of(mask?, |n| brain.data[n])));
     let percent = inside.fold(100.0, f64::min);
     if percent < 50.0 {

@@ -145,7 +145,7 @@ pub enum ResectError {
          masks and their grids"
     )]
     OutsideBrain {
-        /// Share of the mask that was brain on the pre-operative scan: without the ventricles for a cavity.
+        /// Share of the mask that was brain on the pre-operative scan: without the ventricles for a cavity alone.
         percent: f64,
     },
     /// A given mask marks no tissue.
