@@ -5,7 +5,9 @@
 /// be air.
 pub fn coprime_stride(least: usize, values: usize) -> usize {
     let least = least.max(1);
-    (least..).find(|stride| greatest_common_divisor(*stride, values) == 1).unwrap_or(least)
+    // One of as many steps in a row leaves 1 when divided by their number.
+    let mut steps = least..least.saturating_add(values.max(1));
+    steps.find(|step| greatest_common_divisor(*step, values) == 1).unwrap_or(least)
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
