@@ -1,8 +1,7 @@
 //! Some of many values, evenly from everywhere.
 
-/// The next step from `least` on that has no factor in common with a number of values. Where that is an image's, i fastest, or a
-/// slice's, it has none in common with the length of a row: a step as long as a row would look at one column of the image only, which may
-/// be air.
+/// The next step from `least` on that has no factor in common with a number of voxels: an image's, i fastest, or that of its row. A step as
+/// long as a row would look at one column of the image only, which may be air.
 pub fn coprime_stride(least: usize, values: usize) -> usize {
     let least = least.max(1);
     // One of as many steps in a row leaves 1 when divided by their number.

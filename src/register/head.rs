@@ -71,8 +71,7 @@ pub(super) fn range_inside(image: &Volume<f32, Native>, region: &Mask<Native>) -
 /// Two quantiles of the values inside a region (given on any grid).
 pub(super) fn range_within(image: &Volume<f32, Native>, region: &Mask<Native>, low: f64, high: f64) -> [f32; 2] {
     let to_region = region.grid.voxel_from_mm() * image.grid.mm_from_voxel;
-    let [nx, ny, _] = image.grid.dims;
-    let stride = coprime_stride(image.grid.len() / 400_000, nx * ny);
+    let stride = coprime_stride(image.grid.len() / 400_000, image.grid.dims[0]);
     let inside = |index: usize| {
         let [i, j, k] = image.grid.voxel(index);
         let p = to_region.transform_point(&Point3::new(i as f64, j as f64, k as f64));
