@@ -11,7 +11,7 @@ mod signal;
 mod stage;
 mod write;
 
-pub use apart::{ApartError, check_apart, moments_called_as, place};
+pub use apart::{ApartError, check_apart, moments_called_as, named, place};
 pub use manifest::{Manifest, OutputRecord, Provenance};
 pub use reason::Reason;
 pub use signal::{at_signal, end_between_files};

@@ -80,7 +80,7 @@ pub fn compare(mut models: Vec<(String, EstimateOutcome)>) -> Option<(Comparison
     }
     if best.verdict.finding.has_stiffness() {
         // Where a search was not finished the evidence is no more than what it had come to: its model may be better than that.
-        let unfinished = models[near..].iter().filter(|(_, m)| m.convergence.is_unfinished());
+        let unfinished = models[1..].iter().filter(|(_, m)| m.convergence.is_unfinished());
         best.verdict = best.verdict.beside_unsolved(unfinished.map(|(name, _)| name.clone()));
     }
     best.verdict = with_weakest_bounds(best.verdict, &models.iter().map(|(_, m)| &m.verdict));
@@ -94,12 +94,14 @@ fn ruled_out(candidates: &[Candidate], of: &Candidate) -> bool {
     candidates.first().is_some_and(|best| best.log_evidence - of.log_evidence > STRONG)
 }
 
-/// The places of the models that an average is of: the best one, the first, and those of its tissues that are not ruled out beside it.
+/// The places of the models that an average is of: the best one, the first, and those of its tissues that are not ruled out beside it
+/// and claim a stiffness.
 fn alike(candidates: &[Candidate]) -> impl Iterator<Item = usize> {
     let tissues = |c: &Candidate| c.moduli_pa.iter().map(|(tissue, _)| tissue.clone()).collect::<BTreeSet<_>>();
     let of_best = candidates.first().map(tissues);
     let places = candidates.iter().enumerate();
-    places.filter(move |(_, c)| !ruled_out(candidates, c) && Some(tissues(c)) == of_best).map(|(n, _)| n)
+    let claims = move |c: &Candidate| c.finding.has_stiffness() && Some(tissues(c)) == of_best;
+    places.filter(move |(n, c)| *n == 0 || !ruled_out(candidates, c) && claims(c)).map(|(n, _)| n)
 }
 
 impl Comparison {
@@ -110,7 +112,7 @@ impl Comparison {
 }
 
 /// The estimate of the best model, the first of these, which claims a stiffness, beside the others that are not ruled out: none
-/// where one of them claims none, whichever of the two comes first.
+/// where one of them claims none, whichever of the two comes first. A search that only was not finished contradicts nothing.
 fn beside_rivals(
     mut best: EstimateOutcome,
     models: &[(String, EstimateOutcome)],
@@ -118,7 +120,9 @@ fn beside_rivals(
 ) -> EstimateOutcome {
     let against = |c: &Candidate| candidates[0].log_evidence - c.log_evidence;
     let named = |c: &Candidate| (c.name.clone(), against(c));
-    let silent = candidates.iter().filter(|c| !c.finding.has_stiffness()).map(|c| {
+    let only_unfinished = |m: &EstimateOutcome| m.verdict.reasons == [Reason::NotConverged];
+    let silent = candidates.iter().zip(models).filter(|(c, (_, m))| !c.finding.has_stiffness() && !only_unfinished(m));
+    let silent = silent.map(|(c, _)| {
         let (model, log_odds) = named(c);
         Reason::RivalWithholds { model, log_odds, finding: c.finding }
     });
@@ -137,7 +141,8 @@ fn beside_rivals(
         Reason::AnotherModel { models: [candidates[0].name.clone(), model], log_odds }
     });
     // The most probable of them.
-    let other = (0..candidates.len()).find(|n| !alike.contains(n)).map(|n| {
+    let of_others = |n: &usize| !alike.contains(n) && candidates[*n].finding.has_stiffness();
+    let other = (0..candidates.len()).find(of_others).map(|n| {
         let (model, log_odds) = named(&candidates[n]);
         Reason::OtherTissues { model, log_odds }
     });
@@ -173,8 +178,14 @@ pub fn with_weakest_bounds<'a>(verdict: Verdict, models: &(impl Iterator<Item = 
         let weakest = bounds.reduce(|a, b| Some(a?.min(b?))).flatten();
         (tissue.clone(), weakest.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa }))
     };
-    let moduli = verdict.moduli.iter().map(bound).collect();
-    Verdict::new(Finding::NoShift, verdict.explained_share, moduli, verdict.reasons)
+    let moduli: Vec<(String, Claim)> = verdict.moduli.iter().map(bound).collect();
+    // What any of these bounds takes as exact the weakest may, and where there is none nothing does.
+    let is_exact = |reason: &&Reason| matches!(reason, Reason::ShapeTakenAsExact { .. });
+    let exact = models.clone().flat_map(|m| &m.reasons).find(is_exact).cloned();
+    let bounded = moduli.iter().any(|(_, claim)| *claim != Claim::Withheld);
+    let own = verdict.reasons.into_iter().filter(|reason| !is_exact(&reason));
+    let reasons = own.chain(exact.filter(|_| bounded)).collect();
+    Verdict::new(Finding::NoShift, verdict.explained_share, moduli, reasons)
 }
 
 /// The bound that a verdict gives of a tissue, Pa.
@@ -381,8 +392,29 @@ mod tests {
         let (verdict, _) = over(&[sure.clone(), far.clone()]);
         assert_eq!((verdict.finding, &verdict.moduli), (Finding::Identified, &sure.verdict.moduli));
         assert_eq!(verdict.reasons, [Reason::NotCompared { model: "b".to_owned() }]);
+        // Nor does a near one take away what the best one found, for that alone; nor is it of the average.
+        let mut near = far.clone();
+        near.odds = ended(Finding::Unexplained, -11.0, &BRAIN, 3000.0).odds;
+        near.verdict.reasons = vec![Reason::NotConverged];
+        let (verdict, _) = over(&[sure.clone(), near.clone()]);
+        assert_eq!((verdict.finding, &verdict.moduli), (Finding::Identified, &sure.verdict.moduli));
+        assert_eq!(verdict.reasons, [Reason::NotCompared { model: "b".to_owned() }]);
+        near.verdict.reasons.push(Reason::Discrepancy { discrepancy_mm: 1.0, noise_mm: 0.1 });
+        assert_eq!(over(&[sure.clone(), near]).0.finding, Finding::ModelsDisagree);
         far.convergence = Convergence::NoDescent;
         assert_eq!(over(&[sure, far]).0.reasons, []);
+    }
+
+    #[test]
+    fn what_a_bound_may_take_as_exact_is_told_beside_it_and_beside_no_other() {
+        let of = |bound: Option<f64>, reasons: &[Reason]| {
+            let claim = bound.map_or(Claim::Withheld, |bound_pa| Claim::Above { bound_pa });
+            Verdict::new(Finding::NoShift, None, vec![("brain".to_owned(), claim)], reasons.to_vec())
+        };
+        let exact = [Reason::ShapeTakenAsExact { amounts: 2 }];
+        let told = |models: &[Verdict]| with_weakest_bounds(models[0].clone(), &models.iter()).reasons;
+        assert_eq!(told(&[of(Some(900.0), &[]), of(Some(700.0), &exact)]), exact);
+        assert_eq!(told(&[of(Some(900.0), &exact), of(None, &[])]), []);
     }
 
     /// Of two tissues, with this standard deviation and correlation.

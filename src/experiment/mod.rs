@@ -17,6 +17,7 @@ pub mod phantom;
 pub mod population;
 pub mod predict;
 pub mod prior;
+pub mod reach;
 pub mod resection;
 pub mod rmse;
 pub mod sample;

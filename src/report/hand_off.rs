@@ -37,7 +37,8 @@ pub fn segmentations(images: &CaseImages) -> Vec<CaseFile> {
         let mut labels = labels.clone();
         if let Some(resected) = images.resected.as_ref().filter(|r| r.grid.coincides(&labels.grid, 1e-3)) {
             for (l, inside) in labels.data.iter_mut().zip(&resected.data) {
-                if *inside {
+                // As what is meshed: nothing is taken outside the brain, and a ventricle stays one.
+                if *inside && ![label::BACKGROUND, label::VENTRICLE].contains(l) {
                     *l = label::RESECTED;
                 }
             }

@@ -151,7 +151,8 @@ pub enum ResectError {
     /// A given mask marks no tissue.
     #[error(
         "the cavity or resected mask lies in fluid: only {percent:.0} % of what it takes was tissue before, the rest sulci, cisterns or \
-         ventricles; check the mask and its grid, or give a mask of the resected tissue"
+         ventricles; check the mask and its grid, or give a mask of the resected tissue; where labels of your own were given, what was \
+         taken has to be tissue in them"
     )]
     OnlyFluid {
         /// Share of what is taken that was tissue on the pre-operative scan.

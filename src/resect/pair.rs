@@ -161,7 +161,7 @@ pub enum PairError {
     Resect(#[from] ResectError),
     /// Nothing was taken out.
     #[error(
-        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain, or hardly any; check the cavity \
+        "no resected tissue was found: the cavity holds no tissue of the pre-operative brain, or hardly any (in labels of your own, what was taken has to be tissue); check the cavity \
          mask, or give a mask of the resected tissue"
     )]
     NothingResected,

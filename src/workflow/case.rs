@@ -5,12 +5,13 @@ use super::facts::{EstimateFacts, Implausible, MeshFacts};
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use super::warning::Warning;
-use crate::artefact::{Manifest, place};
+use crate::artefact::{Manifest, named, place};
 use crate::experiment::outcome::ExperimentOutcome;
 use crate::layout;
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A folder that a job has filled, or is filling.
@@ -65,9 +66,11 @@ impl Case {
             let made = of_case.into_iter().any(|manifest| manifest.outputs.contains_key(file));
             made || layout::TABLE.iter().any(|entry| entry.path == file)
         };
-        let below =
-            |path: &Path| place(path).strip_prefix(&folder).ok().map(|file| file.to_string_lossy().into_owned());
-        paths.into_iter().filter_map(below).filter(is_own).map(|file| self.path(&file)).collect()
+        let below = |path: PathBuf| path.strip_prefix(&folder).ok().map(|file| file.to_string_lossy().into_owned());
+        // A file that is a link to where it is kept is the case's by its name.
+        let all = paths.into_iter().flat_map(|path| [place(path), named(path)]);
+        let own: BTreeSet<String> = all.filter_map(below).filter(is_own).collect();
+        own.into_iter().map(|file| self.path(&file)).collect()
     }
 
     /// The page.

@@ -124,7 +124,8 @@ impl Case {
         }
         if !self.path(&file).exists() || state.contains(['/', '\\']) {
             let made = self.recorded().into_iter().flat_map(|stage| stage.outputs.into_keys());
-            let made = made.filter_map(|file| layout::SAMPLE_STATE.member(&file).map(str::to_owned));
+            let present = |file: &String| matches!(self.made_with(file), Ok(Some(true)));
+            let made = made.filter(present).filter_map(|file| layout::SAMPLE_STATE.member(&file).map(str::to_owned));
             let states: BTreeSet<String> = made.chain(told.cloned()).collect();
             let (folder, state) = (self.folder().to_path_buf(), state.to_owned());
             return Err(CaseError::NoState { folder, state, states: states.into_iter().collect() }.into());
@@ -291,7 +292,10 @@ pub(super) mod tests {
         assert_eq!(named_state(&case, Some("sample-03")).unwrap(), "sample-03");
         for wrong in ["sample-30", "../sim/estimate"] {
             let refused = named_state(&case, Some(wrong)).unwrap_err().to_string();
-            assert!(refused.contains(&format!("no state `{wrong}` in this case; it has sample-03")), "{refused}");
+            assert!(
+                refused.contains(&format!("no state `{wrong}` in this case; it has sample-03, observed")),
+                "{refused}"
+            );
         }
         // Nor where there is no other: that file is there, and not of the outcome.
         let refused = default_state(&answered(&folder.path().join("prepared"), &[])).unwrap_err();

@@ -216,7 +216,16 @@ pub fn named_state(case: &Case, state: Option<&str>) -> Result<String, WorkflowE
             // What the images alone tell is of no model.
             OBSERVED => case.check_outcome()?,
             FUSED => case.check_made_with(SHIFT_JSON)?,
-            model => case.check_state(model)?,
+            model => case.check_state(model).map_err(|error| match error {
+                WorkflowError::Case(CaseError::NoState { folder, state, mut states }) => {
+                    let of_images = [(OBSERVED, OUTCOME), (FUSED, SHIFT_JSON)].into_iter();
+                    states.extend(
+                        of_images.filter(|(_, file)| case.path(file).exists()).map(|(name, _)| name.to_owned()),
+                    );
+                    CaseError::NoState { folder, state, states }.into()
+                }
+                error => error,
+            })?,
         }
         return Ok(state.to_owned());
     }

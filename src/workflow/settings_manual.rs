@@ -69,12 +69,17 @@ pub fn every_setting(settings: &Settings) -> Vec<Setting> {
 pub fn settings_of_table(mut all: Vec<Setting>, wanted: &str) -> Result<Vec<Setting>, SettingsError> {
     let mut tables: Vec<String> = all.iter().filter_map(|s| s.table.split('.').next()).map(str::to_owned).collect();
     tables.dedup();
-    all.retain(|s| s.table == *wanted || s.table.starts_with(&format!("{wanted}.")));
+    all.retain(|s| s.table == *wanted || s.table.starts_with(&format!("{wanted}.")) || is_called(s, wanted));
     if all.is_empty() {
         let reason = format!("there is no table [{wanted}]; the tables are {}", tables.join(", "));
         return Err(SettingsError { file: None, line: None, table: None, reason });
     }
     Ok(all)
+}
+
+/// Whether a setting is the table of this name.
+fn is_called(setting: &Setting, table: &str) -> bool {
+    table.strip_prefix(&setting.table).and_then(|end| end.strip_prefix('.')) == Some(&setting.name)
 }
 
 /// What a reference in a schema stands for; an optional value's own schema.
@@ -88,12 +93,12 @@ fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
 
 fn collect(root: &Value, schema: &Value, table: &str, [now, default]: [&Value; 2], all: &mut Vec<Setting>) {
     let Some(properties) = resolved(root, schema)["properties"].as_object() else { return };
-    // Plain values before tables, as TOML wants it. A table that is not set has its keys all the same.
+    // Plain values before tables, as TOML wants it. A table that is not set is a value that is not, and has its keys all the same.
     let is_table = |name: &str| {
         let unset = || now[name].is_null() && resolved(root, &properties[name])["properties"].is_object();
         now[name].is_object() || unset()
     };
-    for (name, property) in properties.iter().filter(|(name, _)| !is_table(name)) {
+    for (name, property) in properties.iter().filter(|(name, _)| !now[*name].is_object()) {
         let told = |value: &Value| (!value.is_null()).then(|| value.clone());
         all.push(Setting {
             table: table.to_owned(),
@@ -143,9 +148,10 @@ pub fn annotated(settings: &[Setting]) -> String {
         if table != Some(&setting.table) {
             if !setting.table.is_empty() {
                 // A head alone would set what is not set.
-                let set = settings.iter().any(|other| other.table == setting.table && other.value.is_some());
-                let mark = if set { "" } else { "# " };
-                text += &format!("{}{mark}[{}]\n", if text.is_empty() { "" } else { "\n" }, setting.table);
+                let unset = settings.iter().any(|other| other.value.is_none() && is_called(other, &setting.table));
+                let (mark, told) =
+                    if unset { ("# ", " # to set any of these, set this head as well") } else { ("", "") };
+                text += &format!("{}{mark}[{}]{told}\n", if text.is_empty() { "" } else { "\n" }, setting.table);
             }
             table = Some(&setting.table);
         }
@@ -200,8 +206,14 @@ mod tests {
         for (table, name) in [("resection.csf", "drained"), ("predict.fluid_level", "sd_mm")] {
             let told = settings_of_table(all.clone(), table).unwrap();
             assert!(told.iter().any(|s| s.name == name && s.value.is_none()), "{table}: {told:?}");
-            assert!(annotated(&told).starts_with(&format!("# [{table}]\n")), "{}", annotated(&told));
+            let text = annotated(&told);
+            assert!(text.contains(&format!("\n# [{table}] #")) && text.contains(" is not set\n\n# ["), "{text}");
+            // With its head it is set.
+            let own = text.replace("# [", "[").replace("# below_top_mm is not set", "below_top_mm = 9.0");
+            assert!(Settings::layer(&own, "own.toml").is_ok(), "{own}");
         }
+        // A table is there whether or not one of its values is.
+        assert!(annotated(&all).contains("\n[image]\n"));
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::segment::{PosedScan, atlas, pose_of_head, pose_of_labels};
 use std::path::PathBuf;
 
 /// Raised when the code changes the patient of the same settings.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// The files of a synthetic patient.
 #[derive(Clone, Debug, Default)]

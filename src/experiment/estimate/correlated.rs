@@ -417,7 +417,8 @@ impl Fit<'_, '_> {
                 } else {
                     0.0
                 },
-                would_be_seen_mm: size.map_or(0.0, |Share { sd, .. }| largest_mm * would_be_seen(sd)),
+                // Where its size cannot be told at all, no smaller movement can.
+                would_be_seen_mm: size.map_or(largest_mm, |Share { sd, .. }| largest_mm * would_be_seen(sd)),
                 largest_share,
             },
         })

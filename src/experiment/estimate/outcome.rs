@@ -5,7 +5,8 @@ use super::findings::{Odds, Shift};
 use super::fluid::FluidOutcome;
 use super::re_registration::MovedNode;
 use super::shape::{EdgeAmounts, FalxAmounts, OutlineAmounts};
-use super::{Convergence, LogPrior, Posterior, Process, Z_95};
+use super::{Convergence, LogPrior, Posterior, Process};
+use crate::experiment::reach::reach_95;
 use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::Verdict;
 use crate::fem::Outcome;
@@ -136,8 +137,8 @@ impl Estimate {
         self.state.contact.clear();
         self.state.contact_pressure_pa.clear();
         self.state.warnings.clear();
-        // The reach is 1.96 standard deviations of one of three components.
-        self.displacement_sd_mm.fill(reach_mm * 3f64.sqrt() / Z_95);
+        // The standard deviation with which a size around rest reaches so far.
+        self.displacement_sd_mm.fill(reach_mm / reach_95(0.0, 1.0));
         self.displacement_95_mm.fill(reach_mm);
         self
     }

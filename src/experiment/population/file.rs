@@ -110,8 +110,8 @@ impl Taught {
 /// Whether more patients are left out for what their stiffness came out as than teach. Stiff brains move least, so such a cohort's
 /// mean is that of its softer ones.
 fn outnumbered(teachers: usize, left_out: &BTreeMap<String, usize>) -> bool {
-    let silent =
-        [Finding::NoShift, Finding::Conflict].map(|finding| left_out.get(finding.short()).copied().unwrap_or(0));
+    let silent = [Finding::NoShift, Finding::Conflict, Finding::ModelsDisagree];
+    let silent = silent.map(|finding| left_out.get(finding.short()).copied().unwrap_or(0));
     silent.iter().sum::<usize>() > teachers
 }
 

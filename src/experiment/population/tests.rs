@@ -215,6 +215,9 @@ fn a_cohort_whose_silent_patients_outnumber_its_teachers_moves_no_prior() {
         PopulationFile::new(KIND, &parameters(), all.clone(), left_out).unwrap()
     };
     assert!(beside(20, 20).parameters.iter().all(|taught| taught.moves_prior));
+    let disagree = BTreeMap::from([(Finding::ModelsDisagree.short().to_owned(), 41)]);
+    let disagree = PopulationFile::new(KIND, &parameters(), all.clone(), disagree).unwrap();
+    assert!(disagree.parameters.iter().all(|taught| !taught.moves_prior));
     let silent = beside(21, 20);
     assert!(silent.parameters.iter().all(|taught| !taught.moves_prior) && silent.prior().parameters.is_empty());
     assert_eq!(PopulationFile::from_toml(&silent.to_toml(), "p.toml").unwrap(), silent);

@@ -2,7 +2,7 @@
 //!
 //! A plan's own tissue is what it does not take. Counted over that, the plan that takes most has least left to move, and would be
 //! the best for that alone. Each plan also has a mesh of its own: what all leave is counted at the same voxels in each of them,
-//! so that meshes which differ somewhat do not pass for plans that do.
+//! so that the same tissue is counted. What their meshes make of its movement differs still, by how much was not measured.
 
 use super::modes::Modes;
 use crate::experiment::field::of_voxels;

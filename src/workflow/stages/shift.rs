@@ -5,8 +5,9 @@ use crate::experiment::depth::depth_mm;
 use crate::experiment::estimate::{CorrelatedErrors, EstimateOutcome, MovedNode, SEEN_AT, SEEN_DISPLACEMENT, moved_by};
 use crate::experiment::field::{
     BrainShift, Discrepancy, Explained, FieldSettings, Fused, Moved, ShiftField, Surroundings, explained, fused,
-    reach_95, shift_field,
+    shift_field,
 };
+use crate::experiment::reach::reach_95;
 use crate::geometry::{Frame, Mni, Post, Pre, RigidTransform};
 use crate::image::nifti::{self, ReadOptions};
 use crate::image::resample::grid_with_spacing;
@@ -257,10 +258,6 @@ impl<'a> CaseShift<'a> {
         let Nodes { displacement_mm, sd_mm, reach95_mm } = &model.nodes;
         // The spread of moduli is not the error of a field: what the model leaves of the seen displacement counts too.
         let found = self.put_right(model);
-        if model.is_at_rest() {
-            // No way is the shift's own there: its error is alike in all of them.
-            return self.field(&model.mesh, displacement_mm, (sd_mm, &reaches(displacement_mm, sd_mm)), None);
-        }
         if found.left.is_none() {
             return self.field(&model.mesh, displacement_mm, (sd_mm, reach95_mm), None);
         }
