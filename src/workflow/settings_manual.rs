@@ -208,10 +208,14 @@ mod tests {
             assert!(told.iter().any(|s| s.name == name && s.value.is_none()), "{table}: {told:?}");
             let text = annotated(&told);
             assert!(text.contains(&format!("\n# [{table}] #")) && text.contains(" is not set\n\n# ["), "{text}");
-            // With its head it is set.
-            let own = text.replace("# [", "[").replace("# below_top_mm is not set", "below_top_mm = 9.0");
-            assert!(Settings::layer(&own, "own.toml").is_ok(), "{own}");
         }
+        // With its head it is set.
+        let text = annotated(&settings_of_table(all.clone(), "predict.fluid_level").unwrap());
+        let values =
+            [("# [", "["), ("# below_top_mm is not set", "below_top_mm = 9.0"), ("# sd_mm is not set", "sd_mm = 5.0")];
+        let own = values.iter().fold(text, |text, (from, to)| text.replace(from, to));
+        let set = Settings::layer(&own, "own.toml").and_then(|layer| Settings::resolve([&layer])).unwrap();
+        assert_eq!(set.predict.fluid_level.map(|level| level.below_top_mm), Some(9.0), "{own}");
         // A table is there whether or not one of its values is.
         assert!(annotated(&all).contains("\n[image]\n"));
     }
