@@ -61,6 +61,13 @@ impl Default for PhantomSettings {
 }
 
 impl PhantomSettings {
+    /// A block of two tissues on its base, pushed from above: what estimates are tried on.
+    #[cfg(test)]
+    pub(crate) fn pushed_from_above() -> Self {
+        let (two_tissue_force_n, fixed) = ([0.0, 0.0, -0.1], vec!["base".to_owned()]);
+        Self { tissues: 2, two_tissue_force_n, fixed, ..Self::default() }
+    }
+
     /// Refuses what no phantom can be made with.
     ///
     /// # Errors

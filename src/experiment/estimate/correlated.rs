@@ -436,12 +436,7 @@ mod tests {
 
     /// A block that is pushed from above, and what is estimated of it.
     fn pushed() -> (Scenario, Vec<Unknown>) {
-        let settings = PhantomSettings {
-            tissues: 2,
-            two_tissue_force_n: [0.0, 0.0, -0.1],
-            fixed: vec!["base".to_owned()],
-            ..PhantomSettings::default()
-        };
+        let settings = PhantomSettings::pushed_from_above();
         (settings.scenario(), Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect())
     }
 

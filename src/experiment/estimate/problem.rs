@@ -96,15 +96,6 @@ mod tests {
 
     const SHAPE: ShapeError = ShapeError { outline_mm: 1.0, falx_mm: 0.0, support_edges_mm: 0.0 };
 
-    fn settings() -> PhantomSettings {
-        PhantomSettings {
-            tissues: 2,
-            two_tissue_force_n: [0.0, 0.0, -0.1],
-            fixed: vec!["base".to_owned()],
-            ..PhantomSettings::default()
-        }
-    }
-
     fn known(mean_pa: f64, sd: f64) -> Vec<(Unknown, LogPrior)> {
         let unknowns = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus);
         unknowns.map(|unknown| (unknown.clone(), unknown.prior(mean_pa.ln(), sd))).collect()
@@ -119,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_shape_without_a_mesh_to_find_out_what_it_does_is_told_to_be_taken_as_exact() {
-        let (mesh, settings) = (block(4), settings());
+        let (mesh, settings) = (block(4), PhantomSettings::pushed_from_above());
         let scenario = settings.scenario();
         let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
         let u = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
@@ -138,7 +129,7 @@ mod tests {
 
     #[test]
     fn bounds_without_a_shift_leave_room_for_the_shape_or_say_that_they_do_not() {
-        let (mesh, coarse, scenario) = (block(4), block(3), settings().scenario());
+        let (mesh, coarse, scenario) = (block(4), block(3), PhantomSettings::pushed_from_above().scenario());
         let bounds = |shape, coarser| {
             // Less than the noise.
             let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.01 * v);

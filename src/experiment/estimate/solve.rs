@@ -204,18 +204,9 @@ mod tests {
         Problem { start: vec![2299f64.ln(), 1195f64.ln()], ..Problem::new(mesh, scenario, unknowns, 0.45, seen) }
     }
 
-    fn settings() -> PhantomSettings {
-        PhantomSettings {
-            tissues: 2,
-            two_tissue_force_n: [0.0, 0.0, -0.1],
-            fixed: vec!["base".to_owned()],
-            ..PhantomSettings::default()
-        }
-    }
-
     /// A block with its loads, and how the reference's moduli move its nodes, mm.
     fn phantom(cells: usize) -> (TetMesh, Scenario, Vec<(u32, [f64; 3])>) {
-        let (mesh, settings) = (block(cells), settings());
+        let (mesh, settings) = (block(cells), PhantomSettings::pushed_from_above());
         let scenario = settings.scenario();
         let truth = scenario_of(&scenario, &settings.tissue_list(), &settings.reference_sample()).unwrap();
         let observed = every_node(&simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm);
@@ -269,7 +260,7 @@ mod tests {
     /// Gravity and nothing else.
     fn pulled(gravity_m_per_s2: [f64; 3]) -> Scenario {
         let loads = Loads { gravity_m_per_s2, density_kg_per_m3: 300.0, ..Loads::default() };
-        Scenario { loads, ..settings().scenario() }
+        Scenario { loads, ..PhantomSettings::pushed_from_above().scenario() }
     }
 
     #[test]
@@ -359,7 +350,7 @@ mod tests {
 
     /// A block pushed by `force_n`, seen with errors that neighbours share by a model that knows of a push from above.
     fn seen_by_a_model_of_a_push_from_above(force_n: Option<[f64; 3]>, add: impl Fn([f64; 3]) -> [f64; 3]) -> Estimate {
-        let (mesh, settings) = (block(5), settings());
+        let (mesh, settings) = (block(5), PhantomSettings::pushed_from_above());
         let u = match force_n {
             Some(two_tissue_force_n) => {
                 let pushed = PhantomSettings { two_tissue_force_n, ..settings.clone() };
@@ -427,7 +418,7 @@ mod tests {
     #[test]
     fn the_state_that_is_told_is_in_equilibrium_as_the_scenario_asks_whatever_was_enough_on_the_way() {
         let found = seen_by_a_model_of_a_push_from_above(Some([0.0, 0.0, -0.1]), |_| [0.0; 3]);
-        let (mesh, scenario) = (block(5), settings().scenario());
+        let (mesh, scenario) = (block(5), PhantomSettings::pushed_from_above().scenario());
         let asked = scenario.solver.relative_residual;
         assert!(found.state.convergence.relative_residual <= asked);
         let unknowns = Tissue::grey_and_white().into_iter().map(Unknown::ShearModulus).collect();
@@ -459,7 +450,7 @@ mod tests {
 
     #[test]
     fn an_instruments_own_error_at_rest_is_no_shift() {
-        let (mesh, scenario) = (block(5), settings().scenario());
+        let (mesh, scenario) = (block(5), PhantomSettings::pushed_from_above().scenario());
         let own = |x: [f64; 3]| [0.05 * (0.2 * x[1]).sin(), 0.05 * (0.15 * x[2]).cos(), 0.05 * (0.25 * x[0]).sin()];
         let shown = |u: &[[f64; 3]]| -> Result<Shown, InstrumentError> {
             let seen = |(n, u): (usize, &[f64; 3])| {
@@ -478,8 +469,8 @@ mod tests {
     /// What the model leaves is less than the measurement's noise, and more than is left of that without the instrument's error.
     #[test]
     fn a_model_is_held_against_what_is_left_of_the_noise_once_the_instruments_own_error_is_out() {
-        let (mesh, scenario) = (block(5), settings().scenario());
-        let truth = settings();
+        let (mesh, scenario) = (block(5), PhantomSettings::pushed_from_above().scenario());
+        let truth = PhantomSettings::pushed_from_above();
         let posed = scenario_of(&scenario, &truth.tissue_list(), &truth.reference_sample()).unwrap();
         let u = simulate(&mesh, &posed, &|_| {}).unwrap().displacement_mm;
         let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.03 * v);
@@ -513,7 +504,12 @@ mod tests {
     fn a_body_that_lay_another_way_is_not_explained_and_the_way_it_went_is_named() {
         let mesh = block(5);
         let (upright, lying) = ([0.0, 0.0, -9.81], [-9.81, 0.0, 0.0]);
-        let truth = scenario_of(&pulled(lying), &settings().tissue_list(), &settings().reference_sample()).unwrap();
+        let truth = scenario_of(
+            &pulled(lying),
+            &PhantomSettings::pushed_from_above().tissue_list(),
+            &PhantomSettings::pushed_from_above().reference_sample(),
+        )
+        .unwrap();
         let observed = simulate(&mesh, &truth, &|_| {}).unwrap().displacement_mm;
         let found = |assumed| estimated(&mesh, &pulled(assumed), &observed, None).outcome.verdict;
         let names_a_way = |verdict: &Verdict| verdict.reasons.iter().any(|r| matches!(r, Reason::OtherWayDown { .. }));
@@ -546,7 +542,9 @@ mod tests {
     /// The block, pushed hard enough that a law's shape shows, with the truth's law and the prior of that law.
     fn of_law(truth: &Material, law: MetaModel) -> (EstimateOutcome, BTreeMap<String, Material>) {
         let mesh = block(4);
-        let mut scenario = PhantomSettings { two_tissue_force_n: [0.0, 0.0, -0.35], ..settings() }.scenario();
+        let mut scenario =
+            PhantomSettings { two_tissue_force_n: [0.0, 0.0, -0.35], ..PhantomSettings::pushed_from_above() }
+                .scenario();
         for name in ["grey_matter", "white_matter"] {
             scenario.materials.insert(name.to_owned(), truth.clone());
         }
