@@ -24,7 +24,9 @@ pub const SIZE: usize = REMAINDER + SINES;
 pub struct Basis;
 
 impl Basis {
-    /// Their values at a Hencky strain x = ln l: 1, sign(x)/2, x, |x|, then the sines.
+    /// Their values at a Hencky strain x = ln l: 1, sign(x)/2, x, |x|, then the sines less their value at rest. What a curve is
+    /// at rest is its level's alone: sines that are not zero there would be a second level, as large as the ends of wide windows
+    /// ask for.
     pub fn at(self, x: f64) -> [f64; SIZE] {
         let mut values = [0.0; SIZE];
         values[LEVEL] = 1.0;
@@ -32,7 +34,8 @@ impl Basis {
         values[SLOPE] = x;
         values[BEND] = x.abs();
         for (n, value) in values[REMAINDER..].iter_mut().enumerate() {
-            *value = (frequency(n) * (x + HALF_WIDTH)).sin() / HALF_WIDTH.sqrt();
+            let sine = |x: f64| (frequency(n) * (x + HALF_WIDTH)).sin() / HALF_WIDTH.sqrt();
+            *value = sine(x) - sine(0.0);
         }
         values
     }

@@ -11,7 +11,7 @@
 //! where g is the effective shear modulus (Pa), constant for a neo-Hookean solid: the dip of W to zero at rest and any
 //! offset inside the logarithm are gone. m, u and v are Gaussian processes in the same few functions of x ([`Basis`]): the
 //! level, a step between compression and tension, the slopes of both sides (an exponent of stiffening) and a smooth
-//! remainder in the reduced rank of Solin and Särkkä, "Hilbert space methods for reduced-rank Gaussian process
+//! remainder, none at rest, in the reduced rank of Solin and Särkkä, "Hilbert space methods for reduced-rank Gaussian process
 //! regression", Statistics and Computing 2020. The tasks' means are coregionalised: tasks of one kind of study, or of one
 //! region, share a part of their level. Studies of abnormal tissue have spreads of their own; shapes of elastography
 //! and of linear elasticity are scaled by one factor.
