@@ -40,6 +40,14 @@ impl TriMesh {
         (0..self.triangles.len()).map(|t| self.area_vector_mm2(t).norm()).sum()
     }
 
+    /// Whether the surface has no rim: every edge has exactly two triangles.
+    pub fn is_closed(&self) -> bool {
+        let of_triangle = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]);
+        let mut edges: Vec<[u32; 2]> = self.triangles.iter().flat_map(of_triangle).collect();
+        edges.sort_unstable();
+        !edges.is_empty() && edges.chunk_by(|a, b| a == b).all(|same| same.len() == 2)
+    }
+
     /// Volume enclosed by a closed surface in mm3; positive when it is outward.
     pub fn enclosed_volume_mm3(&self) -> f64 {
         let cone = |t: &[u32; 3]| {

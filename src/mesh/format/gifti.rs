@@ -42,9 +42,10 @@ pub fn encode_surface(surface: &TriMesh, space: Space, name: &str) -> Vec<u8> {
     );
     let nodes = surface.nodes_mm.len();
     data_array(&mut xml, "NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", &[nodes, 3], &about, &coordinates);
-    let topology = "<MetaData><MD><Name>TopologicalType</Name><Value>Closed</Value></MD></MetaData>\n";
+    let kind = if surface.is_closed() { "Closed" } else { "Open" };
+    let topology = format!("<MetaData><MD><Name>TopologicalType</Name><Value>{kind}</Value></MD></MetaData>\n");
     let count = surface.triangles.len();
-    data_array(&mut xml, "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", &[count, 3], topology, &triangles);
+    data_array(&mut xml, "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", &[count, 3], &topology, &triangles);
     xml += "</GIFTI>\n";
     xml.into_bytes()
 }
@@ -307,6 +308,22 @@ mod tests {
         assert_eq!(back, fields);
         assert!(encode_shape(3, &fields).is_err());
         assert!(encode_shape(4, &[Field::vector("u", &[[0.0; 3]; 4])]).is_err());
+    }
+
+    #[test]
+    fn only_a_surface_without_a_rim_is_called_closed() {
+        let called = |surface: &TriMesh| {
+            let text = String::from_utf8(encode_surface(surface, Space::Scanner, "a")).unwrap();
+            let after = text.split("<Name>TopologicalType</Name><Value>").nth(1).unwrap();
+            after.split('<').next().unwrap().to_owned()
+        };
+        let (closed, mut open, mut wing) = (surface(), surface(), surface());
+        open.triangles.pop();
+        // A fin on a closed surface: three triangles at one edge.
+        wing.nodes_mm.push([5.0; 3]);
+        wing.triangles.push([0, 1, 4]);
+        let none = TriMesh::default();
+        assert_eq!([&closed, &open, &wing, &none].map(called), ["Closed", "Open", "Open", "Open"]);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the patient's part changes its result.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Raised when the phantom's part changes its result.
 const PHANTOM_VERSION: u32 = 2;
 const NAME: StageName = StageName::Reference;
