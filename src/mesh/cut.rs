@@ -7,7 +7,8 @@ impl TetMesh {
     /// The mesh cut open along `sheet`, facets between two tetrahedra each. A node is doubled where the sheet parts the
     /// tetrahedra around it; at an edge of the sheet inside the body they hang together, and the node stays one. New nodes
     /// follow the old ones, in the order of the nodes they double, whose node sets they join. The facets of both sides,
-    /// outward, become the facet set `name`; facets of other sets follow their tetrahedron.
+    /// outward, become the facet set `name`, also where both still have the same three nodes; facets of other sets follow
+    /// their tetrahedron.
     #[must_use]
     pub fn cut_along(&self, name: &str, sheet: &[[u32; 3]]) -> Self {
         let sorted = |mut facet: [u32; 3]| {

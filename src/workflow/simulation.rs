@@ -18,7 +18,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Raised when the solver's code changes its results.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// The files of a simulation.
 #[derive(Clone, Debug, Default)]

@@ -16,7 +16,7 @@ mod vtu_file;
 
 use super::{MeshError, TET_FACES, TetMesh};
 use crate::segment::label;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt::{Arguments, Write};
 use thiserror::Error;
 
@@ -133,14 +133,16 @@ fn check_fields(fields: &[Field], places: usize, taken: &[&str]) -> Result<(), W
 }
 
 /// For every facet of `facets`, the tetrahedron and local face it belongs to (see [`TET_FACES`]); the one that sees
-/// the facet outward is preferred, so that a facet inside the mesh keeps its side. Facets of no tetrahedron are left
-/// out.
+/// the facet outward is preferred, so that a facet inside the mesh keeps its side, and one that is there for either side
+/// keeps both: where a sheet that is cut open ends, a facet's two sides may have the same three nodes. Facets of no
+/// tetrahedron are left out, and so is what stands there twice.
 fn facet_owners(mesh: &TetMesh, facets: &[[u32; 3]]) -> Vec<(usize, usize)> {
     let sorted = |mut f: [u32; 3]| {
         f.sort_unstable();
         f
     };
-    let wanted: BTreeMap<[u32; 3], usize> = facets.iter().enumerate().map(|(n, f)| (sorted(*f), n)).collect();
+    let mut wanted: Vec<([u32; 3], usize)> = facets.iter().enumerate().map(|(n, f)| (sorted(*f), n)).collect();
+    wanted.sort_unstable();
     let mut is_wanted = vec![false; mesh.nodes_mm().len()];
     for &n in facets.iter().flatten() {
         is_wanted[n as usize] = true;
@@ -152,12 +154,16 @@ fn facet_owners(mesh: &TetMesh, facets: &[[u32; 3]]) -> Vec<(usize, usize)> {
         }
         for (f, corners) in TET_FACES.iter().enumerate() {
             let face = corners.map(|c| tet[c]);
-            let Some(&n) = wanted.get(&sorted(face)) else { continue };
-            let outward = (0..3).any(|s| [face[s], face[(s + 1) % 3], face[(s + 2) % 3]] == facets[n]);
-            if owners[n].is_none_or(|(.., was_outward)| outward && !was_outward) {
-                owners[n] = Some((t, f, outward));
+            let key = sorted(face);
+            let first = wanted.partition_point(|(other, _)| *other < key);
+            for &(_, n) in wanted[first..].iter().take_while(|(other, _)| *other == key) {
+                let outward = (0..3).any(|s| [face[s], face[(s + 1) % 3], face[(s + 2) % 3]] == facets[n]);
+                if owners[n].is_none_or(|(.., was_outward)| outward && !was_outward) {
+                    owners[n] = Some((t, f, outward));
+                }
             }
         }
     }
-    owners.into_iter().flatten().map(|(t, f, _)| (t, f)).collect()
+    let mut seen = BTreeSet::new();
+    owners.into_iter().flatten().map(|(t, f, _)| (t, f)).filter(|owner| seen.insert(*owner)).collect()
 }

@@ -218,6 +218,22 @@ mod tests {
     }
 
     #[test]
+    fn a_facet_that_is_there_for_either_side_is_read_back_for_both() {
+        let mut mesh = two_tets();
+        let sides = vec![[1, 2, 3], [1, 3, 2]];
+        mesh.facet_sets.insert("falx".into(), [sides.clone(), vec![sides[0]]].concat());
+        let back = decode(&encode(&mesh, &[], &[]).unwrap(), "a.vtu").unwrap().mesh;
+        // In any order, and beginning with any node.
+        let turns = |facets: &[[u32; 3]]| {
+            let mut turns: Vec<_> = facets.iter().map(|&f| mesh.area_vector_mm2(f).x.signum() as i8).collect();
+            turns.sort_unstable();
+            turns
+        };
+        assert_eq!(turns(&back.facet_sets["falx"]), turns(&sides));
+        assert_eq!(turns(&sides), [-1, 1]);
+    }
+
+    #[test]
     fn fractions_are_read_back_to_the_bit_and_refused_where_they_make_no_whole() {
         let mut mesh = two_tets();
         let thirds = Fractions::from([(3, vec![1.0 / 3.0, 0.0]), (17, vec![2.0 / 3.0, 1.0])]);

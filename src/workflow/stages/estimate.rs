@@ -31,7 +31,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 37;
+const VERSION: u32 = 38;
 const NAME: StageName = StageName::Estimate;
 /// How near to its own minimum the search on the coarse mesh ends, in standard deviations of the posterior.
 const NEARLY: f64 = 0.1;

@@ -35,7 +35,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 17;
+const VERSION: u32 = 18;
 const NAME: StageName = StageName::Predict;
 /// Nodes that shares of the variance are summed over.
 const SHARED_NODES: usize = 100;

@@ -19,7 +19,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// What every sample of a sweep shares.
 #[derive(Debug)]
