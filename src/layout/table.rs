@@ -236,7 +236,12 @@ pub const TABLE: &[Entry] = &[
     file(PRE_EVEN_T1, "pre-operative scan without its coil's gain, in units of its own", Space::Mni, Maker::Anat),
     file(TEMPLATE_FIT, "the template's fit, in voxels, of a prediction", Space::Mni, Maker::Anat),
     file(REST_MESH, "undeformed mesh of the tissue with its boundary sets", Space::Mni, Maker::Mesh),
-    file(REST_GMSH, "the same for gmsh", Space::Mni, Maker::Mesh),
+    file(
+        REST_GMSH,
+        "the same for gmsh; none with `partial_volume`, whose parts of cells MSH cannot hold",
+        Space::Mni,
+        Maker::Mesh,
+    ),
     file(REST_SURFACE.0, "surface of a boundary set", Space::Mni, Maker::Mesh),
     file(REFERENCE_SURFACE.0, "target surface of a set, from the post-operative scan", Space::Mni, Maker::Reference),
     file(REFERENCE_STATE, "a phantom's known state", Space::Mni, Maker::Reference),

@@ -5,8 +5,9 @@ use crate::geometry::Frame;
 use crate::image::LabelMap;
 use crate::image::components::{Connectivity, components};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
-/// A part that was removed because it is too small.
+/// A part that was removed because it is too small; of several labels an island each.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Island {
     /// Its label in the map.
@@ -18,23 +19,23 @@ pub struct Island {
 }
 
 /// Removes parts of the labelled region below `smallest_part` of the largest one, and gives parts of a label below
-/// `tet_mm3` the label that surrounds them most (never the last part of a label). In the order of first voxels.
+/// `tet_mm3` the label that surrounds them most (never the last part of a label). In the order of first voxels,
+/// and of labels within a part.
 pub(crate) fn remove_islands<F: Frame>(map: &mut LabelMap<F>, smallest_part: f64, tet_mm3: f64) -> Vec<Island> {
     let voxel_mm3 = map.grid.voxel_volume_mm3();
     let mut islands = Vec::new();
     let whole = components(&map.map(|l| l != 0), Connectivity::Faces);
     let largest = whole.voxels.iter().copied().max().unwrap_or(0) as f64;
     let apart = |n: usize| (whole.voxels[n] as f64) < smallest_part * largest;
-    // One pass for all of them: a speckled map has a hundred thousand.
-    let mut label_of = vec![0; whole.voxels.len()];
+    // One pass for all of them: a speckled map has a hundred thousand. A part may hold several labels, of which each is told.
+    let mut voxels_of: BTreeMap<(u32, u8), usize> = BTreeMap::new();
     for (value, &part) in map.data.iter_mut().zip(&whole.labels.data) {
         if part > 0 && apart(part as usize - 1) {
-            label_of[part as usize - 1] = std::mem::take(value);
+            *voxels_of.entry((part, std::mem::take(value))).or_default() += 1;
         }
     }
-    for n in (0..whole.voxels.len()).filter(|&n| apart(n)) {
-        let volume_mm3 = whole.voxels[n] as f64 * voxel_mm3;
-        islands.push(Island { label: label_of[n], volume_mm3, became: 0 });
+    for ((_, label), voxels) in voxels_of {
+        islands.push(Island { label, volume_mm3: voxels as f64 * voxel_mm3, became: 0 });
     }
     let mut present = [false; 256];
     map.data.iter().for_each(|&l| present[l as usize] = true);
@@ -153,4 +154,29 @@ fn fans(complex: &Complex, a: u32, b: u32) -> Vec<Vec<u32>> {
         fans.push(fan);
     }
     fans
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mni;
+    use crate::image::Grid;
+
+    #[test]
+    fn a_part_that_lay_apart_is_told_by_what_it_has_of_every_label() {
+        // A row of white matter, and apart from it a short one of three labels whose last voxel is ventricle.
+        let grid = Grid::<Mni>::axis_aligned([30, 1, 3], [1.0, 2.0, 1.0], [0.0; 3]);
+        let before = LabelMap::from_fn(grid, |n| match n {
+            0..30 => 3,
+            60 | 61 => 2,
+            62 => 3,
+            63 => 4,
+            _ => 0,
+        });
+        let mut map = before.clone();
+        let islands = remove_islands(&mut map, 0.5, 0.0);
+        let of = |label, volume_mm3| Island { label, volume_mm3, became: 0 };
+        assert_eq!(islands, [of(2, 4.0), of(3, 2.0), of(4, 2.0)]);
+        assert_eq!(map, LabelMap::from_fn(grid, |n| if n < 30 { 3 } else { 0 }));
+    }
 }

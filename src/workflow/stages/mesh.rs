@@ -9,7 +9,7 @@ use crate::image::LabelMap;
 use crate::layout::{PRE_LABELS, REST_GMSH, REST_MESH, REST_SURFACE};
 use crate::mesh::engine::{EngineError, MeshSettings, MeshSize, MeshingRecord, mesh_labels};
 use crate::mesh::format::gifti::{self, Space};
-use crate::mesh::format::{msh, vtu};
+use crate::mesh::format::{WriteError, msh, vtu};
 use crate::mesh::quality::{fidelity, shape_quality, surface_distance};
 use crate::mesh::{TetMesh, TriMesh};
 use crate::register::deformable::DisplacementField;
@@ -26,7 +26,7 @@ use crate::workflow::work::{Made, Work, facts};
 use std::collections::BTreeMap;
 
 /// Raised when the stage's code changes its result.
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 const NAME: StageName = StageName::Mesh;
 /// A part that lay apart is worth a warning from half a cubic centimetre on, and so is a label that is lost; smaller ones are specks
 /// of noise.
@@ -74,8 +74,7 @@ pub(crate) fn mesh(
         // Of a part that was cut off a set has nothing.
         let tags = tags.of_part(&rest, &work.settings.tag);
         let mut produced = Produced::default();
-        produced.files.push((REST_MESH.to_owned(), vtu::encode(&rest, &[], &[])?));
-        produced.files.push((REST_GMSH.to_owned(), msh::encode(&rest)?));
+        produced.files.extend(meshes(&rest)?);
         for (set, facets) in &rest.facet_sets {
             let (surface, _) = TriMesh::from_facets(rest.nodes_mm(), facets);
             produced.files.push((REST_SURFACE.of(set), gifti::encode_surface(&surface, Space::Mni152, set)));
@@ -116,6 +115,16 @@ pub(crate) fn mesh(
         produced.facts = facts(&facts_of_mesh);
         Ok(produced)
     })
+}
+
+/// The mesh in every format that can hold it: MSH has no place for what lies within the cells, and the same scenario would have another
+/// answer there.
+fn meshes(rest: &TetMesh) -> Result<Vec<(String, Vec<u8>)>, WriteError> {
+    let mut files = vec![(REST_MESH.to_owned(), vtu::encode(rest, &[], &[])?)];
+    if rest.fractions().is_empty() {
+        files.push((REST_GMSH.to_owned(), msh::encode(rest)?));
+    }
+    Ok(files)
 }
 
 /// A mesh with its sets, whole and without what is no tissue.
@@ -258,6 +267,18 @@ pub fn mesh_outcome<F: Frame>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Fractions;
+
+    #[test]
+    fn a_mesh_whose_cells_hold_several_tissues_is_written_only_where_the_format_keeps_them() {
+        let nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3]], vec![label::GREY_MATTER]).unwrap();
+        let names = |mesh: &TetMesh| meshes(mesh).unwrap().into_iter().map(|file| file.0).collect::<Vec<_>>();
+        assert_eq!(names(&mesh), [REST_MESH, REST_GMSH]);
+        let halves = [(label::GREY_MATTER, vec![0.5]), (label::WHITE_MATTER, vec![0.5])];
+        mesh.set_fractions(Fractions::from(halves)).unwrap();
+        assert_eq!(names(&mesh), [REST_MESH]);
+    }
 
     #[test]
     fn tissue_that_hangs_on_nothing_is_told_from_half_a_cc_and_refused_from_ten() {
