@@ -230,7 +230,7 @@ fn a_surface_that_says_mni_space_is_not_taken_for_the_scanners_and_says_the_fram
     let read = |space: Space| Drawing::decode(&encode_surface(&surface, space, "made"), "a.surf.gii").unwrap();
     let said = read(Space::Mni152).check_of_scanner("a.surf.gii").unwrap_err().to_string();
     assert!(said.contains("a.surf.gii") && said.contains("MNI_152") && said.contains("SCANNER_ANAT"), "{said}");
-    for space in [Space::Scanner, Space::Talairach] {
+    for space in [Space::Scanner, Space::Aligned, Space::Talairach] {
         let drawing = read(space);
         assert_eq!(drawing.check_of_scanner("a.surf.gii"), Ok(()));
         assert_eq!(drawing.declared(), Some(space));

@@ -15,16 +15,16 @@ use crate::geometry::Native;
 use crate::image::{LabelMap, nifti};
 use crate::mesh::engine::{EnginePrograms, MeshSettings, mesh_labels};
 use crate::mesh::format::{WriteError, feb, gifti, inp, msh, ply, stl, vtu};
-use crate::mesh::{TetMesh, TriMesh};
+use crate::mesh::{Island, TetMesh, TriMesh};
 use crate::report::mesh_figure::preview;
 use crate::segment::label;
-use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
+use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets, with_closed_fissure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Raised when the code changes the mesh of the same labels and settings.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
@@ -71,9 +71,12 @@ pub struct MeshedFile {
     pub edge_mm: f64,
     /// Parts of the label map that were too small.
     pub islands: usize,
-    /// How much of each label lay apart from the rest and is not in the mesh, mm3, where it is more than half a cc.
+    /// How much of each label lay apart from the rest and is not in the mesh, mm3, where it is more than half a cc in all.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub left_out_mm3: BTreeMap<u8, f64>,
+    /// Grey matter put between the hemispheres, which lie against the falx there, mm3; `None` where there was nothing to close.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_mm3: Option<f64>,
     /// The boundary sets.
     pub sets: Vec<SetReport>,
     /// Labels of which the mesh has nothing, where that was half a cc at most.
@@ -141,7 +144,7 @@ pub fn mesh_file(
             write_whole(path, &preview(&mesh, None, PREVIEW_PIXELS))?;
         }
         if let Some(folder) = &files.surfaces {
-            write_surfaces(&mesh, folder, if in_mni { gifti::Space::Mni152 } else { gifti::Space::Scanner })?;
+            write_surfaces(&mesh, folder, space_of(in_mni, &bytes))?;
         }
         let bytes = encode(&mesh, &extension).map_err(|source| MeshFileError::Format { file: file.clone(), source })?;
         Ok(Produced {
@@ -166,6 +169,33 @@ fn in_mni_by_itself(labels: &Path, bytes: &[u8]) -> Result<bool, MeshFileError> 
     Ok(named || nifti::says_mni(bytes))
 }
 
+/// The frame that surfaces of these labels are in: the template's where the file or the user says so, else what the header says.
+fn space_of(in_mni: bool, bytes: &[u8]) -> gifti::Space {
+    if in_mni {
+        return gifti::Space::Mni152;
+    }
+    nifti::code_of(bytes).map_or(gifti::Space::Scanner, gifti::Space::of_nifti_code)
+}
+
+/// The labels as they are meshed for a falx to be found: the hemispheres lie against each other where nothing is between them, as in
+/// a patient's mesh. Also how much grey matter that puts there, mm3.
+fn against_the_falx(labels: &LabelMap<Native>, without: &[u8]) -> (LabelMap<Native>, f64) {
+    let meshed = labels.map(|l| if without.contains(&l) { label::BACKGROUND } else { l });
+    let closed = with_closed_fissure(&meshed, |position_mm| position_mm);
+    let voxels = closed.data.iter().zip(&meshed.data).filter(|(after, before)| after != before).count();
+    (closed, voxels as f64 * labels.grid.voxel_volume_mm3())
+}
+
+/// How much of each label lay apart from the rest, mm3, where it is more than half a cc in all.
+fn left_out_mm3(islands: &[Island]) -> BTreeMap<u8, f64> {
+    let mut left_out = BTreeMap::new();
+    for island in islands.iter().filter(|island| island.became == label::BACKGROUND) {
+        *left_out.entry(island.label).or_default() += island.volume_mm3;
+    }
+    left_out.retain(|_, mm3| *mm3 > LARGE_ISLAND_MM3);
+    left_out
+}
+
 /// Meshes and, with `tags`, tags.
 fn make(
     labels: &LabelMap<Native>,
@@ -173,7 +203,9 @@ fn make(
     tags: Option<&TagSettings>,
     (name, programs): (&str, &EnginePrograms),
 ) -> Result<(TetMesh, MeshedFile), WorkflowError> {
-    let (mut mesh, record) = mesh_labels(labels, settings, programs)
+    let closed = tags.filter(|tags| tags.falx).map(|_| against_the_falx(labels, &settings.without));
+    let body = closed.as_ref().map_or(labels, |(body, _)| body);
+    let (mut mesh, record) = mesh_labels(body, settings, programs)
         .map_err(|source| WorkflowError::Engine { labels: name.to_owned(), source })?;
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
@@ -188,12 +220,17 @@ fn make(
     refused.extend(much.into_iter().map(ToString::to_string));
     let warnings = little.into_iter().map(ToString::to_string).collect();
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
-    let mut left_out_mm3 = BTreeMap::new();
-    for island in record.islands.iter().filter(|i| i.became == 0 && i.volume_mm3 > LARGE_ISLAND_MM3) {
-        *left_out_mm3.entry(island.label).or_default() += island.volume_mm3;
-    }
-    let islands = record.islands.len();
-    Ok((mesh, MeshedFile { mesh: figures, edge_mm: record.edge_mm, islands, left_out_mm3, sets, warnings, refused }))
+    let meshed = MeshedFile {
+        mesh: figures,
+        edge_mm: record.edge_mm,
+        islands: record.islands.len(),
+        left_out_mm3: left_out_mm3(&record.islands),
+        closed_mm3: closed.map(|(_, mm3)| mm3).filter(|mm3| *mm3 > 0.0),
+        sets,
+        warnings,
+        refused,
+    };
+    Ok((mesh, meshed))
 }
 
 fn encode(mesh: &TetMesh, extension: &str) -> Result<Vec<u8>, WriteError> {
@@ -240,5 +277,48 @@ mod tests {
         assert!(matches!(of("space-MNI/dseg.nii.gz", &scanner), Ok(false)), "a folder says nothing of a file");
         let asked = of("a/pre_space-MNI_dseg.nii.gz", &scanner).unwrap_err().to_string();
         assert!(asked.contains("a/pre_space-MNI_dseg.nii.gz") && asked.contains("code 1"), "{asked}");
+    }
+
+    #[test]
+    fn tissue_in_many_small_islands_is_as_much_left_out_as_in_a_large_one() {
+        let island = |label, volume_mm3, became| Island { label, volume_mm3, became };
+        let speckled: Vec<Island> = (0..36)
+            .map(|_| island(label::GREY_MATTER, 350.0, label::BACKGROUND))
+            .chain([island(label::WHITE_MATTER, 400.0, label::BACKGROUND), island(label::VENTRICLE, 900.0, 3)])
+            .collect();
+        assert_eq!(left_out_mm3(&speckled), BTreeMap::from([(label::GREY_MATTER, 36.0 * 350.0)]));
+    }
+
+    #[test]
+    fn surfaces_say_the_frame_that_the_header_of_the_labels_says() {
+        use gifti::Space::{Aligned, Mni152, Scanner, Talairach};
+        let grid = Grid::<Native>::axis_aligned([4; 3], [1.0; 3], [0.0; 3]);
+        let plain = Volume::<u8, Native>::from_fn(grid, |_| 2);
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&nifti::encode_u8(&plain)[..]), &mut bytes)
+            .unwrap();
+        let of = |code: u8| {
+            // qform_code and sform_code of NIfTI-1.
+            for at in [252, 254] {
+                bytes[at..at + 2].copy_from_slice(&[code, 0]);
+            }
+            [false, true].map(|in_mni| space_of(in_mni, &bytes))
+        };
+        let told = [1, 2, 3, 4].map(of);
+        assert_eq!(told, [Scanner, Aligned, Talairach, Mni152].map(|space| [space, Mni152]));
+        assert_eq!(space_of(false, b"a .mgz"), Scanner);
+    }
+
+    #[test]
+    fn hemispheres_of_a_file_lie_against_the_falx_where_nothing_that_is_meshed_parts_them() {
+        // Two hemispheres, and fluid between them above the free edge of the falx.
+        let grid = Grid::<Native>::axis_aligned([41, 4, 4], [1.0; 3], [-20.0, 20.0, 60.0]);
+        let labels = LabelMap::from_fn(grid, |n| {
+            let [i, ..] = grid.voxel(n);
+            if (17..=23).contains(&i) { label::CSF } else { label::GREY_MATTER }
+        });
+        let (closed, mm3) = against_the_falx(&labels, &[label::CSF]);
+        assert_eq!((closed, mm3), (labels.map(|_| label::GREY_MATTER), 7.0 * 16.0));
+        assert_eq!(against_the_falx(&labels, &[]), (labels, 0.0));
     }
 }

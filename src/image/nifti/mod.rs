@@ -210,8 +210,9 @@ pub fn says_scanner(bytes: &[u8]) -> bool {
     code_of(bytes) == Some(1)
 }
 
-/// The code of the affine that is believed.
-fn code_of(bytes: &[u8]) -> Option<i32> {
+/// The code of the affine that is believed (1 scanner, 2 aligned to something else, 3 Talairach, 4 MNI; 0 or another where the
+/// header says no frame). `None` for what is no NIfTI.
+pub fn code_of(bytes: &[u8]) -> Option<i32> {
     let header = Header::parse(&head_of(bytes).ok()?).ok()?;
     Some(if header.sform_code > 0 { header.sform_code } else { header.qform_code })
 }

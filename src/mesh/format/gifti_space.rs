@@ -12,6 +12,8 @@ const MIDDLE: [&str; 3] = ["VolGeomC_R", "VolGeomC_A", "VolGeomC_S"];
 pub enum Space {
     /// A scan's own frame.
     Scanner,
+    /// That of another scan or of some other truth, which the file does not name.
+    Aligned,
     /// MNI 152.
     Mni152,
     /// Talairach's by its word, which Connectome Workbench and FreeSurfer also write of surfaces in the scanner's frame.
@@ -19,9 +21,20 @@ pub enum Space {
 }
 
 impl Space {
+    /// The frame by the code of a NIfTI header (qform_code, sform_code); the scanner's for a code that says no other.
+    pub fn of_nifti_code(code: i32) -> Self {
+        match code {
+            2 => Self::Aligned,
+            3 => Self::Talairach,
+            4 => Self::Mni152,
+            _ => Self::Scanner,
+        }
+    }
+
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Scanner => "NIFTI_XFORM_SCANNER_ANAT",
+            Self::Aligned => "NIFTI_XFORM_ALIGNED_ANAT",
             Self::Mni152 => "NIFTI_XFORM_MNI_152",
             Self::Talairach => "NIFTI_XFORM_TALAIRACH",
         }
@@ -29,7 +42,9 @@ impl Space {
 
     /// The frame by its name in a file; `None` for a word that names no known one.
     fn named(word: &str) -> Option<Self> {
-        [Self::Scanner, Self::Mni152, Self::Talairach].into_iter().find(|space| space.name() == word.trim())
+        [Self::Scanner, Self::Aligned, Self::Mni152, Self::Talairach]
+            .into_iter()
+            .find(|space| space.name() == word.trim())
     }
 }
 
@@ -112,6 +127,7 @@ mod tests {
         let (mni, talairach) = ("NIFTI_XFORM_MNI_152", "NIFTI_XFORM_TALAIRACH");
         assert_eq!(told(mni, mni), Some(Space::Mni152));
         assert_eq!(told(talairach, talairach), Some(Space::Talairach));
+        assert_eq!(told("NIFTI_XFORM_ALIGNED_ANAT", talairach), Some(Space::Aligned));
         assert_eq!(told(SCANNER, talairach), Some(Space::Scanner));
         assert_eq!(told("NIFTI_XFORM_UNKNOWN", talairach), None);
     }
