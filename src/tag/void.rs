@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 /// A hole is one from this volume on, mm3: smaller ones are gaps of the label map.
 const SMALLEST_MM3: f64 = 500.0;
 
-/// Facets of the outside of `mesh` (of what is not fluid around the brain) without those that close around a hole: they see a volume below zero. A cyst's roof looks down
-/// as the base of the brain does, and rests on nothing.
+/// Facets of the outside of `mesh` (of what is not fluid around the brain) without those that close around a hole: they see a
+/// volume below zero. A cyst's roof looks down as the base of the brain does, and rests on nothing.
 pub(crate) fn without_voids(mesh: &TetMesh, facets: &[[u32; 3]]) -> Vec<[u32; 3]> {
     // Of every label: the wall of a hole beside the ventricle or the resected tissue is closed only with their facets. But for fluid:
     // a hole is one whether it is filled with cells or not.
