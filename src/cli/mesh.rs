@@ -8,10 +8,9 @@ use std::path::PathBuf;
 /// Mesh a label map: conforming tetrahedra of every nonzero label, with boundary sets where the map is in MNI space
 ///
 /// Labels: 1 CSF, 2 grey matter, 3 white matter, 4 ventricle, 5 resected tissue, 6 tumour, 7 oedema. A map of FreeSurfer,
-/// SynthSeg, SimNIBS, GIF or MUSE is known by its numbers and carried to these. Numbers of no tool are meshed as they are. For
-/// boundary sets leave label 1 out: hemispheres that fluid parts have no falx, and without it they are closed against each other.
+/// SynthSeg, SimNIBS, GIF or MUSE is known by its numbers and carried to these. Numbers of no tool are meshed as they are.
 ///
-/// Example: hgm mesh pre_space-MNI_dseg.nii.gz -o brain.vtu --without 1 --cells 60000 --preview brain.png
+/// Example: hgm mesh pre_dseg.nii.gz -o brain.vtu --cells 60000 --preview brain.png
 /// Example: hgm mesh aseg.mgz --labels freesurfer -o brain.vtu
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {

@@ -1,9 +1,9 @@
 //! Named node and facet sets of a brain mesh: ventricle wall, falx, base, superior load patch, resection margin.
 //!
 //! The mesh is in the MNI-rigid frame (mm, RAS+, sizes the patient's own) and still carries the ventricle and the
-//! resected tissue as labels, so that their walls conform; other fluid may be there too. Tissue is everything else: sets
-//! lie on tissue only (what borders on other fluid is its outside) and survive `TetMesh::restricted` to it. Load and
-//! compare by facet area, never by node count: areas hardly change with resolution, counts do.
+//! resected tissue as labels, so that their walls conform. Tissue is everything else: sets lie on tissue only, and
+//! survive `TetMesh::restricted` to it. Load and compare by facet area, never by node count: areas hardly change
+//! with resolution, counts do.
 
 mod fissure;
 mod landmark;
@@ -157,7 +157,7 @@ impl TagReport {
                 (set.facets, set.area_mm2, set.centroid_mm) = (facets.len(), moment.area_mm2, moment.centroid_mm());
             }
         }
-        self.warnings = implausible(part, &mut self.sets, settings);
+        self.warnings = implausible(&mut self.sets, settings);
         self
     }
 }
@@ -172,12 +172,6 @@ pub enum TagWarning {
          MNI and the segmentation around it before believing the simulation"
     )]
     Area { set: String, area_mm2: f64, low_mm2: f64, high_mm2: f64 },
-    #[error(
-        "boundary set `{set}` has {area_mm2:.0} mm2; adult brains have {low_mm2:.0} to {high_mm2:.0}: fluid is meshed (label {}), and \
-         where it lies between the hemispheres they do not meet at the falx: leave that label out of the mesh",
-        label::CSF
-    )]
-    Parted { set: String, area_mm2: f64, low_mm2: f64, high_mm2: f64 },
 }
 
 /// Why a mesh cannot be tagged.
@@ -185,9 +179,8 @@ pub enum TagWarning {
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum TagError {
     #[error(
-        "the mesh has no tissue: every cell is ventricle ({}), other fluid ({}) or resected ({}); check the label map",
+        "the mesh has no tissue: every cell is ventricle ({}) or resected ({}); check the label map",
         label::VENTRICLE,
-        label::CSF,
         label::RESECTED
     )]
     NoTissue,
@@ -248,24 +241,19 @@ pub fn tag_boundary_sets_with(
 
     let mut sets = tagger.sets;
     sets.sort_by(|a, b| a.name.cmp(&b.name));
-    let warnings = implausible(mesh, &mut sets, settings);
+    let warnings = implausible(&mut sets, settings);
     Ok(TagReport { sets, median_edge_mm, warnings })
 }
 
 /// Marks the sets whose area is not to be believed, and says so of each.
-fn implausible(mesh: &TetMesh, sets: &mut [SetReport], settings: &TagSettings) -> Vec<TagWarning> {
+fn implausible(sets: &mut [SetReport], settings: &TagSettings) -> Vec<TagWarning> {
     let mut warnings = Vec::new();
     for set in sets {
         let Some(&[low, high]) = settings.plausible_area_mm2.get(&set.name) else { continue };
         set.plausible = (low..=high).contains(&set.area_mm2);
         if !set.plausible {
-            let parted = set.name == FALX && set.area_mm2 < low && mesh.labels().contains(&label::CSF);
-            let (set, area_mm2, low_mm2, high_mm2) = (set.name.clone(), set.area_mm2, low, high);
-            warnings.push(if parted {
-                TagWarning::Parted { set, area_mm2, low_mm2, high_mm2 }
-            } else {
-                TagWarning::Area { set, area_mm2, low_mm2, high_mm2 }
-            });
+            let (set, area_mm2) = (set.name.clone(), set.area_mm2);
+            warnings.push(TagWarning::Area { set, area_mm2, low_mm2: low, high_mm2: high });
         }
     }
     warnings
@@ -275,14 +263,12 @@ fn is_midsagittal(mesh: &TetMesh, facet: &[u32; 3]) -> bool {
     facet.iter().all(|&n| mesh.nodes_mm()[n as usize][0].abs() <= IN_PLANE_MM)
 }
 
-/// A number that no table of ours has is tissue of somebody else's.
 fn is_tissue(label: u8) -> bool {
-    ![label::CSF, label::VENTRICLE, label::RESECTED].contains(&label)
+    label != label::VENTRICLE && label != label::RESECTED
 }
 
 /// The facets around and between tissue, pointing out of it.
 struct Surfaces {
-    /// To the outside of the mesh, or to fluid that is not the ventricles'.
     pial: Vec<[u32; 3]>,
     /// The same without the walls of holes within.
     outer: Vec<[u32; 3]>,
@@ -345,11 +331,7 @@ impl Surfaces {
 
     /// The surface that removing cells of this label exposes.
     fn exposed(&mut self, label: u8) -> &mut Vec<[u32; 3]> {
-        match label {
-            label::VENTRICLE => &mut self.ventricle,
-            label::CSF => &mut self.pial,
-            _ => &mut self.margin,
-        }
+        if label == label::VENTRICLE { &mut self.ventricle } else { &mut self.margin }
     }
 }
 

@@ -155,55 +155,6 @@ fn a_hole_within_the_brain_is_neither_base_nor_top() {
     }
 }
 
-/// The same with cells of this label where `inside` (mm) holds, or without those cells.
-fn with_region(solid: &TetMesh, inside: impl Fn(Vector3<f64>) -> bool, label: Option<u8>) -> TetMesh {
-    let middle =
-        |tet: &[u32; 4]| tet.iter().map(|&n| Vector3::from(solid.nodes_mm()[n as usize])).sum::<Vector3<f64>>() / 4.0;
-    let cells = solid.tets().iter().zip(solid.labels()).filter_map(|(tet, own)| match (inside(middle(tet)), label) {
-        (false, _) => Some((*tet, *own)),
-        (true, Some(label)) => Some((*tet, label)),
-        (true, None) => None,
-    });
-    let (tets, labels): (Vec<_>, Vec<u8>) = cells.unzip();
-    TetMesh::new(solid.nodes_mm().to_vec(), tets, labels).unwrap()
-}
-
-#[test]
-fn sets_beside_fluid_are_those_of_the_tissue_without_it() {
-    let solid = ellipsoid_brain(8.0, 0.0, true);
-    // A layer around the brain, the front of the fissure, and a cyst deep within: no wall, no falx, neither base nor top.
-    let around = |p: Vector3<f64>| {
-        let from_centre = (p - Vector3::new(0.0, -16.0, 5.0)).component_div(&Vector3::new(71.0, 90.0, 76.5));
-        from_centre.norm() > 0.85
-    };
-    let fissure = |p: Vector3<f64>| p.x.abs() < 8.0 && p.y > 10.0 && p.z > 40.0;
-    let cyst = |p: Vector3<f64>| (p - Vector3::new(-20.0, -40.0, -40.0)).norm() < 12.0;
-    let tags = TagSettings { tentorium: true, superior_depth_mm: 60.0, ..settings() };
-    let fluid = |p: Vector3<f64>| around(p) || fissure(p) || cyst(p);
-    let (mut wet, mut dry) = (with_region(&solid, fluid, Some(label::CSF)), with_region(&solid, fluid, None));
-    let reports = [&mut wet, &mut dry].map(|mesh| tag_boundary_sets(mesh, &tags).unwrap().sets);
-    assert_eq!(wet.node_sets, dry.node_sets);
-    let places =
-        |sets: &[SetReport]| -> Vec<_> { sets.iter().map(|s| (s.name.clone(), s.form, s.nodes, s.facets)).collect() };
-    assert_eq!(places(&reports[0]), places(&reports[1]));
-    for (wet, dry) in reports[0].iter().zip(&reports[1]) {
-        assert!((wet.area_mm2 / dry.area_mm2 - 1.0).abs() < 1e-9, "{}: {} {}", wet.name, wet.area_mm2, dry.area_mm2);
-    }
-}
-
-#[test]
-fn hemispheres_that_meshed_fluid_parts_are_told_so() {
-    let solid = ellipsoid_brain(8.0, 0.0, false);
-    let fissure = |p: Vector3<f64>| p.x.abs() < 8.0 && p.z > -20.0 && p.y < 50.0;
-    let ranges = TagSettings { plausible_area_mm2: Map::from([(FALX.to_owned(), [2.2e3, 9e3])]), ..settings() };
-    let warned = |label: Option<u8>| {
-        let mut mesh = with_region(&solid, fissure, label);
-        tag_boundary_sets(&mut mesh, &ranges).unwrap().warnings
-    };
-    assert!(matches!(&warned(Some(label::CSF))[..], [TagWarning::Parted { set, .. }] if set == FALX));
-    assert!(matches!(&warned(None)[..], [TagWarning::Area { set, .. }] if set == FALX));
-}
-
 #[test]
 fn a_lattice_with_nodes_in_the_plane_gets_a_sheet_and_any_other_a_slab() {
     let mut conforming = ellipsoid_brain(8.0, 0.0, false);

@@ -1,18 +1,16 @@
 //! Holes within the tissue, whose walls lie against no skull.
 
 use crate::mesh::TetMesh;
-use crate::segment::label;
 use nalgebra::Vector3;
 
 /// A hole is one from this volume on, mm3: smaller ones are gaps of the label map.
 const SMALLEST_MM3: f64 = 500.0;
 
-/// Facets of the outside of `mesh` (of what is not fluid around the brain) without those that close around a hole: they see a
-/// volume below zero. A cyst's roof looks down as the base of the brain does, and rests on nothing.
+/// Facets of the outside of `mesh` without those that close around a hole: they see a volume below zero. A cyst's roof looks down
+/// as the base of the brain does, and rests on nothing.
 pub(crate) fn without_voids(mesh: &TetMesh, facets: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    // Of every label: the wall of a hole beside the ventricle or the resected tissue is closed only with their facets. But for fluid:
-    // a hole is one whether it is filled with cells or not.
-    let mut outside = mesh.boundary_facets(|l| l != label::CSF);
+    // Of every label: the wall of a hole beside the ventricle or the resected tissue is closed only with their facets.
+    let mut outside = mesh.boundary_facets(|_| true);
     outside.sort_unstable_by_key(|facet| in_order(*facet));
     // Surfaces hang together by edges: a hole may touch the outside in a node.
     let edges = |(n, &[a, b, c]): (usize, &[u32; 3])| [[a, b], [b, c], [c, a]].map(|[a, b]| (a.min(b), a.max(b), n));

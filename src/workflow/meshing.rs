@@ -18,7 +18,7 @@ use crate::mesh::format::{WriteError, feb, gifti, inp, msh, ply, stl, vtu};
 use crate::mesh::{Island, TetMesh, TriMesh};
 use crate::report::mesh_figure::preview;
 use crate::segment::label;
-use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets, with_closed_fissure};
+use crate::tag::{SetReport, TagSettings, falx_sheet, tag_boundary_sets};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,6 +27,9 @@ use std::path::{Path, PathBuf};
 const VERSION: u32 = 8;
 /// Width of the preview in pixels.
 const PREVIEW_PIXELS: usize = 1600;
+/// Of the label map as `hgm segment` writes it every label is meshed, its fluid too.
+const FLUID_IS_MESHED: &str = "fluid (label 1) is meshed, and boundary sets take it for tissue: where it lies between brain and skull or in the \
+     fissure, they lie on it; leave it out to have those of the brain";
 const FORMATS: [&str; 4] = ["vtu", "msh", "inp", "feb"];
 const SURFACES: [&str; 4] = ["pial", "white", "ventricle", "margin"];
 const SURFACE_ENDINGS: [&str; 3] = [".surf.gii", ".stl", ".ply"];
@@ -74,9 +77,6 @@ pub struct MeshedFile {
     /// How much of each label lay apart from the rest and is not in the mesh, mm3, where it is more than half a cc in all.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub left_out_mm3: BTreeMap<u8, f64>,
-    /// Grey matter put between the hemispheres, which lie against the falx there, mm3; `None` where there was nothing to close.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub closed_mm3: Option<f64>,
     /// The boundary sets.
     pub sets: Vec<SetReport>,
     /// Labels of which the mesh has nothing, where that was half a cc at most.
@@ -177,15 +177,6 @@ fn space_of(in_mni: bool, bytes: &[u8]) -> gifti::Space {
     nifti::code_of(bytes).map_or(gifti::Space::Scanner, gifti::Space::of_nifti_code)
 }
 
-/// The labels as they are meshed for a falx to be found: the hemispheres lie against each other where nothing is between them, as in
-/// a patient's mesh. Also how much grey matter that puts there, mm3.
-fn against_the_falx(labels: &LabelMap<Native>, without: &[u8]) -> (LabelMap<Native>, f64) {
-    let meshed = labels.map(|l| if without.contains(&l) { label::BACKGROUND } else { l });
-    let closed = with_closed_fissure(&meshed, |position_mm| position_mm);
-    let voxels = closed.data.iter().zip(&meshed.data).filter(|(after, before)| after != before).count();
-    (closed, voxels as f64 * labels.grid.voxel_volume_mm3())
-}
-
 /// How much of each label lay apart from the rest, mm3, where it is more than half a cc in all.
 fn left_out_mm3(islands: &[Island]) -> BTreeMap<u8, f64> {
     let mut left_out = BTreeMap::new();
@@ -196,6 +187,11 @@ fn left_out_mm3(islands: &[Island]) -> BTreeMap<u8, f64> {
     left_out
 }
 
+/// What to say of cells that boundary sets take for tissue and that are none.
+fn meshed_fluid(labels: &[u8]) -> Option<&'static str> {
+    labels.contains(&label::CSF).then_some(FLUID_IS_MESHED)
+}
+
 /// Meshes and, with `tags`, tags.
 fn make(
     labels: &LabelMap<Native>,
@@ -203,9 +199,7 @@ fn make(
     tags: Option<&TagSettings>,
     (name, programs): (&str, &EnginePrograms),
 ) -> Result<(TetMesh, MeshedFile), WorkflowError> {
-    let closed = tags.filter(|tags| tags.falx).map(|_| against_the_falx(labels, &settings.without));
-    let body = closed.as_ref().map_or(labels, |(body, _)| body);
-    let (mut mesh, record) = mesh_labels(body, settings, programs)
+    let (mut mesh, record) = mesh_labels(labels, settings, programs)
         .map_err(|source| WorkflowError::Engine { labels: name.to_owned(), source })?;
     let (mut sets, mut refused) = (Vec::new(), Vec::new());
     if let Some(tags) = tags {
@@ -218,14 +212,14 @@ fn make(
     // A stray voxel is told; what is large enough to be seen is missed.
     let (much, little): (Vec<_>, Vec<_>) = lost.iter().partition(|lost| lost.mm3 > LARGE_ISLAND_MM3);
     refused.extend(much.into_iter().map(ToString::to_string));
-    let warnings = little.into_iter().map(ToString::to_string).collect();
+    let mut warnings: Vec<String> = little.into_iter().map(ToString::to_string).collect();
+    warnings.extend(meshed_fluid(mesh.labels()).filter(|_| tags.is_some()).map(str::to_owned));
     let figures = mesh_outcome(&mesh, &mesh, labels, settings);
     let meshed = MeshedFile {
         mesh: figures,
         edge_mm: record.edge_mm,
         islands: record.islands.len(),
         left_out_mm3: left_out_mm3(&record.islands),
-        closed_mm3: closed.map(|(_, mm3)| mm3).filter(|mm3| *mm3 > 0.0),
         sets,
         warnings,
         refused,
@@ -290,6 +284,12 @@ mod tests {
     }
 
     #[test]
+    fn sets_that_lie_on_fluid_are_told_of() {
+        assert_eq!(meshed_fluid(&[label::GREY_MATTER, label::CSF]), Some(FLUID_IS_MESHED));
+        assert_eq!(meshed_fluid(&[label::GREY_MATTER, label::WHITE_MATTER, label::VENTRICLE]), None);
+    }
+
+    #[test]
     fn surfaces_say_the_frame_that_the_header_of_the_labels_says() {
         use gifti::Space::{Aligned, Mni152, Scanner, Talairach};
         let grid = Grid::<Native>::axis_aligned([4; 3], [1.0; 3], [0.0; 3]);
@@ -307,18 +307,5 @@ mod tests {
         let told = [1, 2, 3, 4].map(of);
         assert_eq!(told, [Scanner, Aligned, Talairach, Mni152].map(|space| [space, Mni152]));
         assert_eq!(space_of(false, b"a .mgz"), Scanner);
-    }
-
-    #[test]
-    fn hemispheres_of_a_file_lie_against_the_falx_where_nothing_that_is_meshed_parts_them() {
-        // Two hemispheres, and fluid between them above the free edge of the falx.
-        let grid = Grid::<Native>::axis_aligned([41, 4, 4], [1.0; 3], [-20.0, 20.0, 60.0]);
-        let labels = LabelMap::from_fn(grid, |n| {
-            let [i, ..] = grid.voxel(n);
-            if (17..=23).contains(&i) { label::CSF } else { label::GREY_MATTER }
-        });
-        let (closed, mm3) = against_the_falx(&labels, &[label::CSF]);
-        assert_eq!((closed, mm3), (labels.map(|_| label::GREY_MATTER), 7.0 * 16.0));
-        assert_eq!(against_the_falx(&labels, &[]), (labels, 0.0));
     }
 }

@@ -101,10 +101,6 @@ pub fn meshed(found: &MeshedFile, output: &Path) -> String {
     for (number, mm3) in &found.left_out_mm3 {
         text += &format!("  left out: {:.2} cc of {}, apart from the rest\n", mm3 / 1000.0, name_of_label(*number));
     }
-    if let Some(mm3) = found.closed_mm3 {
-        text +=
-            &format!("  closed: {:.2} cc between the hemispheres, which lie against the falx there\n", mm3 / 1000.0);
-    }
     for warning in &found.warnings {
         text += &format!("  warning: {warning}\n");
     }

@@ -120,11 +120,7 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     prints("evaluate", &["evaluate", &at("planned"), "--against", &case]);
     prints(
         "mesh",
-        &[
-            &["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu"), "--without", "1"],
-            &CHEAP[..],
-        ]
-        .concat(),
+        &[&["mesh", &format!("{case}/anat/pre_space-MNI_dseg.nii.gz"), "-o", &at("m.vtu")], &CHEAP[..]].concat(),
     );
     let phantom = ["phantom", "--include-reference", "--mesher", "lattice", "--cells", "8000", "-o"];
     prints("phantom", &[&phantom[..], &[&at("phantom")]].concat());
