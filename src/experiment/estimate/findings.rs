@@ -8,7 +8,8 @@ use super::projection::Projection;
 use super::re_registration::InstrumentError;
 use super::shape::ShapeFound;
 use super::softest::Softest;
-use super::{Descent, EstimateError};
+use super::{Descent, EstimateError, EstimateSettings};
+use crate::experiment::verdict::Finding;
 use crate::geometry::{Mni, RigidTransform};
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -54,6 +55,18 @@ pub(super) struct Fitted {
     pub taken_up: Option<RigidTransform<Mni, Mni>>,
     /// What correlated errors say.
     pub correlated: Option<Findings>,
+}
+
+impl Fitted {
+    /// Root mean square of what is left of an observation, and the standard deviation that it is held against, mm. Where nothing was
+    /// seen to move the state is rest: what the body that was looked at leaves, at moduli that are no answer, says nothing.
+    pub fn left_mm(&self, finding: Finding, settings: &EstimateSettings) -> [f64; 2] {
+        match &self.correlated {
+            _ if finding != Finding::NoShift => [self.residual_rms_mm, self.noise_mm],
+            Some(found) => [self.rest_rms_mm, found.measured_noise.sd_mm],
+            None => [self.rest_rms_mm, settings.noise_mm],
+        }
+    }
 }
 
 /// How probable the model is beside simpler explanations: natural logarithms.

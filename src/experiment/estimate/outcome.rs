@@ -50,9 +50,10 @@ pub struct EstimateOutcome {
     pub observations: usize,
     /// How many of them count as independent.
     pub independent_observations: f64,
-    /// Standard deviation of one observation, mm: the measurement's, or the misfit's where that is larger.
+    /// Standard deviation of one observation, mm: the measurement's, or the misfit's where that is larger; where no shift was seen
+    /// the measurement's.
     pub noise_mm: f64,
-    /// Root mean square of the residuals at the estimate, mm.
+    /// Root mean square of the residuals at the estimate, mm; where no shift was seen, at rest.
     pub residual_rms_mm: f64,
     /// Root mean square of the measurement's own error that was taken out of one observation, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -19,7 +19,7 @@ pub enum Knowledge {
     Widened,
     /// The figure is an average over models that cannot be told apart.
     Averaged,
-    /// The figures stand under a model that the data do not bear out: they are not an answer.
+    /// The figures are not an answer: no shift was seen, or the model does not stand, or not alone (the verdict says which).
     Withheld,
 }
 

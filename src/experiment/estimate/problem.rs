@@ -89,6 +89,7 @@ mod tests {
     use super::*;
     use crate::experiment::estimate::{Estimate, EstimateSettings, Process, solve_problem};
     use crate::experiment::phantom::{PhantomSettings, block};
+    use crate::experiment::rmse::root_mean_square;
     use crate::experiment::sample::Tissue;
     use crate::experiment::sweep::scenario_of;
     use crate::experiment::verdict::{Claim, Finding, Reason};
@@ -127,16 +128,37 @@ mod tests {
         assert_eq!([told(ShapeError::default()), told(SHAPE)], [None, Some(4)]);
     }
 
+    const NOISE_MM: f64 = 0.02;
+
+    fn errors() -> CorrelatedErrors {
+        let noise = Process { sd_mm: NOISE_MM, length_mm: 7.5 };
+        CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 }
+    }
+
+    /// What is seen of every node of a body that has not moved.
+    fn less_than_noise(mesh: &TetMesh) -> Vec<(u32, [f64; 3])> {
+        let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.01 * v);
+        mesh.nodes_mm().iter().enumerate().map(|(n, x)| (n as u32, wave(x))).collect()
+    }
+
+    #[test]
+    fn where_nothing_has_moved_what_is_left_is_what_was_seen_beside_the_measurements_own_noise() {
+        let (mesh, scenario) = (block(4), PhantomSettings::pushed_from_above().scenario());
+        let seen = (Observation::Nodes(less_than_noise(&mesh)), Errors::Correlated(errors()));
+        let problem = Problem::new(&mesh, &scenario, known(1100.0, 0.4), 0.45, seen);
+        let found = solve_problem(problem, &EstimateSettings::default()).unwrap();
+        assert_eq!(found.outcome.verdict.finding, Finding::NoShift, "{:?}", found.outcome.verdict);
+        let seen_mm: Vec<f64> = found.seen.iter().flat_map(|(_, u)| *u).collect();
+        let left_mm = found.outcome.residual_rms_mm;
+        assert!((left_mm - root_mean_square(&seen_mm).unwrap()).abs() < 1e-12, "{left_mm}");
+        assert_eq!(found.outcome.noise_mm, NOISE_MM);
+    }
+
     #[test]
     fn bounds_without_a_shift_leave_room_for_the_shape_or_say_that_they_do_not() {
         let (mesh, coarse, scenario) = (block(4), block(3), PhantomSettings::pushed_from_above().scenario());
         let bounds = |shape, coarser| {
-            // Less than the noise.
-            let wave = |x: &[f64; 3]| [(0.2 * x[1]).sin(), (0.15 * x[2]).cos(), (0.25 * x[0]).sin()].map(|v| 0.01 * v);
-            let nodes = mesh.nodes_mm().iter().enumerate().map(|(n, x)| (n as u32, wave(x))).collect();
-            let noise = Process { sd_mm: 0.02, length_mm: 7.5 };
-            let errors = CorrelatedErrors { noise, corrected_mm: noise.sd_mm, rigid_mm: 0.1, places: 150 };
-            let seen = (Observation::Nodes(nodes), Errors::Correlated(errors));
+            let seen = (Observation::Nodes(less_than_noise(&mesh)), Errors::Correlated(errors()));
             let posed = Problem::new(&mesh, &scenario, known(1100.0, 0.4), 0.45, seen);
             let problem = Problem { shape, coarser, body_known: false, ..posed };
             let found = solve_problem(problem, &EstimateSettings::default()).unwrap();

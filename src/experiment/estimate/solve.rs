@@ -123,6 +123,7 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
     };
     let fluid = FluidOutcome::of(&unknown, &prior, &fitted.descent.log_parameters, &posterior)
         .filter(|_| verdict.finding.has_stiffness());
+    let [residual_rms_mm, noise_mm] = fitted.left_mm(verdict.finding, settings);
     let correlated = fitted.correlated;
     let shape = correlated.as_ref().map(|c| c.shape).unwrap_or_default();
     let outcome = EstimateOutcome {
@@ -133,8 +134,8 @@ pub fn solve_problem(problem: Problem<'_>, settings: &EstimateSettings) -> Resul
         verdict,
         observations: fitted.observations,
         independent_observations: fitted.independent,
-        noise_mm: fitted.noise_mm,
-        residual_rms_mm: fitted.residual_rms_mm,
+        noise_mm,
+        residual_rms_mm,
         taken_out_rms_mm: fitted.taken_out_rms_mm,
         rigid_taken_up: fitted.taken_up.map(|taken_up| taken_up.to_matrix().transpose().into()),
         convergence: fitted.descent.convergence,
