@@ -8,7 +8,7 @@ use crate::experiment::landmarks::Evaluation;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome};
 use crate::experiment::predict::{Prediction, TargetPlace};
 use crate::experiment::resection::improvement;
-use crate::experiment::verdict::Claim;
+use crate::experiment::verdict::{Claim, Finding};
 use crate::experiment::verdict_of_samples::nearest_to_reference;
 use crate::material::law::StabilityRange;
 use crate::material::meta_model::Fit;
@@ -161,12 +161,16 @@ fn estimate_figures(estimate: &EstimateOutcome) -> String {
     if let Some(ventricles) = &estimate.ventricles {
         text += &format!("check: {}\n", ventricles.sentence());
     }
+    // Of what has not moved the state is rest: no moduli have led there, whose condition there would be to tell.
+    let still = estimate.verdict.finding == Finding::NoShift;
+    let (at, on) = if still { (" at rest", "a state of the model") } else { ("", "the estimate") };
+    let condition = format!(", condition {}", condition_in_words(posterior.identifiability.condition));
     text += &format!(
-        "residual {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves, condition {}\n",
-        condition_in_words(posterior.identifiability.condition)
+        "residual{at} {residual_rms_mm:.4} mm, noise {noise_mm:.3} mm, {tangent_solves} tangent solves{}\n",
+        if still { "" } else { &condition }
     );
     if let Some(taken_out) = taken_out_rms_mm {
-        text += &format!("registration's own error, {taken_out:.3} mm, measured on the estimate and taken out\n");
+        text += &format!("registration's own error, {taken_out:.3} mm, measured on {on} and taken out\n");
     }
     for limit in limits {
         text += &format!("limit: {limit}\n");
@@ -225,7 +229,17 @@ fn stability_in_words(fit: &Fit) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::page::estimate_of_two;
     use super::*;
+
+    #[test]
+    fn without_a_shift_the_figures_are_those_of_rest() {
+        let said = |finding| estimate_figures(&estimate_of_two(finding, [0.3, 0.25]));
+        let still = said(Finding::NoShift);
+        assert!(still.contains("residual at rest 0.1000 mm") && !still.contains("condition"), "{still}");
+        let moved = said(Finding::Identified);
+        assert!(moved.contains("residual 0.1000 mm") && moved.contains("condition 20.0"), "{moved}");
+    }
 
     #[test]
     fn a_condition_that_is_infinite_is_told_in_a_word() {

@@ -6,6 +6,7 @@ use super::results::{Row, table, words};
 use crate::experiment::compare::{Candidate, Comparison};
 use crate::experiment::estimate::{EstimateOutcome, Knowledge, Scale};
 use crate::experiment::parameter_name::{in_words, with_unit};
+use crate::experiment::verdict::{Claim, Finding, Verdict};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -18,6 +19,7 @@ pub fn section(
     residuals: Option<Markup>,
 ) -> Markup {
     let claimed = estimate.verdict.finding.has_stiffness();
+    let still = estimate.verdict.finding == Finding::NoShift;
     let posterior = &estimate.posterior;
     let head = ["Parameter", "Most probable", "95 % interval", "Prior 95 %", "What the data say"].map(str::to_owned);
     let row = |n: usize| -> Row {
@@ -33,7 +35,7 @@ pub fn section(
             Knowledge::NotIdentifiable => "not identifiable",
             Knowledge::Widened => "narrowed, less than the measurement would: the model leaves something unexplained",
             Knowledge::Averaged => "averaged over models that cannot be told apart",
-            Knowledge::Withheld => "withheld: the model does not stand",
+            Knowledge::Withheld => withheld(&estimate.verdict, &posterior.names[n]),
         };
         let cells = [
             with_unit(&posterior.names[n]),
@@ -59,7 +61,8 @@ pub fn section(
         (figures(estimate, truth))
         @if let Some(models) = models { (table_of_models(models)) }
         p {
-            "Residual " (number(estimate.residual_rms_mm, 3)) " mm over " (estimate.observations) " observations ("
+            @if still { "Residual at rest " } @else { "Residual " }
+            (number(estimate.residual_rms_mm, 3)) " mm over " (estimate.observations) " observations ("
             (number(estimate.independent_observations, 3)) " of them independent), each known to "
             (number(estimate.noise_mm, 3)) " mm. " (estimate.solves) " equilibria and " (estimate.tangent_solves)
             " tangent solves."
@@ -78,10 +81,12 @@ pub fn section(
         @if let Some(taken_out) = estimate.taken_out_rms_mm {
             p {
                 "The registration's own error, " (number(taken_out, 3))
-                " mm, was measured on the estimate's state and taken out of what it saw."
+                " mm, was measured on " @if still { "a state of the model" } @else { "the estimate's state" }
+                " and taken out of what it saw."
             }
         }
-        @if posterior.names.len() > 1 {
+        // Of what has not moved there is no minimum, nor a valley about it.
+        @if posterior.names.len() > 1 && !still {
             p {
                 "Correlation of the first two sensitivities " (number(panel.sensitivity_correlation[0][1], 3))
                 "; condition number " (number(panel.condition, 3)) ". The cost has its valley along ("
@@ -93,6 +98,18 @@ pub fn section(
             h3 { "What limits it" }
             ul { @for limit in &estimate.limits { li { (limit) } } }
         }
+    }
+}
+
+/// Why no figure of this parameter is an answer.
+fn withheld(verdict: &Verdict, name: &str) -> &'static str {
+    let tissue = name.strip_prefix("shear_modulus_pa of ");
+    let bounded = |(of, claim): &(String, Claim)| tissue == Some(of.as_str()) && matches!(claim, Claim::Above { .. });
+    match verdict.finding {
+        Finding::NoShift if verdict.moduli.iter().any(bounded) => "no shift seen: a bound alone",
+        Finding::NoShift => "no shift seen",
+        Finding::ModelsDisagree => "withheld: another model, about as probable, claims no stiffness",
+        _ => "withheld: the model does not stand",
     }
 }
 
@@ -138,8 +155,30 @@ fn table_of_models(models: &Comparison) -> Markup {
 
 #[cfg(test)]
 mod tests {
+    use super::super::posterior::tests::estimate;
     use super::*;
-    use crate::experiment::verdict::{Finding, Verdict};
+
+    #[test]
+    fn what_is_withheld_says_why_and_a_model_that_stands_is_not_said_to_fall() {
+        let shown = |finding| {
+            let mut found = estimate(finding, [0.3, 0.25]);
+            found.posterior = found.posterior.withheld();
+            section(&found, None, &BTreeMap::new(), None).into_string()
+        };
+        let falls = "withheld: the model does not stand";
+        for finding in [Finding::Conflict, Finding::Unexplained] {
+            assert_eq!(shown(finding).matches(falls).count(), 2);
+        }
+        let still = shown(Finding::NoShift);
+        assert!(still.matches("no shift seen: a bound alone").count() == 2 && !still.contains(falls), "{still}");
+        assert!(still.contains("Residual at rest 0.100 mm") && !still.contains("valley along"), "{still}");
+        let rival = shown(Finding::ModelsDisagree);
+        assert!(rival.contains("about as probable, claims no stiffness") && !rival.contains(falls), "{rival}");
+        assert_eq!(
+            withheld(&estimate(Finding::NoShift, [0.3; 2]).verdict, "effective density_kg_per_m3"),
+            "no shift seen"
+        );
+    }
 
     #[test]
     fn a_model_that_saw_no_shift_explains_no_share_of_it() {

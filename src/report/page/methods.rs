@@ -4,6 +4,7 @@ use super::super::html::{count, number};
 use super::results::tissue_name;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome, SampleOutcome};
+use crate::experiment::verdict::{Claim, Finding};
 use maud::{Markup, html};
 
 /// A work to cite.
@@ -190,17 +191,26 @@ fn of_samples(outcome: &ExperimentOutcome, samples: usize, model: &Markup) -> Ma
 
 fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &Markup) -> Markup {
     let laws = laws(outcome);
-    html! {
-        "Shear moduli of " (tissues(outcome)) " were estimated by least squares with solver sensitivities from "
-        (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from "
+    let of_person = estimate.prior.iter().any(|prior| prior.average.is_some());
+    let prior = html! {
         @if let Some(patients) = estimate.taught_by { "a cohort of " (patients) " patients" }
-        @else if estimate.prior.iter().any(|prior| prior.average.is_some()) {
-            "a study-level model of the curves collected by " (model) ", for a person nobody has measured; their average judged the result"
+        @else if of_person {
+            "a study-level model of the curves collected by " (model) ", for a person nobody has measured"
         } @else { "a Gaussian-process model of the literature " (model) }
-        @if !laws.is_empty() { ", with " (laws) " laws" }
-        "; intervals are 95 % intervals of the posterior. "
+    };
+    let still = estimate.verdict.finding == Finding::NoShift;
+    html! {
+        @if still { (without_shift(outcome, estimate, &prior)) } @else {
+            "Shear moduli of " (tissues(outcome)) " were estimated by least squares with solver sensitivities from "
+            (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from "
+            (prior)
+            @if of_person && estimate.taught_by.is_none() { "; their average judged the result" }
+            @if !laws.is_empty() { ", with " (laws) " laws" }
+            "; intervals are 95 % intervals of the posterior. "
+        }
         @if estimate.taken_out_rms_mm.is_some() {
-            "The registration's own error was measured on the estimate's state and taken out of what it saw. "
+            "The registration's own error was measured on " @if still { "a state of the model" } @else { "the estimate's state" }
+            " and taken out of what it saw. "
         }
         @if let Some(fluid) = &estimate.fluid {
             "How much of the fluid around the brain had drained was estimated along with the moduli, tissue above its level with its own \
@@ -209,5 +219,42 @@ fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &
         @if let Some(models) = &outcome.comparison {
             (models.candidates.len()) " models were held against each other by their evidence. "
         }
+    }
+}
+
+/// Of what has not moved: no estimate, and what bounds the moduli where something does.
+fn without_shift(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, prior: &Markup) -> Markup {
+    let above = |(tissue, claim): &(String, Claim)| matches!(claim, Claim::Above { .. }).then(|| tissue_name(tissue));
+    let bounded: Vec<String> = estimate.verdict.moduli.iter().filter_map(above).collect();
+    html! {
+        "No shift was seen in " (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2))
+        " mm, and no shear modulus of " (tissues(outcome)) " was estimated. "
+        @if bounded.is_empty() {
+            "What is known of the moduli beforehand is from " (prior) ". "
+        } @else {
+            "What a body with the most probable moduli of " (prior) " would have done under these loads bounds the shear moduli of "
+            (list(&bounded)) " from below, with 95 % certainty. "
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::posterior::tests::estimate;
+    use super::*;
+
+    #[test]
+    fn without_a_shift_the_methods_tell_a_bound_and_no_estimate() {
+        let told = |finding| {
+            let tissues = vec!["grey_matter".to_owned(), "white_matter".to_owned()];
+            let estimate = Some(estimate(finding, [0.3, 0.25]));
+            paragraph(&ExperimentOutcome { tissues, estimate, ..ExperimentOutcome::default() }).into_string()
+        };
+        let still = told(Finding::NoShift);
+        assert!(still.contains("No shift was seen in 300 observations, each known to 0.10 mm"), "{still}");
+        assert!(still.contains("of grey matter and white matter from below, with 95 % certainty"), "{still}");
+        assert!(!still.contains("were estimated") && !still.contains("posterior"), "{still}");
+        let moved = told(Finding::Identified);
+        assert!(moved.contains("were estimated by least squares") && !moved.contains("from below"), "{moved}");
     }
 }

@@ -17,6 +17,8 @@ mod tasks;
 
 pub use evaluation::in_a_sentence as evaluation_in_a_sentence;
 pub use methods::{Reference, references};
+#[cfg(test)]
+pub(in crate::report) use posterior::tests::estimate as estimate_of_two;
 pub use prediction::in_a_sentence as expected_in_a_sentence;
 pub use results::set_name;
 

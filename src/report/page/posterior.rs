@@ -219,13 +219,13 @@ fn of_two(estimate: &EstimateOutcome, truth: &BTreeMap<String, f64>) -> Vec<Join
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::experiment::estimate::{Convergence, Identifiability, Knowledge, Posterior};
     use crate::experiment::verdict::{Finding, Verdict};
 
     /// Two moduli: modes, standard deviations of the logarithms, and their correlation.
-    fn estimate(finding: Finding, sd: [f64; 2]) -> EstimateOutcome {
+    pub(in crate::report) fn estimate(finding: Finding, sd: [f64; 2]) -> EstimateOutcome {
         let names = ["grey_matter", "white_matter"].map(|tissue| format!("shear_modulus_pa of {tissue}"));
         let mode = [1370.0, 990.0];
         let both = -0.8 * sd[0] * sd[1];
