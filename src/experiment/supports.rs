@@ -66,23 +66,17 @@ impl ResectionSettings {
         self.supports == Supports::Sliding || self.csf.is_some()
     }
 
-    /// What else holds and carries the brain, to follow a list of what is held.
+    /// What else holds the brain, to follow a list of what is held.
     pub fn supports_in_words(&self) -> String {
-        let mut words = String::new();
-        if self.supports == Supports::Sliding {
-            let from = match self.skull.from {
-                SkullFrom::Cortex => "from the cortex",
-                SkullFrom::Scan => "outside the fluid that the scan shows",
-            };
-            words += &format!(", sliding on a skull {} mm {from}", self.skull.gap_mm);
-            if self.falx == Support::Sliding {
-                words += " and along the falx";
-            }
+        if self.supports != Supports::Sliding {
+            return String::new();
         }
-        if let Some(csf) = &self.csf {
-            words += &format!(", {:.0} % of the fluid drained", 100.0 * csf.drained);
-        }
-        words
+        let from = match self.skull.from {
+            SkullFrom::Cortex => "from the cortex",
+            SkullFrom::Scan => "outside the fluid that the scan shows",
+        };
+        let along = if self.falx == Support::Sliding { " and along the falx" } else { "" };
+        format!(", sliding on a skull {} mm {from}{along}", self.skull.gap_mm)
     }
 
     /// The scenario with supports and fluid as these settings have them, by the labels of the pre-operative scan in the

@@ -34,4 +34,8 @@ pub struct EstimateFacts {
     /// The models that were tried, where there were several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Comparison>,
+    /// Loads and supports in words of each body that the verdict is about: several where it is an average, or a bound of all of them;
+    /// none of a phantom, and in manifests of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<String>,
 }

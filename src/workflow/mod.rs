@@ -35,6 +35,7 @@ mod labels;
 mod landmark_pairs;
 mod law_fitting;
 mod layer;
+mod loads_in_words;
 mod lock;
 mod lost_label;
 mod made_files;

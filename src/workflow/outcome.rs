@@ -7,7 +7,7 @@ use super::fresh::{GATHERED, Provenance, StageRecord};
 use super::work::Work;
 use crate::artefact::{Manifest, sha256_hex, write_whole};
 use crate::experiment::outcome::ExperimentOutcome;
-use crate::experiment::verdict::Claim;
+use crate::experiment::verdict::{Claim, Finding, Verdict};
 use crate::layout;
 use crate::report::case::report_files;
 
@@ -91,11 +91,31 @@ fn samples_table(outcome: &ExperimentOutcome) -> String {
     lines.join("\n") + "\n"
 }
 
-/// The outcome with the estimate as one more sample, its moduli as far as they are claimed; it is the best one where no sweep
-/// has chosen another.
+/// What the bodies that a verdict is about were loaded and held by.
+fn loads_of(facts: &EstimateFacts) -> Option<String> {
+    let Verdict { finding, moduli, .. } = &facts.estimate.verdict;
+    let bounded = moduli.iter().any(|(_, claim)| matches!(claim, Claim::Above { .. }));
+    let said = facts.loads.join("; or ");
+    match (facts.loads.len(), finding) {
+        (0, _) => None,
+        (2.., Finding::CannotTell) => Some(format!("{said} (the moduli are averages over these)")),
+        (2.., Finding::NoShift) if bounded => Some(format!("{said} (the bounds hold for each of these)")),
+        _ => Some(said),
+    }
+}
+
+/// The outcome with the estimate as one more sample, its moduli as far as they are claimed, and the loads of its own bodies; it is
+/// the best one where no sweep has chosen another.
 pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFacts) {
     let name = &facts.record.id;
     outcome.samples.retain(|s| s.id != *name);
+    if let Some(own) = loads_of(facts).filter(|own| outcome.loads != [own.as_str()]) {
+        let of_samples = outcome.loads.iter().filter(|_| !outcome.samples.is_empty());
+        outcome.loads = match of_samples.map(|said| format!("for the samples {said}")).collect::<Vec<_>>() {
+            none if none.is_empty() => vec![own],
+            said => said.into_iter().chain([format!("for the estimate {own}")]).collect(),
+        };
+    }
     if outcome.samples.is_empty() {
         outcome.tissues = facts.record.shear_modulus_pa.keys().cloned().collect();
     }
@@ -107,6 +127,10 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
     record.shear_modulus_pa.retain(|tissue, _| claimed(tissue));
     // Samples are drawn from the prior of an average person, an estimate from nothing: its level would be of another prior.
     record.sd_levels.clear();
+    if facts.estimate.verdict.finding == Finding::NoShift {
+        // Its state is rest, which no law has led to.
+        record.laws.clear();
+    }
     outcome.samples.push(record);
     if outcome.best_sample.is_none() {
         outcome.best_sample = Some(name.clone());
@@ -118,7 +142,7 @@ pub(crate) fn with_estimate(outcome: &mut ExperimentOutcome, facts: &EstimateFac
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::outcome::SampleOutcome;
+    use crate::experiment::outcome::{LawOutcome, SampleOutcome};
     use serde_json::json;
 
     /// An estimate of two tissues that claims a modulus of the first alone.
@@ -147,10 +171,16 @@ mod tests {
             id: "estimate".to_owned(),
             shear_modulus_pa: of_both(975.0, 717.0).into(),
             sd_levels: of_both(-0.3, -0.2).into(),
+            laws: [("grey_matter".to_owned(), LawOutcome::default())].into(),
             converged: true,
             ..SampleOutcome::default()
         };
-        EstimateFacts { estimate: serde_json::from_value(estimate).unwrap(), record, comparison: None }
+        EstimateFacts {
+            estimate: serde_json::from_value(estimate).unwrap(),
+            record,
+            comparison: None,
+            loads: Vec::new(),
+        }
     }
 
     #[test]
@@ -162,5 +192,36 @@ mod tests {
         assert!(table.ends_with("\nestimate,,975,,,true,0,\n"), "{table}");
         // The stage's own warnings say them.
         assert_eq!(outcome.warnings, [""; 0]);
+        assert_eq!(outcome.samples[0].laws.len(), 1);
+    }
+
+    #[test]
+    fn what_has_not_moved_was_led_there_by_no_law() {
+        let mut facts = half_claimed();
+        facts.estimate.verdict.finding = Finding::NoShift;
+        let mut outcome = ExperimentOutcome::default();
+        with_estimate(&mut outcome, &facts);
+        assert!(outcome.samples[0].laws.is_empty());
+    }
+
+    #[test]
+    fn an_estimates_loads_are_those_of_the_bodies_it_is_about_and_samples_keep_theirs() {
+        let of = |finding, samples: usize, loads: &[&str]| {
+            let mut facts = half_claimed();
+            facts.estimate.verdict.finding = finding;
+            facts.loads = loads.iter().map(|said| (*said).to_owned()).collect();
+            let samples = vec![SampleOutcome { id: "sample-00".to_owned(), ..SampleOutcome::default() }; samples];
+            let mut outcome =
+                ExperimentOutcome { samples, loads: vec!["a".to_owned()], ..ExperimentOutcome::default() };
+            with_estimate(&mut outcome, &facts);
+            outcome.loads
+        };
+        assert_eq!(of(Finding::Identified, 0, &["b"]), ["b"]);
+        assert_eq!(of(Finding::CannotTell, 0, &["b", "a"]), ["b; or a (the moduli are averages over these)"]);
+        assert_eq!(of(Finding::NoShift, 0, &["b", "a"]), ["b; or a"], "no bound, of which to say for what it holds");
+        assert_eq!(of(Finding::Identified, 1, &["b"]), ["for the samples a", "for the estimate b"]);
+        assert_eq!(of(Finding::Identified, 1, &["a"]), ["a"]);
+        // A phantom's, and what earlier versions have kept.
+        assert_eq!(of(Finding::Identified, 1, &[]), ["a"]);
     }
 }

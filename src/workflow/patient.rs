@@ -2,9 +2,9 @@
 
 use super::earlier_prediction::earlier_prediction;
 use super::error::{CaseError, WorkflowError};
-use super::estimate_options::Fluid;
 use super::facts::MeshFacts;
 use super::inputs::{Inputs, OwnMasks, ScanSums, Scans, with_own_masks_of};
+use super::loads_in_words::loads_in_words;
 use super::outcome::{finish, keep_settings, with_estimate};
 use super::plan::{self, Goal};
 use super::refusal;
@@ -417,27 +417,8 @@ impl<'w, 'a> Patient<'w, 'a> {
     fn posed_outcome(&self) -> ExperimentOutcome {
         let settings = &self.work.settings.resection;
         let rest = self.reference.errors(&self.mesh, &vec![[0.0; 3]; self.mesh.nodes_mm().len()]);
-        let [gx, gy, gz] = self.scenario.loads.gravity_m_per_s2;
-        let (held, supports) = (self.scenario.fixed.join(" and "), settings.supports_in_words());
-        let on = |kg_per_m3: f64| {
-            format!(
-                "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}"
-            )
-        };
-        let in_fluid = || {
-            let in_fluid = ResectionSettings { csf: None, ..settings.in_fluid() };
-            let supports = in_fluid.supports_in_words();
-            let kg_per_m3 = in_fluid.density_kg_per_m3;
-            format!(
-                "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2 on tissue of {kg_per_m3} kg/m3, with {held} held{supports}, an unknown part of \
-                 the fluid drained"
-            )
-        };
-        let loads = match self.work.settings.estimate.fluid {
-            Fluid::AsGiven => on(settings.density_kg_per_m3),
-            Fluid::Unknown => in_fluid(),
-            Fluid::Evidence => format!("{}; or {}", on(settings.density_kg_per_m3), in_fluid()),
-        };
+        // Of samples; an estimate brings its own.
+        let loads = loads_in_words(settings, &self.scenario, (&[], ""));
         ExperimentOutcome {
             reference: "ventricle wall and cavity surface of the post-operative scan (closest points)".to_owned(),
             rest_rmse_mm: rest.rmse_mm,

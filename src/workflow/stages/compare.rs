@@ -1,6 +1,7 @@
 //! Stage `compare`: models of one patient beside each other, by their evidence.
 
-use super::estimate::{Bodies, EstimateInput, HeldBody};
+use super::estimate::{Bodies, EstimateInput};
+use super::held_body::HeldBody;
 use super::held_by::held_by;
 use crate::artefact::Produced;
 use crate::experiment::compare::{Comparison, compare as weigh};

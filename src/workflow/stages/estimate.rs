@@ -1,18 +1,17 @@
 //! Stage `estimate`: the most probable moduli with their intervals, and the state they lead to.
 
 use super::brain_shift::SeenShift;
+use super::held_body::HeldBody;
 use super::held_by::held_by;
 use crate::artefact::{Produced, Stage};
-use crate::experiment::compare::{Comparison, compare, with_weakest_bounds};
+use crate::experiment::compare::{Candidate, Comparison, compare, with_weakest_bounds};
 use crate::experiment::estimate::{
-    Errors, Estimate, EstimateOutcome, EstimateSettings, FluidLevels, Instrument, LogPrior, MovedNode, Observation,
-    Problem, SEEN_AT, SEEN_DISPLACEMENT, ShapeError, Shown, Turn, Unknown, moved_by, prior_of_drained, solve_problem,
+    Errors, Estimate, EstimateOutcome, EstimateSettings, Instrument, LogPrior, MovedNode, Observation, Problem,
+    SEEN_AT, SEEN_DISPLACEMENT, ShapeError, Shown, Unknown, moved_by, solve_problem,
 };
 use crate::experiment::outcome::SampleOutcome;
 use crate::experiment::prior::{PriorSettings, law_priors};
-use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::sample::{Sample, Tissue, TissueSample};
-use crate::experiment::stuck_cortex::{with_stuck_cortex, with_stuck_set};
 use crate::experiment::sweep::Reference;
 use crate::experiment::ventricles::VentricleChange;
 use crate::experiment::verdict::{Finding, Verdict};
@@ -28,7 +27,6 @@ use crate::workflow::facts::EstimateFacts;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::warning::Warning;
 use crate::workflow::work::{Made, Work, facts};
-use std::sync::Arc;
 
 /// Raised when the stage's code changes its result.
 const VERSION: u32 = 38;
@@ -66,103 +64,6 @@ impl EstimateOptions {
             );
         }
         Ok(())
-    }
-
-    /// The loads that are estimated, with what is known of them beforehand.
-    fn unknown_loads(&self, loads: &Loads) -> Vec<(Unknown, LogPrior)> {
-        let mut unknowns = Vec::new();
-        let mut add = |unknown: Unknown, mean: f64, sd: f64| {
-            let prior = unknown.prior(mean, sd);
-            unknowns.push((unknown, prior));
-        };
-        // Beside a fluid the density is the tissue's own, which is known.
-        if self.density && loads.csf.is_none() {
-            add(Unknown::Density, loads.density_kg_per_m3.ln(), self.density_log_sd);
-        }
-        if self.gravity_direction {
-            for turn in [Turn::Nodding, Turn::Rolling] {
-                add(Unknown::GravityTurn(turn), 0.0, self.gravity_direction_sd_deg.to_radians());
-            }
-        }
-        if self.pressure {
-            for (n, load) in loads.pressure.iter().enumerate() {
-                add(Unknown::Pressure(n), load.pressure_pa.abs().ln(), self.pressure_log_sd);
-            }
-        }
-        unknowns
-    }
-}
-
-/// A body as one way of holding it poses it.
-pub(crate) struct HeldBody {
-    /// What holds it; none of a phantom.
-    pub settings: Option<ResectionSettings>,
-    /// Loads, supports, solver.
-    pub scenario: Scenario,
-    /// The undeformed mesh, with the sets that slide; the nodes of the case's mesh come first.
-    pub mesh: TetMesh,
-    /// What its state is compared with.
-    pub reference: Reference,
-    /// The levels of the fluid around it, where nobody knows how much has drained.
-    pub levels: Option<Arc<FluidLevels>>,
-}
-
-impl HeldBody {
-    /// The part of the fluid that has drained, where nobody knows it.
-    fn unknown_fluid(&self, options: &EstimateOptions) -> Option<(Unknown, LogPrior)> {
-        let unknown = Unknown::Drained(self.levels.clone()?);
-        let drained = self.settings.as_ref()?.csf.as_ref()?.drained;
-        let prior = prior_of_drained(&unknown, drained, options.drained_log_sd);
-        Some((unknown, prior))
-    }
-
-    /// The room between cortex and skull, which no scan shows well enough to be given, where the body slides.
-    fn unknown_room(&self) -> Option<(Unknown, LogPrior)> {
-        let skull = &self.settings.as_ref().filter(|s| s.supports == Supports::Sliding)?.skull;
-        (skull.gap_mm > 0.0 && skull.gap_log_sd > 0.0).then(|| {
-            let unknown = Unknown::Gap(0);
-            let prior = unknown.prior(skull.gap_mm.ln(), skull.gap_log_sd);
-            (unknown, prior)
-        })
-    }
-
-    /// Standard deviation of ln(modulus) that its labels and supports add.
-    fn log_sd(&self, options: &EstimateOptions) -> f64 {
-        let slides = self.settings.as_ref().is_some_and(|s| s.supports == Supports::Sliding);
-        if slides { options.wall_log_sd } else { options.labels_log_sd }
-    }
-
-    /// The same body with its cortex stuck to the skull where it faces down.
-    pub fn stuck(&self) -> Self {
-        Self {
-            settings: self.settings.clone(),
-            mesh: self.stuck_mesh(self.mesh.clone()),
-            reference: self.reference.clone(),
-            levels: self.levels.clone(),
-            scenario: with_stuck_cortex(&self.scenario),
-        }
-    }
-
-    /// A mesh of it with what sticks to the skull then.
-    fn stuck_mesh(&self, mesh: TetMesh) -> TetMesh {
-        let skull = self.settings.as_ref().map(|s| s.skull.clone()).unwrap_or_default();
-        with_stuck_set(mesh, &skull, self.scenario.loads.gravity_m_per_s2)
-    }
-
-    /// What it assumes, in words.
-    pub fn name(&self) -> String {
-        let Some(settings) = &self.settings else { return String::new() };
-        let fluid = match (&self.levels, &settings.csf) {
-            (Some(_), _) => ", fluid of unknown level".to_owned(),
-            (None, Some(csf)) => format!(", {:.0} % of the fluid drained", 100.0 * csf.drained),
-            (None, None) => String::new(),
-        };
-        format!("supports {}{fluid}", settings.supports.name())
-    }
-
-    /// Whether a body of this name ([`Self::name`]) slides.
-    pub fn slides(name: &str) -> bool {
-        name.starts_with(&format!("supports {}", Supports::Sliding.name()))
     }
 }
 
@@ -269,7 +170,12 @@ pub(crate) fn estimate(
         let comparison = comparison.map(|c| Comparison { verdict: verdict.clone(), ..c });
         let outcome = EstimateOutcome { taught_by, limits: verdict.because(), verdict, ..found.outcome };
         let found = Estimate { outcome, ..found };
-        let mut produced = produced(body, input, found, comparison)?;
+        let loads = bodies.loads_in_words(
+            &work.settings.estimate,
+            (name.as_str(), comparison.as_ref()),
+            found.outcome.verdict.finding,
+        );
+        let mut produced = produced(body, input, found, (comparison, loads))?;
         produced.warn(left_out.into_iter().map(|(model, reason)| Warning::ModelLeftOut { model, reason }));
         Ok(produced)
     })
@@ -320,6 +226,24 @@ impl Bodies {
         // The same places for every body: evidence is of one set of data.
         let deep = options.displacement.observed(input.mesh.0, |x| x);
         Ok(Self { list, deep, coarser })
+    }
+
+    /// Loads and supports in words of what a verdict of this finding is about, a body each: of the model of this name, of every one
+    /// that an average is over, of all where a bound has to hold for all. None of a phantom.
+    fn loads_in_words(
+        &self,
+        options: &EstimateOptions,
+        (best, compared): (&str, Option<&Comparison>),
+        finding: Finding,
+    ) -> Vec<String> {
+        let name = |candidate: &Candidate| candidate.name.clone();
+        let about = match (compared, finding) {
+            (Some(compared), Finding::CannotTell) => compared.averaged().map(name).collect(),
+            (Some(compared), Finding::NoShift) => compared.candidates.iter().map(name).collect(),
+            _ => vec![best.to_owned()],
+        };
+        let bodies = about.iter().filter_map(|name| self.list.iter().find(|body| body.name() == *name));
+        bodies.filter_map(|body| body.loads_in_words(options, finding)).collect()
     }
 
     /// What is estimated of one of them, and its scenario.
@@ -493,7 +417,7 @@ fn produced(
     body: &HeldBody,
     input: &EstimateInput<'_>,
     found: Estimate,
-    comparison: Option<Comparison>,
+    (comparison, loads): (Option<Comparison>, Vec<String>),
 ) -> Result<Produced, WorkflowError> {
     let mesh = &body.mesh;
     let found = if found.outcome.verdict.finding == Finding::NoShift { found.at_rest() } else { found };
@@ -554,6 +478,51 @@ fn produced(
     Ok(Produced {
         files: vec![(file, vtu::encode(mesh, &points, &cells)?), (ESTIMATE_JSON.to_owned(), json.into_bytes())],
         warnings: limits.chain(of_state).map(|limit| format!("estimate: {limit}")).collect(),
-        facts: facts(&EstimateFacts { estimate: outcome, record, comparison }),
+        facts: facts(&EstimateFacts { estimate: outcome, record, comparison, loads }),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::label;
+    use crate::experiment::resection::{ResectionSettings, Supports};
+    use nalgebra::UnitQuaternion;
+
+    fn body(supports: Supports) -> HeldBody {
+        let settings = ResectionSettings { supports, ..ResectionSettings::default() };
+        let held = if supports == Supports::Sliding { "brainstem" } else { "base" };
+        let scenario = Scenario { fixed: vec![held.to_owned()], ..settings.scenario(&UnitQuaternion::identity()) };
+        let nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3]], vec![label::GREY_MATTER]).unwrap();
+        HeldBody { settings: Some(settings), scenario, mesh, reference: Reference::Nodes(Vec::new()), levels: None }
+    }
+
+    #[test]
+    fn loads_are_told_of_the_bodies_that_a_verdict_is_about() {
+        let list = [Supports::Fixed, Supports::Sliding].map(body).into();
+        let bodies = Bodies { list, deep: Vec::new(), coarser: None };
+        let told = |finding, log_odds: f64| {
+            let candidate = |(name, log_evidence): (&str, f64)| Candidate {
+                name: name.to_owned(),
+                log_evidence,
+                weight: 0.5,
+                finding: Finding::Identified,
+                explained_share: 0.9,
+                moduli_pa: Vec::new(),
+            };
+            let candidates = [("supports sliding", 0.0), ("supports fixed", -log_odds)].map(candidate).to_vec();
+            let compared = Comparison { candidates, log_odds: Some(log_odds), verdict: Verdict::default() };
+            bodies.loads_in_words(&EstimateOptions::default(), ("supports sliding", Some(&compared)), finding)
+        };
+        let is_of = |said: &[String], held: &[&str]| {
+            said.len() == held.len() && said.iter().zip(held).all(|(said, held)| said.contains(&format!("{held} held")))
+        };
+        let sliding = told(Finding::Identified, 99.0);
+        assert!(is_of(&sliding, &["brainstem"]) && sliding[0].contains("skull estimated along"), "{sliding:?}");
+        assert!(is_of(&told(Finding::CannotTell, 1.0), &["brainstem", "base"]));
+        assert!(is_of(&told(Finding::CannotTell, 99.0), &["brainstem"]), "not of one that is ruled out");
+        let every = told(Finding::NoShift, 99.0);
+        assert!(is_of(&every, &["brainstem", "base"]) && every[0].contains("skull not taken as known"), "{every:?}");
+    }
 }
