@@ -43,6 +43,16 @@ impl Manifest {
         serde_json::from_str(&std::fs::read_to_string(Self::path_of_stage(folder, stage)).ok()?).ok()
     }
 
+    /// Those of every stage that has finished in this folder, by the stages' names.
+    pub fn all_of(folder: &Path) -> Vec<Self> {
+        let entries = std::fs::read_dir(folder.join(".stages")).into_iter().flatten().flatten();
+        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let stages = names.filter_map(|name| name.strip_suffix(".manifest.json").map(str::to_owned));
+        let mut all: Vec<Self> = stages.filter_map(|stage| Self::of_stage(folder, &stage)).collect();
+        all.sort_by(|a, b| a.stage.cmp(&b.stage));
+        all
+    }
+
     /// The figures that a later stage or the report needs. Through their text: of two ways to read a type the compiler makes both.
     ///
     /// # Errors

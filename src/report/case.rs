@@ -7,6 +7,7 @@ use super::case_views::{add_results, observed_errors};
 use super::figure::CaseImages;
 use super::glance_figure::glance_figure;
 use super::hand_off::{self, CaseFile};
+use super::left_behind::left_behind;
 use super::listing::listing;
 use super::mesh_figure::{PICTURE, cut_views, legend, middle_mm};
 use super::page::{CaptionedPicture, CasePage, PredictionFigure, ShiftFigure, title_of};
@@ -134,7 +135,9 @@ fn read_with_images(folder: &Path) -> Result<(CasePage, Option<CaseImages>), Rep
     let absent = &mut page.absent;
     page.prediction = case.numbers(layout::PREDICTION_JSON, ["the brain shift expected", "hgm predict"], absent)?;
     page.evaluation = evaluation_of(&case, absent)?;
-    page.brain_shift = case.numbers(layout::SHIFT_JSON, ["the brain shift", "hgm run"], absent)?;
+    if !left_behind(folder).contains(layout::SHIFT_JSON) {
+        page.brain_shift = case.numbers(layout::SHIFT_JSON, ["the brain shift", "hgm run"], absent)?;
+    }
     page.landmarks = landmarks_in(&case, absent)?.filter(|_| page.brain_shift.is_some());
     let estimated = outcome.as_ref().is_some_and(|outcome| outcome.estimate.is_some());
     // Sections that need nothing of each other are drawn side by side.
@@ -240,7 +243,12 @@ pub fn report_files(folder: &Path) -> Result<Vec<CaseFile>, ReportError> {
             files.extend(surfaces.map_err(ReportError::HandOff)?);
         }
     }
-    page.files = listing(folder, &files.iter().map(|(file, _)| file.as_str()).collect());
+    // Answers that no stage has made may be of an earlier state, too.
+    let mut left = left_behind(folder);
+    let landmarks = landmarks_in(&case, &mut Vec::new())?;
+    let answers = [(layout::LANDMARKS_JSON, landmarks.is_none()), (layout::EVALUATION_JSON, page.evaluation.is_none())];
+    left.extend(answers.into_iter().filter(|(_, earlier)| *earlier).map(|(file, _)| file.to_owned()));
+    page.files = listing(folder, &files.iter().map(|(file, _)| file.as_str()).collect(), &left);
     files.insert(0, (layout::PAGE.to_owned(), page.to_html().into_bytes()));
     Ok(files)
 }
@@ -404,6 +412,37 @@ mod tests {
             assert!(page.absent.iter().any(named), "{file}: {:?}", page.absent);
         }
         assert!(page.prediction.is_none() && page.brain_shift.is_none());
+    }
+
+    #[test]
+    fn what_another_job_has_left_in_the_folder_is_neither_shown_nor_linked() {
+        use crate::artefact::{Produced, Stage};
+
+        let folder = tempfile::tempdir().unwrap();
+        case(folder.path());
+        let files = vec![(layout::SHIFT_JSON.to_owned(), serde_json::to_vec(&BrainShift::default()).unwrap())];
+        let made = || Ok::<_, std::convert::Infallible>(Produced { files, ..Produced::default() });
+        let key = Stage::new("fields", 1, folder.path(), &()).run(false, made).unwrap().manifest.key;
+        let of_outcome = |stages: serde_json::Value| {
+            let provenance = serde_json::json!({ "program": "hgm", "stages": stages });
+            write(folder.path(), layout::PROVENANCE, provenance.to_string().as_bytes());
+        };
+        let links = |file: &str| {
+            let (_, page) = report_files(folder.path()).unwrap().swap_remove(0);
+            String::from_utf8(page).unwrap().contains(&format!("href=\"{file}\""))
+        };
+        let of_sha256 = results_sha256(folder.path()).unwrap();
+        let landmarks = Evaluation { of_sha256, ..Evaluation::default() };
+        write(folder.path(), layout::LANDMARKS_JSON, &serde_json::to_vec(&landmarks).unwrap());
+        of_outcome(serde_json::json!([{ "stage": "fields", "key": key }]));
+        assert!(links(layout::SHIFT_JSON) && links(layout::LANDMARKS_JSON) && links(layout::OUTCOME));
+        assert!(read_case(folder.path()).unwrap().brain_shift.is_some());
+        of_outcome(serde_json::json!([]));
+        assert!(!links(layout::SHIFT_JSON) && links(layout::OUTCOME));
+        assert!(read_case(folder.path()).unwrap().brain_shift.is_none());
+        let landmarks = Evaluation { of_sha256: "another".to_owned(), ..landmarks };
+        write(folder.path(), layout::LANDMARKS_JSON, &serde_json::to_vec(&landmarks).unwrap());
+        assert!(!links(layout::LANDMARKS_JSON));
     }
 
     #[test]

@@ -16,13 +16,13 @@ pub struct Listed {
 }
 
 /// The files of a case in the table's order, `made` among them: those that are written with the page. What an earlier page
-/// left and this one does not make is not listed, nor is the page itself.
-pub fn listing(folder: &Path, made: &BTreeSet<&str>) -> Vec<Listed> {
+/// left and this one does not make is not listed, nor is what another job has left, `left_behind`, nor the page itself.
+pub fn listing(folder: &Path, made: &BTreeSet<&str>, left_behind: &BTreeSet<String>) -> Vec<Listed> {
     let mut listed: BTreeSet<String> = BTreeSet::new();
     let rows = layout::TABLE.iter().filter(|entry| ![layout::PAGE, layout::LOCK].contains(&entry.path)).map(|entry| {
         let there = |file: &str| match entry.maker {
             Maker::Report if !by_another_command(entry) => made.contains(file),
-            _ => folder.join(file).is_file(),
+            _ => !left_behind.contains(file) && folder.join(file).is_file(),
         };
         let mut files = if entry.path.contains('{') {
             members(folder, Family(entry.path), made)
@@ -85,7 +85,8 @@ mod tests {
             write_whole(&folder.path().join(file), b"x").unwrap();
         }
         let pial = layout::BEST_SURFACE.of("pial");
-        let rows = listing(folder.path(), &BTreeSet::from([pial.as_str(), layout::PAGE]));
+        let made = BTreeSet::from([pial.as_str(), layout::PAGE]);
+        let rows = listing(folder.path(), &made, &BTreeSet::new());
         let of = |file: &str| rows.iter().filter(|row| row.files.iter().any(|f| f == file)).collect::<Vec<_>>();
         for file in [layout::OUTCOME, layout::ESTIMATE_STATE, &sample, &head_up, &draws, &pial] {
             assert_eq!(of(file).len(), 1, "{file}");
@@ -94,5 +95,12 @@ mod tests {
             assert!(of(file).is_empty(), "{file}");
         }
         assert!(of(&sample)[0].what.contains("one sample") && of(&head_up)[0].what.contains("prediction"));
+        let left = BTreeSet::from([layout::ESTIMATE_STATE.to_owned()]);
+        let fewer: usize = listing(folder.path(), &made, &left).iter().map(|row| row.files.len()).sum();
+        assert_eq!(
+            fewer + 1,
+            rows.iter().map(|row| row.files.len()).sum::<usize>(),
+            "what another job has left is not"
+        );
     }
 }

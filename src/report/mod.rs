@@ -17,6 +17,7 @@ pub mod glance_figure;
 pub mod hand_off;
 pub mod html;
 pub mod in_words;
+mod left_behind;
 pub mod lettering;
 pub mod linked_slices;
 pub mod listing;

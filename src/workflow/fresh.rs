@@ -181,11 +181,7 @@ impl Case {
 
     /// The stages that have finished here, each after those it was made from.
     pub(crate) fn recorded(&self) -> Vec<Manifest> {
-        let entries = std::fs::read_dir(self.path(".stages")).into_iter().flatten().flatten();
-        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-        let stages = names.filter_map(|name| name.strip_suffix(".manifest.json").map(str::to_owned));
-        let mut waiting: Vec<Manifest> = stages.filter_map(|stage| Manifest::of_stage(self.folder(), &stage)).collect();
-        waiting.sort_by(|a, b| a.stage.cmp(&b.stage));
+        let mut waiting = Manifest::all_of(self.folder());
         let mut ordered: Vec<Manifest> = Vec::new();
         while !waiting.is_empty() {
             let ready =
