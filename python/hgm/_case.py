@@ -157,12 +157,15 @@ class Case:
     def mask(self, name: str, *, of: str = "", space: str = "native") -> Any:
         """A mask as an image: ``brain`` (``of="pre"`` or ``"post"``), ``resected``, ``cavity``, ``ventricle``.
 
-        ``space`` is ``native`` (the scan's own grid) or ``mni``.
+        ``space`` is ``native`` (the scan's own grid) or ``mni``. The ventricles after surgery are
+        ``mask("ventricle", of="post", space="mni")``; those before surgery, which ``ventricle_mask`` of :func:`hgm.run` gives, have no
+        mask of their own: they are label 4 of :meth:`labels`.
         """
         key = " ".join(word for word in ("mask", name, of or ("pre" if name == "brain" else ""), space) if word)
         if key not in _NAMES:
             known = sorted(key.removeprefix("mask ") for key in _NAMES if key.startswith("mask "))
-            raise InputRefused(f"mask: {key.removeprefix('mask ')!r}: say one of {', '.join(known)}")
+            before = "; the ventricles before surgery are label 4 of case.labels()" if name == "ventricle" else ""
+            raise InputRefused(f"mask: {key.removeprefix('mask ')!r}: say one of {', '.join(known)}{before}")
         return self.image(_NAMES[key])
 
     def labels(self, *, space: str = "native") -> Any:

@@ -123,7 +123,7 @@ pub fn names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         ("mask resected mni", layout::RESECTED),
         ("mask cavity native", layout::NATIVE_CAVITY),
         ("mask cavity mni", layout::CAVITY),
-        ("mask ventricle mni", layout::POST_VENTRICLE),
+        ("mask ventricle post mni", layout::POST_VENTRICLE),
         ("labels native", layout::PRE_NATIVE_LABELS),
         ("labels mni", layout::PRE_LABELS),
         ("field deformed", layout::SHIFT.0),

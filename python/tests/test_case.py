@@ -61,6 +61,11 @@ def test_a_case_hands_over_what_is_in_it(case: hgm.Case) -> None:
     assert mesh.points.shape[1] == 3 and mesh.cells.shape == (len(mesh.labels), 4) and "base" in mesh.sets
     assert case.page.name == "report.html"
     assert case.mask("cavity").get_fdata().any() and case.mask("brain", space="mni").get_fdata().any()
+    # Before surgery there are ventricles too: which are meant must be said.
+    assert case.mask("ventricle", of="post", space="mni").get_fdata().any()
+    for unclear in [{"space": "mni"}, {"of": "post"}, {"of": "pre"}, {"of": "pre", "space": "mni"}]:
+        with pytest.raises(hgm.InputRefused, match="ventricle post mni; the ventricles before surgery are label 4 of"):
+            case.mask("ventricle", **unclear)
     assert set(np.unique(case.labels().get_fdata())) >= {0, 2, 3}
     files = case.files
     assert files["mesh/rest.vtu"]["space"] == "mni" and all((case.path / name).exists() for name in files)
