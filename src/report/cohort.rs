@@ -24,6 +24,9 @@ pub struct Row {
     pub status: Status,
     /// Why it did not end well.
     pub message: Option<String>,
+    /// Whether its page lies beside that of all.
+    #[serde(skip)]
+    pub has_page: bool,
     /// The sample that explains it best, or `estimate`.
     pub best_sample: Option<String>,
     /// What it comes down to, in a few words.
@@ -240,6 +243,7 @@ fn row(member: &Member, columns: &mut Vec<String>) -> Row {
         participant_id: member.participant_id.clone(),
         status: member.status.clone(),
         message: member.message.clone(),
+        has_page: member.has_page,
         best_sample: member.outcome.as_ref().and_then(|o| o.best_sample.clone()),
         verdict: member.outcome.as_ref().map(|o| o.verdict.finding.short()),
         sentence: member.outcome.as_ref().map(|o| o.verdict.sentence.clone()),
@@ -276,7 +280,7 @@ mod tests {
         });
         let outcome = outcome.map(ExperimentOutcome::with_verdict);
         let message = (status == Status::Failed).then(|| "no brain".to_owned());
-        Member { participant_id: name.to_owned(), status, message, outcome, settings_sha256: None }
+        Member { participant_id: name.to_owned(), status, message, has_page: true, outcome, settings_sha256: None }
     }
 
     fn cohort() -> Cohort {

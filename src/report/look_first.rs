@@ -212,7 +212,7 @@ mod tests {
     fn member(name: &str, scans: Option<ScanQualities>) -> Member {
         let outcome = Some(ExperimentOutcome { scans, ..ExperimentOutcome::default() });
         let participant_id = name.to_owned();
-        Member { participant_id, status: Status::Done, message: None, outcome, settings_sha256: None }
+        Member { participant_id, status: Status::Done, message: None, has_page: true, outcome, settings_sha256: None }
     }
 
     fn measured(name: &str, contrast_to_noise: f64) -> Member {

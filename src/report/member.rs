@@ -33,6 +33,8 @@ pub struct Member {
     pub status: Status,
     /// Why it did not end well.
     pub message: Option<String>,
+    /// Whether its page lies beside that of all.
+    pub has_page: bool,
     /// Its numbers, where its last run gave any.
     pub outcome: Option<ExperimentOutcome>,
     /// Checksum of its settings: subjects with different ones are not to be compared.
@@ -62,7 +64,7 @@ impl Status {
         }
     }
 
-    /// Whether the subject has a page.
+    /// Whether a page of the subject, where there is one, is of how it ended.
     pub fn has_page(&self) -> bool {
         !matches!(self, Self::Failed | Self::Unfinished | Self::Missing)
     }

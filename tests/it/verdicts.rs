@@ -142,6 +142,7 @@ fn page_terminal_json_and_group_say_the_same_verdict_of_eight_outcomes() {
             participant_id: format!("sub-{:02}", members.len()),
             status: if outcome.answer.is_some() { Status::NoOperation } else { Status::Done },
             message: None,
+            has_page: true,
             outcome: Some(outcome),
             settings_sha256: None,
         });

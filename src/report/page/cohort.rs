@@ -228,7 +228,7 @@ impl Cohort {
                     value: *row.figures.get(column)?,
                     apart: row.outlying.contains(column),
                     counted: row.status == Status::Done,
-                    page: row.status.has_page().then(|| page_of(row)),
+                    page: row.has_page.then(|| page_of(row)),
                 })
             };
             StripChart { name: words(column), points: self.subjects.iter().filter_map(point).collect() }.to_svg()
@@ -299,7 +299,7 @@ fn apart(row: &Row) -> &'static str {
 /// The subject's name, and the way to its page where it has one.
 fn linked(row: &Row) -> Markup {
     let name = &row.participant_id;
-    html! { @if row.status.has_page() { a href=(page_of(row)) { (name) } } @else { (name) } }
+    html! { @if row.has_page { a href=(page_of(row)) { (name) } } @else { (name) } }
 }
 
 fn page_of(row: &Row) -> String {

@@ -334,6 +334,7 @@ fn a_cohort_shows_which_scans_to_look_at_first_and_why() {
         participant_id: name.to_owned(),
         status: Status::Done,
         message: None,
+        has_page: true,
         outcome: Some(ExperimentOutcome {
             scans: Some(ScanQualities { pre: Some(scan(3.0, Air::Blank)), post: Some(scan(post, Air::Blank)) }),
             ..ExperimentOutcome::default()
@@ -359,5 +360,9 @@ fn a_cohort_shows_which_scans_to_look_at_first_and_why() {
     // Cases of before scans were measured are still in the list, and say so.
     let mut old = member("sub-4", 3.0);
     old.outcome.as_mut().unwrap().scans = None;
-    assert!(Cohort::new(&[old]).to_html().contains("No scan was measured"));
+    assert!(Cohort::new(std::slice::from_ref(&old)).to_html().contains("No scan was measured"));
+    // A gate may stop a subject before there is a page: a link would lead nowhere.
+    old.status = Status::QualityGate;
+    assert!(Cohort::new(std::slice::from_ref(&old)).to_html().contains("sub-4.html"));
+    assert!(!Cohort::new(&[Member { has_page: false, ..old }]).to_html().contains("sub-4.html"));
 }

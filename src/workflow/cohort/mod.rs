@@ -129,6 +129,7 @@ pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, CohortE
     };
     Ok(Member {
         participant_id: subject.to_owned(),
+        has_page: participant_level::page_of(out, subject, &status).is_some(),
         status,
         message: log.map(|log| format!("{}: {}", log.kind, log.message)).or(stale),
         settings_sha256: read(layout::SETTINGS).filter(|_| outcome.is_some()).map(|text| sha256_hex(text.as_bytes())),
@@ -177,6 +178,10 @@ mod tests {
             let told = member.outcome.is_some();
             assert_eq!((member.status, told), (status, exit_code == 4), "exit code {exit_code}");
             assert_eq!(member.message.unwrap(), "input rejected: no brain");
+            assert!(!member.has_page, "none was published");
+            write_whole(&out.path().join("sub-01.html"), b"page").unwrap();
+            assert_eq!(read(out.path()).has_page, exit_code == 4, "exit code {exit_code}");
+            std::fs::remove_file(out.path().join("sub-01.html")).unwrap();
         }
     }
 }

@@ -170,7 +170,7 @@ pub fn participants(
 }
 
 /// A subject's page: one that failed shows none, and a gate may have stopped it before there was one.
-fn page_of(out: &Path, called: &str, status: &Status) -> Option<PathBuf> {
+pub(super) fn page_of(out: &Path, called: &str, status: &Status) -> Option<PathBuf> {
     Some(out.join(format!("{called}.html"))).filter(|page| status.has_page() && page.exists())
 }
 

@@ -206,6 +206,7 @@ mod tests {
             participant_id: format!("sub-{n:02}"),
             status: Status::Done,
             message: None,
+            has_page: true,
             outcome: Some(outcome),
             settings_sha256: None,
         }
