@@ -237,7 +237,7 @@ pub struct RegistrationOutcome {
     pub rotation_deg: f64,
     /// Translation of the brain's centre, mm.
     pub translation_mm: [f64; 3],
-    /// The similarity's name: `Mattes mutual information`.
+    /// The similarity's name: `Mattes mutual information`; [`GIVEN_BY_HAND`] where nothing was compared.
     pub similarity: String,
     /// Similarity at the start.
     #[serde(default)]
@@ -245,6 +245,16 @@ pub struct RegistrationOutcome {
     /// Similarity at the end.
     #[serde(default)]
     pub similarity_after: Option<f64>,
+}
+
+/// The similarity of a transform that was given and not looked for.
+pub const GIVEN_BY_HAND: &str = "given by hand";
+
+impl RegistrationOutcome {
+    /// Whether it was given by hand: nothing was registered for it.
+    pub fn is_by_hand(&self) -> bool {
+        self.similarity == GIVEN_BY_HAND
+    }
 }
 
 /// A mesh in numbers.

@@ -14,6 +14,7 @@ use super::work::{Place, Work};
 use crate::anatomy::label;
 use crate::experiment::compare::Comparison;
 use crate::experiment::parameter_name::in_words as called;
+use crate::experiment::predict::Head;
 use crate::experiment::prior::{PriorSettings, held_material};
 use crate::experiment::resection::{ResectionSettings, Supports};
 use crate::experiment::verdict::{Finding, Verdict};
@@ -129,12 +130,12 @@ pub fn posed_case(
             (scenario, own.poisson_ratio)
         }
         Subject::Plan => {
-            // The way to lie that comes first; its gravity is in the mesh's frame already.
-            let mut own = settings.resection.clone();
-            if let Some(head) = settings.predict.heads.first() {
-                own.gravity_m_per_s2 = head.gravity_m_per_s2(&stages::mni_from_pre(&case)?);
-            }
-            (own.scenario(&UnitQuaternion::identity()), own.poisson_ratio)
+            // The way to lie that comes first, in the fluid that its draws are around; its gravity is in the mesh's frame already.
+            let head = settings.predict.heads.first().copied().unwrap_or(Head::Supine);
+            let gravity = head.gravity_m_per_s2(&stages::mni_from_pre(&case)?);
+            let labels = stages::PlannedHead::read(&case)?.before;
+            let (own, scenario) = stages::planned_body(settings, gravity, Supports::Fixed, &labels)?;
+            (scenario, own.poisson_ratio)
         }
     };
     add_materials(&mesh, &mut scenario, ratio, &settings.prior)?;

@@ -139,6 +139,7 @@ fn every_stage(
         registrations: vec![posed.fit],
         sets: meshed.sets,
         mesh: Some(meshed.mesh),
+        held_shear_modulus_pa: prediction.held_shear_modulus_pa.clone(),
         ..ExperimentOutcome::default()
     };
     Ok((made, prediction, outcome))

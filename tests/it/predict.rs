@@ -2,6 +2,7 @@
 
 use crate::job::{CHEAP, contents, output, sample};
 use crate::made::{copy, finished_pair};
+use hgm::workflow::{Case, Place, Resection, Settings, Silent, posed_case};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -137,6 +138,15 @@ fn slow_a_known_level_and_poissons_ratio_are_drawn_and_told_and_a_seed_gives_oth
     for words in ["Where the fluid stands", "Poisson's ratio", "30 mm below the brain's highest point"] {
         assert!(page.contains(words), "{words}");
     }
+
+    for head in found["heads"].as_array().unwrap() {
+        assert_eq!(head["draws_solved"]["solved"], head["draws_solved"]["of"], "a level is solved for in each draw");
+    }
+    // A body that is stepped by hand lies in the same fluid.
+    let own = Case::open(&case).unwrap();
+    let settings = Settings::resolve([&own.settings().unwrap()]).unwrap();
+    let posed = posed_case(&Place::from(case.as_path()), &settings, Resection::Done, &mut Silent).unwrap();
+    assert!(posed.scenario.loads.csf.is_some() && posed.scenario.loads.density_kg_per_m3 > 1000.0);
 
     assert_eq!(told(&["--seed", "0"]), plain, "seed 0 has the points that no seed has");
     let (one, other) = (told(&["--seed", "5"]), told(&["--seed", "6"]));

@@ -71,6 +71,8 @@ pub struct Forecast {
     pub check: Option<Check>,
     /// Equilibria that were solved, checks apart.
     pub states: usize,
+    /// Draws that were solved themselves; the others are read from the surface.
+    pub solved: usize,
     /// Draws that were to be solved and have no equilibrium, so heavy and soft are they; they are read from the surface.
     pub unbalanced: usize,
 }
@@ -178,8 +180,8 @@ pub fn forecast(
     }
     let check = (!pairs.is_empty()).then(|| checked(&posed.supports, &pairs));
     let response = response.thinned(&(0..nodes).collect::<Vec<_>>());
-    let equilibria = states.len() + solved_draws - unbalanced;
-    Ok(Forecast { response, draws_mm, check, states: equilibria, unbalanced })
+    let solved = solved_draws - unbalanced;
+    Ok(Forecast { response, draws_mm, check, states: states.len() + solved, solved, unbalanced })
 }
 
 #[cfg(test)]
@@ -265,6 +267,7 @@ mod tests {
         let heaviest = (0..16).max_by(|&a, &b| load(a).total_cmp(&load(b))).unwrap();
         let read = |n: usize| ended.response.at(&walled.uncertainty.draw(n)) == ended.draws_mm[n];
         assert!((0..16).all(|n| read(n) == (n != heaviest)));
+        assert_eq!((ended.solved, unended.solved), (1, 0));
     }
 
     /// A block of one tissue that is pressed on top and can give way along z alone.
@@ -344,6 +347,7 @@ mod tests {
         let found = forecast(&posed, nodes, (16, 16), &|| ()).unwrap();
         // Two of three states of the path, one with the tissues apart, and the draws.
         assert_eq!((found.states + found.unbalanced, posed.path().points(&posed.uncertainty).len()), (2 + 1 + 16, 3));
+        assert_eq!(found.solved + found.unbalanced, 16);
         let check = found.check.unwrap();
         assert!(check.solves == 16 && check.mean_off_95.unwrap() < 0.01, "{check:?}");
     }

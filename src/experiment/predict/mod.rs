@@ -47,7 +47,7 @@ pub use known_level::KnownLevel;
 pub use left_by_all::LeftByAll;
 pub use low_discrepancy::{halton, inverse_normal, normals, normals_of};
 pub use modes::{DrawnState, Modes};
-pub use outcome::{HeadPrediction, Prediction, TargetPlace, TargetPrediction, UnknownOutcome};
+pub use outcome::{DrawsSolved, HeadPrediction, Prediction, TargetPlace, TargetPrediction, UnknownOutcome};
 pub use path::Path;
 pub use place::{Found, Locator};
 pub use planned::{PREDICTED, assumptions};

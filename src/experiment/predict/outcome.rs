@@ -9,6 +9,7 @@ use super::support::SupportWeight;
 use super::uncertain::Cause;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A prediction. Lengths in mm, positions and directions in the pre-operative scanner's frame, RAS+.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,6 +28,9 @@ pub struct Prediction {
     pub least: Option<HeadComparison>,
     /// What was not known, and its prior.
     pub unknowns: Vec<UnknownOutcome>,
+    /// Tissues that were not drawn but held at the mean of their prior (tumour, oedema): shear modulus, Pa.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub held_shear_modulus_pa: BTreeMap<String, f64>,
     /// How the brain may be supported, and how probable that was taken to be before any way was left out.
     pub supports: Vec<SupportWeight>,
     /// How far draws read from the response surface are off those solved whole.
@@ -67,11 +71,25 @@ pub struct HeadPrediction {
     pub fluid: Option<FluidOfHead>,
     /// Equilibria that were solved for it, checks apart.
     pub states_solved: usize,
+    /// Its draws of all ways of supporting the brain, and those among them that were solved themselves: the others were read from the
+    /// response surface. Absent from predictions of before this was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draws_solved: Option<DrawsSolved>,
     /// How the brain is supported in its draws, and how much that counts: a way without an equilibrium is left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub supports: Vec<SupportWeight>,
     /// Points that were asked for.
     pub targets: Vec<TargetPrediction>,
+}
+
+/// How many draws were solved themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DrawsSolved {
+    /// Those that were solved.
+    pub solved: usize,
+    /// All.
+    pub of: usize,
 }
 
 /// Where a target lies.

@@ -165,6 +165,7 @@ pub fn assumptions(
         format!("How stiff this brain is, is not known: it is drawn from {stiffness}."),
     ];
     said.extend(prior.spread_of(&settings.tissue_list()));
+    said.extend(held_in_words(found));
     if let Some(sd) = settings.poisson_log_sd {
         let at = |z: f64| Scale::LameRatio.value(Scale::LameRatio.number(own.poisson_ratio) + z * sd);
         said.push(format!(
@@ -184,6 +185,18 @@ pub fn assumptions(
         ));
     }
     said
+}
+
+/// What was not drawn, where the brain has such tissue.
+fn held_in_words(found: &Prediction) -> Option<String> {
+    let held = found.held_shear_modulus_pa.iter();
+    let held: Vec<String> = held.map(|(name, pa)| format!("{} at {pa:.0} Pa", name.replace('_', " "))).collect();
+    (!held.is_empty()).then(|| {
+        format!(
+            "How stiff abnormal tissue is, is not drawn: its shear modulus is held at the mean of what is known of such tissue ({}).",
+            held.join(", ")
+        )
+    })
 }
 
 /// Where the fluid is known to stand, and what part of it has drained then.
@@ -308,6 +321,13 @@ mod tests {
         let poisson = PredictSettings { poisson_log_sd: Some(0.7), ..PredictSettings::default() };
         assert!(
             told(Supports::Fixed, &poisson).contains("Poisson's ratio is about 0.45 (95 % between 0.35 and 0.486)")
+        );
+        let held_shear_modulus_pa = [("tumour".to_owned(), 29_901.2)].into();
+        let found = Prediction { held_shear_modulus_pa, ..found };
+        let ill = assumptions(&PredictSettings::default(), (&own, &PriorSettings::default()), &found).join(" ");
+        assert!(
+            ill.contains("not drawn") && ill.contains("tumour at 29901 Pa") && !sliding.contains("abnormal"),
+            "{ill}"
         );
         let fluid_level = Some(KnownLevel { below_top_mm: 25.0, sd_mm: 5.0 });
         let level = told(Supports::Fixed, &PredictSettings { fluid_level, ..PredictSettings::default() });

@@ -4,7 +4,10 @@ use super::super::html::{count, number};
 use super::results::tissue_name;
 use crate::experiment::estimate::EstimateOutcome;
 use crate::experiment::outcome::{ESTIMATE, ExperimentKind, ExperimentOutcome, SampleOutcome};
+use crate::experiment::parameter_name::in_words;
+use crate::experiment::predict::{Cause, DrawsSolved, Prediction, UnknownOutcome};
 use crate::experiment::verdict::{Claim, Finding};
+use crate::geometry::{Frame, Pre};
 use maud::{Markup, html};
 
 /// A work to cite.
@@ -63,7 +66,7 @@ const CGAL: Reference = Reference {
 /// What a reader of this outcome should cite, in the order of the text: the works whose methods were used.
 pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
     let mut all = vec![TEMPLATE];
-    if !outcome.registrations.is_empty() {
+    if outcome.registrations.iter().any(|registration| !registration.is_by_hand()) {
         all.push(MUTUAL_INFORMATION);
     }
     if outcome.mesh.as_ref().is_some_and(|m| m.engine == "cgal") {
@@ -76,14 +79,14 @@ pub fn references(outcome: &ExperimentOutcome) -> Vec<Reference> {
     all
 }
 
-/// The paragraph, what was found, the references and their BibTeX.
-pub fn section(outcome: &ExperimentOutcome) -> Markup {
+/// The paragraph, what was found, the references and their BibTeX; of a prediction its numbers say how it was drawn.
+pub fn section(outcome: &ExperimentOutcome, prediction: Option<&Prediction>) -> Markup {
     let references = references(outcome);
     let bibtex: Vec<&str> = references.iter().map(|r| r.bibtex).collect();
     html! {
         p { "Text that may be used as it stands:" }
         blockquote id="methods-text" {
-            p { (paragraph(outcome)) }
+            p { (paragraph(outcome, prediction)) }
             p { "Result. " (outcome.verdict.sentence) }
         } "\n"
         h3 { "References" }
@@ -110,7 +113,7 @@ fn cite(references: &[Reference], wanted: Reference) -> Markup {
 }
 
 /// Only what was done: a step that was not reached has no sentence.
-fn paragraph(outcome: &ExperimentOutcome) -> Markup {
+fn paragraph(outcome: &ExperimentOutcome, prediction: Option<&Prediction>) -> Markup {
     let references = references(outcome);
     let cite = |wanted| cite(&references, wanted);
     let is_estimate = |s: &&SampleOutcome| outcome.estimate.is_some() && s.id == ESTIMATE;
@@ -121,16 +124,10 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
         @match outcome.kind {
             ExperimentKind::Phantom => { ", on the MNI152NLin2009aSym template " (cite(TEMPLATE)) ". " },
             ExperimentKind::Prediction => {
-                ". The pre-operative image was registered rigidly to the MNI152NLin2009aSym template " (cite(TEMPLATE))
-                ", so that sizes stay the patient's. The tissue of the plan was removed from the mesh. "
+                ". " (registered(outcome, &cite)) "The tissue of the plan was removed from the mesh. "
             },
             ExperimentKind::Resection => {
-                ". The images were registered rigidly, after surgery to before surgery and before surgery to the \
-                 MNI152NLin2009aSym template " (cite(TEMPLATE))
-                @if !outcome.registrations.is_empty() {
-                    ", maximising Mattes mutual information " (cite(MUTUAL_INFORMATION))
-                }
-                ", so that sizes stay the patient's. "
+                ". " (registered(outcome, &cite))
                 @if outcome.answer.is_some() { "No mesh was made and nothing was simulated. " }
             },
         }
@@ -144,14 +141,71 @@ fn paragraph(outcome: &ExperimentOutcome) -> Markup {
             "Loads: " (list(&outcome.loads)) ". "
         }
         @if outcome.kind == ExperimentKind::Prediction {
-            "Unknowns were drawn by Halton's sequence from the priors stated above " (cite(GENERATIVE_MODEL))
-            ", and each draw's displacement was read from a response surface through static equilibria and their sensitivities. "
+            (of_draws(prediction, &cite(GENERATIVE_MODEL)))
         }
         @if swept > 0 { (of_samples(outcome, swept, &cite(GENERATIVE_MODEL))) }
         @if let Some(estimate) = &outcome.estimate { (of_estimate(outcome, estimate, &cite(GENERATIVE_MODEL))) }
-        @if !outcome.held_shear_modulus_pa.is_empty() && simulated {
+        @if !outcome.held_shear_modulus_pa.is_empty() && (simulated || outcome.kind == ExperimentKind::Prediction) {
             "Held at the mean of the prior of abnormal tissue: "
             (list(&outcome.held_shear_modulus_pa.keys().map(|name| tissue_name(name)).collect::<Vec<_>>())) ". "
+        }
+    }
+}
+
+/// How the images came to lie on the template: registered, or by a transform that was given.
+fn registered(outcome: &ExperimentOutcome, cite: &dyn Fn(Reference) -> Markup) -> Markup {
+    let by_hand = outcome.registrations.iter().any(|r| r.moving == Pre::NAME && r.is_by_hand());
+    let computed = outcome.registrations.iter().any(|r| !r.is_by_hand());
+    let template = html! { "the MNI152NLin2009aSym template " (cite(TEMPLATE)) };
+    html! {
+        @match (outcome.kind == ExperimentKind::Resection, by_hand) {
+            (true, false) => {
+                "The images were registered rigidly, after surgery to before surgery and before surgery to " (template)
+            },
+            (true, true) => {
+                "The pre-operative image was placed on " (template)
+                " by a transform given by hand, and the post-operative one was registered rigidly to it"
+            },
+            (false, false) => { "The pre-operative image was registered rigidly to " (template) },
+            (false, true) => { "The pre-operative image was placed on " (template) " by a transform given by hand" },
+        }
+        @if computed { ", maximising Mattes mutual information " (cite(MUTUAL_INFORMATION)) }
+        ", so that sizes stay the patient's. "
+    }
+}
+
+/// What was drawn, and what came of each draw; the model is of the stiffness.
+fn of_draws(prediction: Option<&Prediction>, model: &Markup) -> Markup {
+    let Some(found) = prediction else {
+        return html! { "Unknowns were drawn by Halton's sequence from their priors " (model) ". " };
+    };
+    let prior = |u: &UnknownOutcome| {
+        let (name, unit) = in_words(&u.name);
+        let figures = [u.median, u.interval_95[0], u.interval_95[1]].map(|x| number(x, 3));
+        let [middle, low, high] = figures;
+        // A share and a ratio have none.
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        html! { (name) @if u.cause == Cause::Stiffness { " " (model) } ", " (middle) " (" (low) " to " (high) ")" (unit) }
+    };
+    let solved = found.heads.iter().map(|head| head.draws_solved).collect::<Option<Vec<DrawsSolved>>>();
+    let solved = solved.map(|all| all.iter().fold((0, 0), |(solved, of), d| (solved + d.solved, of + d.of)));
+    html! {
+        "What is not known of the patient was drawn by Halton's sequence from its priors (middle, and 95 % between): "
+        @for (n, unknown) in found.unknowns.iter().enumerate() { @if n > 0 { "; " } (prior(unknown)) }
+        ". "
+        @match solved {
+            None | Some((_, 0)) => {},
+            Some((solved, of)) if solved == of => {
+                "Each of the " (count(of)) " draws was solved to its own static equilibrium. "
+            },
+            Some((0, of)) => {
+                "The displacement of each of the " (count(of)) " draws was read from a response surface through static equilibria and their \
+                 sensitivities. "
+            },
+            Some((solved, of)) => {
+                "Of the " (count(of)) " draws " (count(solved)) " were solved to their own static equilibria; the displacement of the others was \
+                 read from a response surface through static equilibria and their sensitivities. "
+            },
         }
     }
 }

@@ -290,7 +290,7 @@ impl CasePage {
         let heading = if sliced { "Slices and 3-D view" } else { "3-D view" };
         add("view", heading, self.viewer.as_ref().map(Viewer::section));
         add("convergence", "Convergence", outcome.and_then(results::convergence));
-        add("methods", "Methods", outcome.map(methods::section));
+        add("methods", "Methods", outcome.map(|o| methods::section(o, self.prediction.as_ref())));
         add("provenance", "Files and settings", self.provenance_section());
         add("rating", "Your rating", Some(parts::rating()));
         sections

@@ -31,8 +31,9 @@ pub fn in_a_sentence(prediction: &Prediction) -> String {
     let no_farther = head.farthest_95_mm.map_or_else(String::new, |mm| {
         format!("; in 95 of 100 cases no place moves by more than {} mm", number(mm, 2))
     });
+    let drained = if drains(head) { " and fluid drains" } else { "" };
     format!(
-        "With the head {}, once {} cc are taken and fluid drains, the brain is expected to move by about {} mm at most, at ({x}, {y}, {z}) mm \
+        "With the head {}, once {} cc are taken{drained}, the brain is expected to move by about {} mm at most, at ({x}, {y}, {z}) mm \
          of the scan{no_farther}. On average over the draws {} cc of tissue move by more than {} mm. What matters most: {}.{least}",
         head.head,
         number(prediction.plan.resected_cc, 2),
@@ -41,6 +42,15 @@ pub fn in_a_sentence(prediction: &Prediction) -> String {
         number(prediction.threshold_mm, 2),
         most(&head.shares),
     )
+}
+
+/// Whether any fluid drains in the draws of a head; where its level is not known, some does.
+fn drains(head: &HeadPrediction) -> bool {
+    let Some(fluid) = &head.fluid else { return true };
+    match (fluid.drained, fluid.drained_95) {
+        (Some(part), Some([_, most])) => part > 0.0 || most > 0.0,
+        _ => fluid.interval_95_mm[1] > 0.0,
+    }
 }
 
 /// The unknown with the largest share, in words.
@@ -239,6 +249,20 @@ mod tests {
         for words in ["head supine", "6.2 mm", "14 mm", "how much fluid drains (50 %", "Least cannot be told."] {
             assert!(said.contains(words), "{words}: {said}");
         }
+    }
+
+    #[test]
+    fn fluid_that_just_covers_the_brain_is_not_said_to_drain() {
+        let of = |drained: f64, most: f64| {
+            let mut found = prediction();
+            let (drained, drained_95) = (Some(drained), Some([0.0, most]));
+            found.heads[0].fluid = Some(FluidOfHead { drained, drained_95, ..FluidOfHead::default() });
+            in_a_sentence(&found)
+        };
+        let covered = of(0.0, 0.0);
+        assert!(!covered.contains("and fluid drains") && covered.contains("cc are taken, the brain"), "{covered}");
+        let drains = [of(0.1, 0.2), of(0.0, 0.1), in_a_sentence(&prediction())];
+        assert!(drains.iter().all(|said| said.contains("taken and fluid drains, the brain")), "{drains:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use super::*;
 use crate::experiment::outcome::{
-    LawOutcome, NoiseFloor, RegistrationOutcome, ResectionVolumes, SampleOutcome, SetOutcome,
+    GIVEN_BY_HAND, LawOutcome, NoiseFloor, RegistrationOutcome, ResectionVolumes, SampleOutcome, SetOutcome,
 };
 use crate::report::cohort::{Cohort, Member, Status};
 use crate::segment::{Air, ScanQualities, ScanQuality};
@@ -208,6 +208,64 @@ fn a_midline_that_moved_less_than_can_be_told_has_moved_to_no_side() {
 fn how_a_prediction_was_drawn_stands_in_its_methods_once() {
     let html = page(outcome(ExperimentKind::Prediction)).to_html();
     assert_eq!(html.matches("Halton").count(), 1);
+}
+
+#[test]
+fn methods_of_a_prediction_say_what_was_drawn_from_what_held_and_what_was_solved() {
+    use crate::experiment::predict::{Cause, DrawsSolved, HeadPrediction, UnknownOutcome};
+    let shown = |solved: usize| {
+        let head = HeadPrediction { draws_solved: Some(DrawsSolved { solved, of: 32 }), ..HeadPrediction::default() };
+        let unknown = UnknownOutcome {
+            name: "shear_modulus_pa of grey_matter".to_owned(),
+            cause: Cause::Stiffness,
+            median: 1110.0,
+            interval_95: [540.0, 980.0],
+        };
+        let prediction = Some(Prediction { heads: vec![head], unknowns: vec![unknown], ..Prediction::default() });
+        let outcome = ExperimentOutcome {
+            held_shear_modulus_pa: map(vec![("tumour", 29_900.0)]),
+            samples: Vec::new(),
+            ..outcome(ExperimentKind::Prediction)
+        };
+        let html = CasePage { prediction, ..page(outcome) }.to_html();
+        html.split("id=\"methods-text\"").nth(1).unwrap().split("</blockquote>").next().unwrap().to_owned()
+    };
+    let all = shown(32);
+    for words in ["shear modulus of grey matter", "(540 to 980) Pa", "abnormal tissue: tumour", "solved to its own"] {
+        assert!(all.contains(words), "{words}: {all}");
+    }
+    assert!(!all.contains("response surface") && !all.contains("stated above"), "{all}");
+    let (some, none) = (shown(2), shown(0));
+    assert!(some.contains("Of the 32 draws 2 were solved") && some.contains("others was read from"), "{some}");
+    assert!(none.contains("each of the 32 draws was read from") && !none.contains("solved"), "{none}");
+}
+
+#[test]
+fn a_transform_given_by_hand_is_not_said_to_be_registered() {
+    let shown = |kind, hands: &[&str]| {
+        let mut outcome = outcome(kind);
+        outcome.registrations = [("post", "pre"), ("pre", "MNI")]
+            .map(|(moving, fixed)| RegistrationOutcome {
+                moving: moving.to_owned(),
+                fixed: fixed.to_owned(),
+                similarity: if hands.contains(&moving) { GIVEN_BY_HAND } else { "Mattes mutual information" }
+                    .to_owned(),
+                ..RegistrationOutcome::default()
+            })
+            .into_iter()
+            .filter(|r| kind == ExperimentKind::Resection || r.moving == "pre")
+            .collect();
+        let html = page(outcome).to_html();
+        html.split("id=\"methods\"").nth(1).unwrap().split("</section>").next().unwrap().to_owned()
+    };
+    let found = shown(ExperimentKind::Resection, &[]);
+    assert!(found.contains("maximising Mattes") && !found.contains("given by hand"), "{found}");
+    let placed = shown(ExperimentKind::Resection, &["pre"]);
+    assert!(placed.contains("by a transform given by hand, and the post-operative one was registered"), "{placed}");
+    assert!(placed.contains("maximising Mattes"), "the other scan was registered: {placed}");
+    let planned = shown(ExperimentKind::Prediction, &["pre"]);
+    assert!(planned.contains("given by hand") && !planned.contains("Mattes"), "{planned}");
+    assert!(!planned.contains("registered rigidly"), "{planned}");
 }
 
 #[test]

@@ -38,7 +38,7 @@ pub(crate) use labels::labels;
 pub(crate) use mesh::{LARGE_ISLAND_MM3, coarser_mesh, mesh, mesh_before_resection, mesh_stage, mesh_stage_of};
 pub(crate) use plan::{PlanFacts, PlannedHead, plan, plan_stage};
 pub(crate) use pose::{PoseFacts, pose, pose_stage};
-pub(crate) use predict::{PredictInput, fluid_of_head, predict};
+pub(crate) use predict::{PredictInput, fluid_of_head, planned_body, predict};
 pub(crate) use predicted_draws::{Predicted, read_draws};
 pub(crate) use reading::WithReading;
 pub(crate) use reference::{

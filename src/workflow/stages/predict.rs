@@ -10,12 +10,13 @@ use crate::artefact::Produced;
 use crate::experiment::field::{Moved, ShiftField, Surroundings, in_tetrahedra, shift_field};
 use crate::experiment::outcome::MeshOutcome;
 use crate::experiment::predict::{
-    Check, DrawnState, FluidOfHead, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction, Locator, Modes,
-    PREDICTED, Planned, Posed, PredictSettings, Prediction, Spread, SupportWeight, TargetPlace, TargetPrediction,
-    UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast, spread,
-    variance_shares,
+    Check, DrawnState, DrawsSolved, FluidOfHead, Forecast, ForecastError, Found, Head, HeadDraws, HeadPrediction,
+    Locator, Modes, PREDICTED, Planned, Posed, PredictSettings, Prediction, Spread, SupportWeight, TargetPlace,
+    TargetPrediction, UnknownOutcome, assumptions, compared_heads, draws_to_csv, ellipsoid_95, farthest, forecast,
+    spread, variance_shares,
 };
-use crate::experiment::resection::Supports;
+use crate::experiment::resection::{ResectionSettings, Supports};
+use crate::fem::Scenario;
 use crate::geometry::{Frame, Mni, Position, Pre, RigidTransform};
 use crate::image::nifti::{encode_displacement, encode_mask, encode_numbers};
 use crate::image::{LabelMap, Mask};
@@ -27,6 +28,7 @@ use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, vtu};
 use crate::workflow::case::Case;
 use crate::workflow::error::{PredictError, WorkflowError};
+use crate::workflow::settings::Settings;
 use crate::workflow::stage_name::StageName;
 use crate::workflow::targets::Targets;
 use crate::workflow::warning::Warning;
@@ -70,6 +72,7 @@ pub(crate) fn predict(work: &Work<'_>, made: &mut Made, input: &PredictInput<'_>
             threshold_mm: settings.predict.threshold_mm,
             draws: settings.predict.draws,
             supports: weights.iter().map(weighed).collect(),
+            held_shear_modulus_pa: with_held_tissues(work, input.mesh.2, Scenario::default())?.1,
             ..Prediction::default()
         };
         let heads = &settings.predict.heads;
@@ -143,7 +146,7 @@ struct Patient<'a> {
     around: Surroundings,
     planned: Mask<Pre>,
     targets: Vec<Target>,
-    settings: &'a crate::workflow::Settings,
+    settings: &'a Settings,
 }
 
 impl<'a> Patient<'a> {
@@ -174,13 +177,8 @@ impl<'a> Patient<'a> {
         let settings = work.settings;
         let gravity = head.gravity_m_per_s2(&self.mni_from_pre);
         let one = |(supports, weight)| -> Result<Posed, WorkflowError> {
-            let own = settings.predict.resection(&settings.resection, gravity, supports);
-            let scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), &self.head.before)?;
+            let (own, scenario) = planned_body(settings, gravity, supports, &self.head.before)?;
             let (mut scenario, _) = with_held_tissues(work, self.input.mesh.2, scenario)?;
-            let csf = settings.resection.csf.as_ref();
-            if let Some((level, _)) = settings.predict.known_fluid(csf, &self.head.before, gravity) {
-                scenario.loads.csf = Some(level);
-            }
             let mesh = own.supported_mesh(self.input.mesh.0.clone(), &scenario)?;
             scenario.solver.element = settings.estimate.element;
             let uncertainty = settings.predict.uncertainty(&own, &settings.prior, &self.head.before)?;
@@ -250,6 +248,23 @@ impl<'a> Patient<'a> {
     }
 }
 
+/// Loads and supports of a planned patient for gravity in the MNI frame, with what all draws are around: fluid stands where its level is
+/// known, or where so much of it has drained. Materials are still to come.
+pub(crate) fn planned_body(
+    settings: &Settings,
+    gravity_m_per_s2: [f64; 3],
+    supports: Supports,
+    labels: &LabelMap<Mni>,
+) -> Result<(ResectionSettings, Scenario), WorkflowError> {
+    let own = settings.predict.resection(&settings.resection, gravity_m_per_s2, supports);
+    let mut scenario = own.supported(&own.scenario(&nalgebra::UnitQuaternion::identity()), labels)?;
+    let csf = settings.resection.csf.as_ref();
+    if let Some((level, _)) = settings.predict.known_fluid(csf, labels, gravity_m_per_s2) {
+        scenario.loads.csf = Some(level);
+    }
+    Ok((own, scenario))
+}
+
 /// What is around the mesh on the grid of the fields, and the plan on the scan's own: a coarse grid loses what is thin, and moves
 /// the margin by half of its spacing.
 fn surroundings(case: &Case, spacing_mm: f64) -> Result<(Surroundings, Mask<Pre>), WorkflowError> {
@@ -281,6 +296,7 @@ struct Lying {
     shares: crate::experiment::predict::Shares,
     fluid: Option<FluidOfHead>,
     states: usize,
+    draws_solved: DrawsSolved,
     supports: Vec<SupportWeight>,
 }
 
@@ -325,6 +341,10 @@ impl Lying {
             thinned.iter().map(|(weight, response, unknowns)| (*weight, response, *unknowns)).collect();
         let shares = variance_shares(&models);
         let states = found.iter().map(|(_, f)| f.states).sum();
+        let draws_solved = DrawsSolved {
+            solved: found.iter().map(|(_, f)| f.solved).sum(),
+            of: found.iter().map(|(_, f)| f.draws_mm.len()).sum(),
+        };
         let used = |(posed, _): &(&Posed, Forecast)| SupportWeight {
             supports: posed.supports.clone(),
             weight: posed.weight / all,
@@ -339,7 +359,7 @@ impl Lying {
         }
         let spread = spread(&draws, nodes, settings.threshold_mm);
         let fluid = fluid_of_head(settings, head, &patient.head.before, &patient.mni_from_pre)?;
-        Ok(Self { draws, named, spread, checks: told, shares, fluid, states, supports })
+        Ok(Self { draws, named, spread, checks: told, shares, fluid, states, draws_solved, supports })
     }
 
     /// The draws as they are kept.
@@ -381,6 +401,7 @@ impl Lying {
             shares: self.shares,
             fluid: self.fluid.clone(),
             states_solved: self.states,
+            draws_solved: Some(self.draws_solved),
             supports: self.supports.clone(),
             targets: (0..patient.targets.len()).map(|n| self.target(patient, n)).collect(),
         }
@@ -436,7 +457,31 @@ fn rounded(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::anatomy::label;
+    use crate::experiment::predict::KnownLevel;
     use crate::image::Grid;
+
+    #[test]
+    fn a_planned_body_has_the_weight_and_the_fluid_that_its_draws_are_around() {
+        let grid = Grid::<Mni>::axis_aligned([10, 40, 10], [1.0; 3], [0.0; 3]);
+        let label = |n: usize| if grid.voxel(n)[1] < 30 { label::GREY_MATTER } else { label::CSF };
+        let labels = LabelMap::from_data(grid, (0..grid.len()).map(label).collect());
+        let loads = |predict: PredictSettings| {
+            let settings = Settings { predict, ..Settings::default() };
+            planned_body(&settings, [0.0, -9.81, 0.0], Supports::Fixed, &labels).unwrap().1.loads
+        };
+        let plain = loads(PredictSettings::default());
+        assert!(plain.csf.is_none() && plain.density_kg_per_m3 < 1000.0);
+        let drained = loads(PredictSettings { drained: Some(0.3), ..PredictSettings::default() });
+        assert!(drained.csf.is_some() && drained.density_kg_per_m3 > 1000.0);
+        let level = |below_top_mm| {
+            let fluid_level = Some(KnownLevel { below_top_mm, sd_mm: 0.0 });
+            let loads = loads(PredictSettings { fluid_level, ..PredictSettings::default() });
+            assert_eq!(loads.density_kg_per_m3, drained.density_kg_per_m3);
+            loads.csf.unwrap().level_mm
+        };
+        assert!((level(5.0) - level(12.0) - 7.0).abs() < 1e-9);
+    }
 
     #[test]
     fn what_a_plan_takes_of_the_targets_is_the_same_however_coarse_the_fields_are() {

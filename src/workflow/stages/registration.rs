@@ -3,7 +3,7 @@
 use super::earlier::Earlier;
 use super::reading::WithReading;
 use crate::artefact::{Produced, Stage};
-use crate::experiment::outcome::RegistrationOutcome;
+use crate::experiment::outcome::{GIVEN_BY_HAND, RegistrationOutcome};
 use crate::experiment::resection::GravityFrame;
 use crate::geometry::{Frame, Mni, Position, Post, Pre, RigidTransform};
 use crate::image::{Grid, LabelMap, Volume};
@@ -188,7 +188,7 @@ fn by_hand<M: Frame, F: Frame>(transform: &RigidTransform<M, F>, moving: &Grid<M
         fixed: F::NAME.to_owned(),
         rotation_deg: transform.rotation.angle().to_degrees(),
         translation_mm: moved.into(),
-        similarity: "given by hand".to_owned(),
+        similarity: GIVEN_BY_HAND.to_owned(),
         similarity_before: None,
         similarity_after: None,
     }
