@@ -140,7 +140,9 @@ fn slow_a_known_level_and_poissons_ratio_are_drawn_and_told_and_a_seed_gives_oth
     }
 
     for head in found["heads"].as_array().unwrap() {
-        assert_eq!(head["draws_solved"]["solved"], head["draws_solved"]["of"], "a level is solved for in each draw");
+        // Each draw in a fluid is solved; one that is too heavy and soft for an equilibrium is read from the surface.
+        let [solved, of] = ["solved", "of"].map(|which| head["draws_solved"][which].as_u64().unwrap());
+        assert!(2 * solved > of && of >= 16, "{}", head["draws_solved"]);
     }
     // A body that is stepped by hand lies in the same fluid.
     let own = Case::open(&case).unwrap();
