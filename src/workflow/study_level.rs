@@ -23,7 +23,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Raised when this code changes its files.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Points over a window for the laws that are fitted, as in the published tests between laws.
 const STRETCHES: usize = 101;
 /// Persons drawn for the moduli's moments: their sd is known to 1.6 %.
@@ -169,17 +169,20 @@ fn over_window(evidence: &Evidence, spreads: &Spreads, task: Task, of: Of, point
 }
 
 /// Bands of all tasks, each publication against what the others say of it, and the moduli of a person nobody has
-/// measured, into `folder`. The facts' `text` is for a terminal.
+/// measured, into `folder`: all of these studies, whatever studies the spreads were fitted to. `seed` is that of the persons who are
+/// drawn. The facts' `text` is for a terminal.
 ///
 /// # Errors
 /// A table that holds too little; the disk's.
 pub fn show_study_level(
     studies: &Studies,
-    own: Option<&StudyLevelFile>,
+    own: Option<&Spreads>,
+    seed: u64,
     (folder, force): (&Path, bool),
 ) -> Result<GenerativeFiles, WorkflowError> {
-    let used = json!({ "model": "study-level", "curves": studies.curves, "spreads": own.map(|file| file.spreads) });
-    let stage = Stage::new("gp-show-study-level", VERSION, folder, &used);
+    let used =
+        json!({ "model": "study-level", "curves": studies.curves, "spreads": own, "persons": PERSONS, "seed": seed });
+    let stage = Stage::new("gp-show-study-level", VERSION, folder, &used).seed(seed);
     let names = [
         "study-level-bands.svg",
         "study-level-left-out.svg",
@@ -190,8 +193,8 @@ pub fn show_study_level(
     let outcome = studies.input(stage).run(force, || {
         let settings = law_settings(studies.curves);
         let publications = publications(studies);
-        let all = refit(&publications, &own.map_or_else(Spreads::default, |file| file.spreads))?;
-        let spreads = own.map_or(all.spreads, |file| file.spreads);
+        let all = refit(&publications, &own.copied().unwrap_or_default())?;
+        let spreads = own.copied().unwrap_or(all.spreads);
         let evidence = Evidence::new(&publications, &spreads).ok_or(FitError::NotFinite)?;
         let mut rows = Vec::new();
         let mut panels = Vec::new();
@@ -205,10 +208,7 @@ pub fn show_study_level(
             panels.push(TaskBands { bands: [Of::Study, Of::Laboratory, Of::Mean].map(prior), curves });
         }
         let left_out = leave_one_publication_out(&publications, &all)?;
-        let moduli = match own {
-            Some(file) => file.moduli.clone(),
-            None => person_moduli(&evidence, &spreads, 0, studies.curves)?,
-        };
+        let moduli = person_moduli(&evidence, &spreads, seed, studies.curves)?;
         let ranks: Vec<f64> = left_out.iter().map(|left| left.rank).collect();
         let points = left_out.iter().map(|left| left.points).sum::<usize>() as f64;
         let texts = [
@@ -229,4 +229,31 @@ pub fn show_study_level(
     });
     let files = names.iter().map(|name| folder.join(name)).collect();
     Ok(GenerativeFiles { files, settings: used, facts: facts(outcome)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_a_persons_moduli_are_of_the_studies_and_the_seed_that_are_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut studies = Studies::read(None, Curves::Corrected).unwrap();
+        studies.models.truncate(8);
+        fit_study_level(&studies, 3, (folder.path(), false)).unwrap();
+        let fitted = study_level_file(&folder.path().join("study-level.toml")).unwrap();
+        let shown = |studies: &Studies, seed: u64, name: &str| {
+            let place = folder.path().join(name);
+            show_study_level(studies, Some(&fitted.spreads), seed, (&place, false)).unwrap();
+            std::fs::read_to_string(place.join("study-level-person.csv")).unwrap()
+        };
+        // The studies and the seed of the fit give what the fit has found.
+        let own = shown(&studies, 3, "own");
+        assert_eq!(own, moduli_prior_csv(&fitted.moduli));
+        // Another seed is other persons, where the first ones lie already.
+        assert_ne!(shown(&studies, 4, "own"), own);
+        let mut fewer = studies.clone();
+        fewer.models.remove(0);
+        assert_ne!(shown(&fewer, 3, "fewer"), own);
+    }
 }

@@ -34,8 +34,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let studies = args.studies.read()?;
     if args.generative.model == GenerativeModel::StudyLevel {
         only_with(!args.models.is_empty(), "--models", "published")?;
-        let own = args.hyperparameters.study_level()?;
-        return emit(show_study_level(&studies, own.as_ref(), (&args.output, session.options.force))?, session);
+        let own = args.hyperparameters.study_level()?.map(|file| file.spreads);
+        let (seed, place) = (session.options.seed.unwrap_or(0), (args.output.as_path(), session.options.force));
+        return emit(show_study_level(&studies, own.as_ref(), seed, place)?, session);
     }
     let base = if args.studies.published { SampleSettings::published() } else { SampleSettings::default() };
     let settings = SampleSettings { hyperparameters: args.hyperparameters.read()?, ..base };

@@ -29,6 +29,7 @@ impl StudyLevelFile {
         let mut text = String::from(
             "# The study-level model: standard deviations of its parts (ln Pa, slopes per unit of Hencky strain), their 90 %\n\
              # intervals, and the shear moduli of a person nobody has measured: normal in ln Pa, jointly over the tasks.\n\
+             # `hgm` reads the spreads; the moduli follow from them and the studies that it is given beside them.\n\
              [spreads]\n",
         );
         for (name, value) in SPREAD_NAMES.iter().zip(self.spreads.to_array()) {
