@@ -26,8 +26,8 @@ pub struct PriorSettings {
     /// The published program's choices instead of the exact ones.
     pub published: bool,
     /// The generative model: the paper's, or what the spread between studies and people leaves to expect of a person. Left out:
-    /// estimates start from a person, whom the literature knows far less well than the average of its studies; levels of a
-    /// sweep and predictions are the paper's.
+    /// estimates start from a person, whom the literature knows far less well than what one more study would report; levels of a
+    /// sweep and predictions are the paper's, of what one more study would report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<GenerativeModel>,
     /// Whose studies: elastography, linear elasticity or hyperelastic tests.
@@ -273,7 +273,7 @@ const ANY_SHARE_SD: f64 = 1.813_799_364_234_217_8;
 /// law names beside it: the exponent of Ogden's, the limit of Gent's, the share of C1 of Mooney and Rivlin's. The modulus' mean and
 /// spread, and its correlation with an exponent or a limit, are those of laws fitted to whole random curves of the Gaussian process ([`Spread::Study`]: what one more study would
 /// report) or, of the study-level model, of persons nobody has measured; then what the paper's process says stands beside it, as the
-/// average of the studies. Those curves share their shape far more than studies do, so an exponent's or a limit's mean and spread are those
+/// average of the studies with the spread of one more of them. Those curves share their shape far more than studies do, so an exponent's or a limit's mean and spread are those
 /// of the published hyperelastic models of healthy tissue themselves. An exponent at its bound of 5 says nothing of the exponent:
 /// Ogden's law is fitted without that bound. Draws put C1 at its bound of 0: then any share that a stable law has is as likely
 /// as another. A person's tissues go together (a laboratory that finds one soft finds the other soft): how much stiffer one is

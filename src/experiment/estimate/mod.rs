@@ -76,8 +76,8 @@ pub struct LogPrior {
     /// Correlation with the parameters right before it, the nearest first; independent of all others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub correlation: Vec<f64>,
-    /// The average of the studies, where `mean` and `sd` are of a person: a figure far from it contradicts the literature, and
-    /// data that do not narrow it say nothing.
+    /// What one more study would report, where `mean` and `sd` are of a person: the average of the studies with the spread of one
+    /// more of them. A figure far from it contradicts the literature, and data that do not narrow it say nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average: Option<Average>,
 }
@@ -85,9 +85,9 @@ pub struct LogPrior {
 /// A Gaussian over ln(parameter).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Average {
-    /// Its mean.
+    /// Its mean: the average of the studies.
     pub mean: f64,
-    /// Its standard deviation.
+    /// Its standard deviation: how far one more study may be from it, not how well the average is known.
     pub sd: f64,
 }
 
@@ -155,7 +155,7 @@ impl LogPrior {
         self.sd.map_or(0.0, |sd| 1.0 / (sd * sd))
     }
 
-    /// The average of the studies as a prior, where there is one beside this; it knows each parameter by itself.
+    /// What one more study would report as a prior, where that stands beside this; it knows each parameter by itself.
     #[must_use]
     pub fn of_average(&self) -> Self {
         match self.average {

@@ -6,7 +6,7 @@ use super::{EstimateSettings, Knowledge, LogPrior, Posterior};
 use crate::experiment::verdict::{CONTRADICTION_SD, Claim, Finding, Reason, STRONG, Verdict};
 use nalgebra::Vector3;
 
-/// How far from the average of the studies, in its standard deviations, a figure may lie that was not drawn towards it
+/// How far from the average of the studies, in standard deviations of one more study, a figure may lie that was not drawn towards it
 /// (docs/evidence/estimate.md, "A person instead of the average").
 const FAR_FROM_AVERAGE_SD: f64 = 4.0;
 

@@ -7,7 +7,6 @@ use crate::experiment::prior::PriorSettings;
 use crate::experiment::resection::ResectionSettings;
 use crate::experiment::sample::Tissue;
 use crate::material::generative::GenerativeModel;
-use crate::material::law::Estimated;
 use thiserror::Error;
 
 /// What a cohort's moduli are called, before the tissue's name.
@@ -109,13 +108,9 @@ impl PriorSettings {
                     laboratories differ by."
                 .to_owned();
         }
-        let of = match self.law.estimated() {
-            Estimated::Shaped(_) => "what one more study would report",
-            Estimated::Modulus | Estimated::Not => "how well their average is known",
-        };
         let apart = if several { ", each tissue drawn by itself" } else { "" };
         format!(
-            "The spread of the studies' stiffness is {of}{apart}; it is not the spread from person to person, which is wider and which \
+            "The spread of the studies' stiffness is that of what one more study would report{apart}; it is not the spread from person to person, which is wider and which \
              `model = \"study-level\"` of the table [prior] draws from."
         )
     }
@@ -129,8 +124,12 @@ fn in_words(tissues: &[String]) -> String {
 mod tests {
     use super::super::known_level::KnownLevel;
     use super::*;
+    use crate::experiment::moments::mean_and_sd;
     use crate::experiment::population::{LearntPrior, PopulationPrior};
-    use crate::experiment::prior::law_priors;
+    use crate::experiment::prior::{law_priors, task_of};
+    use crate::material::generative::{SampleSettings, draw_materials, joint_tissue_prior};
+    use crate::material::gp::Spread;
+    use crate::material::literature::table;
     use crate::material::meta_model::MetaModel;
 
     fn taught(names: &[&str]) -> PriorSettings {
@@ -169,16 +168,17 @@ mod tests {
         let tissues = PredictSettings::default().tissue_list();
         let of = |prior: &PriorSettings| prior.spread_of(&tissues).join(" ");
         let usual = PriorSettings::default();
-        let average = of(&usual);
-        for words in
-            ["how well their average is known", "each tissue drawn by itself", "not the spread from person to person"]
-        {
-            assert!(average.contains(words), "{words}: {average}");
+        let study = of(&usual);
+        for words in [
+            "that of what one more study would report",
+            "each tissue drawn by itself",
+            "not the spread from person to person",
+        ] {
+            assert!(study.contains(words), "{words}: {study}");
         }
         let person = of(&PriorSettings { model: Some(GenerativeModel::StudyLevel), ..usual.clone() });
-        assert!(person.contains("is that from person to person") && !person.contains("average"), "{person}");
-        let shaped = of(&PriorSettings { law: MetaModel::OGDEN, ..usual });
-        assert!(shaped.contains("one more study would report"), "{shaped}");
+        assert!(person.contains("is that from person to person") && !person.contains("one more study"), "{person}");
+        assert_eq!(of(&PriorSettings { law: MetaModel::OGDEN, ..usual.clone() }), study);
         // The setting that the sentence names makes the spread wider indeed, and ties the tissues.
         let priors = |prior: &PriorSettings| law_priors(&tissues, &prior.for_predictions()).unwrap();
         let [narrow, wide] = [None, Some(GenerativeModel::StudyLevel)]
@@ -188,7 +188,23 @@ mod tests {
 
         let cohort = of(&taught(&["grey_matter", "white_matter"]));
         assert!(cohort.contains("too wide rather than too narrow") && !cohort.contains("studies'"), "{cohort}");
-        assert!(!average.contains("cohort") && of(&taught(&["grey_matter"])).contains("their average is known; it"));
+        assert!(!study.contains("cohort") && of(&taught(&["grey_matter"])).contains("would report; it"));
+    }
+
+    #[test]
+    fn the_spread_of_the_studies_is_that_of_one_more_study_and_not_of_how_well_their_mean_is_known() {
+        let tissues = PredictSettings::default().tissue_list();
+        let usual = PriorSettings::default().for_predictions();
+        let drawn = law_priors(&tissues[..1], &usual).unwrap()[0].1.sd.unwrap();
+        let settings = SampleSettings { stretches: 51, ..SampleSettings::default() };
+        let process = joint_tissue_prior(task_of(&tissues[0], usual.study).unwrap(), &table(), &settings);
+        let sd_of = |spread: Spread| {
+            let draws = draw_materials(&process, 400, 0, spread, &settings).unwrap();
+            mean_and_sd(&draws.iter().map(|draw| draw.shear_modulus_pa.ln()).collect::<Vec<f64>>()).1
+        };
+        // The sd of 400 draws' sd is 3.5 % of it.
+        assert!((drawn / sd_of(Spread::Study) - 1.0).abs() < 0.15, "{drawn}");
+        assert!(drawn > 10.0 * sd_of(Spread::Tissue), "{drawn}");
     }
 
     #[test]
