@@ -1,6 +1,6 @@
 //! `population.toml`: what a cohort says of people, and the moments that it says so from.
 
-use super::hierarchy::{Inferred, MEAN_SD, Population, SPREAD_SCALE, TooMany};
+use super::hierarchy::{Inferred, MEAN_SD, Population, SPREAD_SCALE, TooMany, narrows};
 use super::kind::Kind;
 use super::learnt::{LearntPrior, PopulationPrior};
 use super::moments::Moments;
@@ -17,6 +17,9 @@ const FORMAT: u32 = 1;
 const LEAST_PATIENTS: usize = 5;
 /// A mean known no better than this share of the literature's own spread is one more study among the literature's.
 const LEAST_KNOWN: f64 = 0.5;
+/// A mean known no better than this share of its own prior has a sixteenth and more of its precision from there, whatever the
+/// literature knows: the next patient's prior would be in part the hierarchy's.
+const LEAST_OF_PATIENTS: f64 = 0.25;
 
 /// Figures that differ by less than this, relative to 1 and themselves, are the same.
 const SAME: f64 = 1e-6;
@@ -57,7 +60,7 @@ pub struct PopulationFile {
 pub struct Taught {
     /// As estimates call it.
     pub name: String,
-    /// Patients whose scans say something of it.
+    /// Patients whose scans say something of it: they alone halve what is not known of it before any patient.
     pub patients: usize,
     /// Mean of the logarithm over people.
     pub log_mean: f64,
@@ -79,7 +82,7 @@ pub struct Taught {
     pub next_95: [f64; 2],
     /// Mean of the logarithm that the literature expects.
     pub literature_log_mean: f64,
-    /// Its standard deviation.
+    /// Its standard deviation: that of what one more study would report.
     pub literature_log_sd: f64,
     /// Whether the next patient's prior is this one; else the cohort is one study's worth, or most of its patients showed no shift or
     /// contradicted what is known, and the literature's prior stands.
@@ -143,7 +146,8 @@ pub enum MergeError {
     TooMany(#[from] TooMany),
 }
 
-/// What is known of a parameter before any patient: mean and standard deviation of its logarithm.
+/// What the literature expects one more study to report of a parameter: mean and standard deviation of its logarithm. Not of a person,
+/// of whom far less is known: a cohort that knows its mean no better than that is one study's worth all the same.
 pub type Literature = (f64, f64);
 
 impl PopulationFile {
@@ -163,8 +167,9 @@ impl PopulationFile {
         let found = Population::infer(&names, &moments)?;
         let heard = !outnumbered(moments.len(), &left_out);
         let taught = |(n, (name, literature)): (usize, &(String, Literature))| {
-            let patients = moments.iter().filter(|m| m.tells_of(n)).count();
+            let patients = moments.iter().filter(|m| narrows(m, n)).count();
             let [mean, spread, next]: [Inferred; 3] = [found.mean(n), found.spread(n), found.next(n)];
+            let known = mean.sd <= (LEAST_KNOWN * literature.1).min(LEAST_OF_PATIENTS * MEAN_SD);
             Taught {
                 name: name.clone(),
                 patients,
@@ -179,7 +184,7 @@ impl PopulationFile {
                 next_95: next.interval_95.map(f64::exp),
                 literature_log_mean: literature.0,
                 literature_log_sd: literature.1,
-                moves_prior: heard && patients >= LEAST_PATIENTS && mean.sd <= LEAST_KNOWN * literature.1,
+                moves_prior: heard && patients >= LEAST_PATIENTS && known,
             }
         };
         Ok(Self {
@@ -238,10 +243,11 @@ impl PopulationFile {
              # inverse of its covariance, `information` that times its mean. All other figures follow from these.\n\
              # A patient's logarithms are normal about the population's mean, independent between parameters. Priors: means normal about\n\
              # ln 1000 (a density's: ln 100) with standard deviation {MEAN_SD}, spreads half normal of scale {SPREAD_SCALE}.\n\
-             # `moves_prior = false`: fewer than {LEAST_PATIENTS} patients, or a mean known no better than {LEAST_KNOWN} of the literature's\n\
-             # spread. That is one study's worth, and the literature's prior stands. So it does where more patients had no shift to be\n\
-             # seen or contradicted what is known than teach: the mean is of those whose stiffness was identified, who may be the softer\n\
-             # ones of all.\n\n"
+             # `patients` of a parameter are those whose scans alone halve what is not known of it before any patient.\n\
+             # `moves_prior = false`: fewer than {LEAST_PATIENTS} such patients, or a mean known no better than {LEAST_KNOWN} of what one more study\n\
+             # would report (`literature_log_sd`) or {LEAST_OF_PATIENTS} of its own prior. That is one study's worth, and the literature's prior\n\
+             # stands. So it does where more patients had no shift to be seen or contradicted what is known than teach: the mean\n\
+             # is of those whose stiffness was identified, who may be the softer ones of all.\n\n"
         );
         head + &toml::to_string(self).expect("figures are plain data")
     }

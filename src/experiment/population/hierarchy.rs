@@ -176,6 +176,16 @@ fn damped(precision: &DMatrix<f64>, variance: &DMatrix<f64>) -> DMatrix<f64> {
     sum.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count))
 }
 
+/// Whether a patient's scans alone, from what is known before any patient, halve what is not known of a parameter. A cohort of
+/// patients who do not leaves the hierarchy's own priors.
+pub(super) fn narrows(patient: &Moments, parameter: usize) -> bool {
+    let (precision, _) = patient.parts();
+    let count = precision.nrows();
+    let before = DMatrix::identity(count, count) * MEAN_SD.powi(-2);
+    let after = (before + precision).try_inverse();
+    after.is_some_and(|variances| variances[(parameter, parameter)] <= (0.5 * MEAN_SD).powi(2))
+}
+
 /// The density of these spreads and the population's mean under them. A patient's own logarithms are integrated out: the scans'
 /// say is then a reading of the mean with precision W = (P^-1 + T)^-1.
 fn tried(patients: &[(DMatrix<f64>, DVector<f64>)], first: &DVector<f64>, spreads: Vec<f64>) -> Tried {

@@ -207,6 +207,22 @@ fn a_small_cohort_is_one_studys_worth_and_a_large_one_moves_the_prior() {
 }
 
 #[test]
+fn a_mean_that_is_in_part_the_hierarchys_own_moves_no_prior_however_little_the_literature_knows() {
+    let anything = [(WHITE.to_owned(), (7.5, 5.0))];
+    let of = |own_sd: f64| {
+        let precision = own_sd.powi(-2);
+        let patient = |n: i32| Moments {
+            information: vec![(6.9 + 0.1 * f64::from(n - 2)) * precision],
+            precision: vec![vec![precision]],
+        };
+        let file = PopulationFile::new(KIND, &anything, (0..5).map(patient).collect(), BTreeMap::new()).unwrap();
+        (file.parameters[0].patients, file.parameters[0].moves_prior)
+    };
+    // To a factor of eleven they say nothing, to one of three too little, to a tenth enough.
+    assert_eq!([2.4, 1.15, 0.1].map(of), [(0, false), (5, false), (5, true)]);
+}
+
+#[test]
 fn a_cohort_whose_silent_patients_outnumber_its_teachers_moves_no_prior() {
     let all = moments(&cohort(40, 9));
     let beside = |no_shift: usize, conflict: usize| {

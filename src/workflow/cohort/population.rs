@@ -130,7 +130,7 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     Ok(Some((Some(file), told)))
 }
 
-/// What the literature expects of a parameter.
+/// What the literature expects one more study to report of a parameter; estimates start from a person, of whom it knows less.
 fn literature(name: &str, settings: &Settings) -> Result<Literature, PriorError> {
     let Some(tissue) = name.strip_prefix(OF_PEOPLE[0]) else {
         return Ok((settings.resection.density_kg_per_m3.ln(), settings.estimate.density_log_sd));
@@ -139,7 +139,8 @@ fn literature(name: &str, settings: &Settings) -> Result<Literature, PriorError>
     let prior = PriorSettings { population: None, ..settings.prior.clone() };
     let known = law_priors(&[tissue], &prior)?;
     let modulus = known.into_iter().map(|(_, known)| known).find(|known| known.name == name);
-    Ok(modulus.map_or((0.0, 1.0), |known| (known.mean, known.sd.unwrap_or(1.0))))
+    let study = modulus.map(|known| known.of_average());
+    Ok(study.map_or((0.0, 1.0), |known| (known.mean, known.sd.unwrap_or(1.0))))
 }
 
 /// A cohort's population from its file.
@@ -176,26 +177,37 @@ pub fn merge_populations(paths: &[PathBuf], output: &Path) -> Result<PopulationF
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::estimate::LogPrior;
     use crate::experiment::outcome::ExperimentOutcome;
     use crate::experiment::verdict::Verdict;
     use serde_json::json;
 
     const BRAIN: &str = "shear_modulus_pa of brain";
 
+    /// A parameter as it was found (mode in its unit, sd of its logarithm), and mean and sd of its logarithm before.
+    type Found<'a> = (&'a str, f64, f64, (f64, f64));
+
     /// A subject whose brain was found to have this modulus, known to a seventh, under the prior of these settings.
     fn member(n: usize, modulus_pa: f64, finding: Finding, settings: &Settings) -> Member {
-        let (mean, sd) = literature(BRAIN, settings).unwrap();
-        let log_sd = 0.15;
+        subject(n, finding, &[(BRAIN, modulus_pa, 0.15, literature(BRAIN, settings).unwrap())])
+    }
+
+    fn subject(n: usize, finding: Finding, found: &[Found<'_>]) -> Member {
+        let one = |place: usize, sd: f64| (0..found.len()).map(|k| if k == place { sd * sd } else { 0.0 }).collect();
+        let covariance: Vec<Vec<f64>> =
+            found.iter().enumerate().map(|(place, (_, _, sd, _))| one(place, *sd)).collect();
+        let prior = |(name, _, _, (mean, sd)): &Found<'_>| json!({"name": name, "mean": mean, "sd": sd});
         let estimate: EstimateOutcome = serde_json::from_value(json!({
             "posterior": {
-                "names": [BRAIN], "mode": [modulus_pa], "log_sd": [log_sd], "interval_95": [[1.0, 2.0]],
-                "log_covariance": [[log_sd * log_sd]],
+                "names": found.iter().map(|one| one.0).collect::<Vec<_>>(), "mode": found.iter().map(|one| one.1).collect::<Vec<_>>(),
+                "log_sd": found.iter().map(|one| one.2).collect::<Vec<_>>(), "interval_95": vec![[1.0, 2.0]; found.len()],
+                "log_covariance": covariance,
                 "identifiability": {
-                    "verdicts": ["identified"], "sensitivity_correlation": [], "condition": 1.0, "valley": [],
+                    "verdicts": vec!["identified"; found.len()], "sensitivity_correlation": [], "condition": 1.0, "valley": [],
                     "valley_log_sd": 1.0,
                 },
             },
-            "prior": [{"name": BRAIN, "mean": mean, "sd": sd}], "observations": 1, "independent_observations": 1.0,
+            "prior": found.iter().map(prior).collect::<Vec<_>>(), "observations": 1, "independent_observations": 1.0,
             "noise_mm": 0.2, "residual_rms_mm": 0.2, "convergence": "step-below-tolerance", "solves": 1, "tangent_solves": 1,
             "limits": [],
         }))
@@ -251,6 +263,42 @@ mod tests {
         assert!(of(0) > 500.0 && of(7) < 675.0 && of(0) < of(7), "{} {}", of(0), of(7));
         let text = file.to_toml();
         assert!(!text.contains("sub-"), "a name travels");
+    }
+
+    #[test]
+    fn the_literatures_prior_stands_for_a_tissue_that_the_scans_hardly_know_beside_one_that_they_know() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = Settings::default();
+        let before = law_priors(&Tissue::grey_and_white(), &settings.prior).unwrap();
+        let [grey, white] = [0, 1].map(|n| &before[n].1);
+        // What scans say by themselves, with what an estimate knows of a person before.
+        let found = |prior: &LogPrior, said: f64, own_sd: f64| {
+            let sd = prior.sd.unwrap();
+            let precision = own_sd.powi(-2) + sd.powi(-2);
+            let mean = (said * own_sd.powi(-2) + prior.mean * sd.powi(-2)) / precision;
+            (mean.exp(), precision.powf(-0.5), (prior.mean, sd))
+        };
+        for vague in [0.7, 1.0, 2.4] {
+            let patient = |n: usize| {
+                let step = n as f64 - 2.0;
+                let (mode, sd, known) = found(grey, 6.7 + 0.05 * step, 0.1);
+                let (other_mode, other_sd, other_known) = found(white, 6.9 + 0.3 * step, vague);
+                let both = [(&*grey.name, mode, sd, known), (&*white.name, other_mode, other_sd, other_known)];
+                subject(n, Finding::Identified, &both)
+            };
+            let members: Vec<Member> = (0..5).map(patient).collect();
+            let file = learn(&members, folder.path()).unwrap().unwrap().0.unwrap();
+            let moved: Vec<bool> = file.parameters.iter().map(|taught| taught.moves_prior).collect();
+            assert_eq!(moved, [true, false], "{vague}: {:?}", file.parameters);
+            let prior = PriorSettings { population: Some(file.prior()), ..settings.prior.clone() };
+            assert_eq!(prior.learnt(white.clone()), *white);
+            assert_ne!(prior.learnt(grey.clone()), *grey);
+            // It is held against one more study, not against the person that the estimates start from.
+            let study = white.average.unwrap();
+            let held = &file.parameters[1];
+            assert_eq!((held.literature_log_mean, held.literature_log_sd), (study.mean, study.sd));
+            assert!(white.sd.unwrap() > 2.0 * study.sd);
+        }
     }
 
     #[test]
