@@ -131,15 +131,15 @@ impl Grids {
     }
 }
 
-/// The task that tells how widely a publication may differ: healthy tissue where it speaks of any.
-fn leading(tasks: &[Task]) -> Task {
-    let healthy = tasks.iter().find(|task| task.region != Region::Abnormal);
-    *healthy.unwrap_or(&tasks[0])
-}
-
-/// The same of its curves.
+/// The task that tells how widely a publication may differ, whatever the order of its curves: in its level as healthy tissue where it
+/// speaks of any, in its shape as hyperelastic studies where it has a curve of them. Its curves of elastography and linear elasticity
+/// then share that shape unscaled: what one laboratory does is one function here ([`super::predict_jointly`] scales it by the task).
 pub(super) fn leading_task(curves: &[StudyCurve]) -> Task {
-    leading(&curves.iter().map(|curve| curve.task).collect::<Vec<_>>())
+    let tasks = || curves.iter().map(|curve| curve.task);
+    let hyperelastic = tasks().find(|task| task.kind == StudyKind::Hyperelastic);
+    let healthy = tasks().find(|task| task.region != Region::Abnormal);
+    let first = curves[0].task;
+    Task { kind: hyperelastic.unwrap_or(first).kind, region: healthy.unwrap_or(first).region }
 }
 
 fn read_publication(

@@ -1,10 +1,10 @@
 use super::*;
-use crate::material::Task;
 use crate::material::generative::SampleSettings;
 use crate::material::gp::Hyperparameters;
 use crate::material::literature::{Curves, table};
 use crate::material::meta_model;
 use crate::material::task::stretches;
+use crate::material::{Region, StudyKind, Task};
 use nalgebra::{DMatrix, DVector};
 
 fn literature() -> Studies {
@@ -54,7 +54,10 @@ fn dense_log_likelihood(studies: &Studies, spreads: &Spreads) -> f64 {
         .collect();
     let leading = |p: usize| {
         let curves = &studies.publications[p].1;
-        curves.iter().find(|c| c.task.region != crate::material::Region::Abnormal).unwrap_or(&curves[0]).task
+        let shaped = curves.iter().any(|c| c.task.kind == StudyKind::Hyperelastic);
+        let abnormal = curves.iter().all(|c| c.task.region == Region::Abnormal);
+        let kind = if shaped { StudyKind::Hyperelastic } else { StudyKind::Linear };
+        Task { kind, region: if abnormal { Region::Abnormal } else { Region::Healthy } }
     };
     let mean_prior: Vec<_> = (0..SIZE).map(|f| (spreads.mean_covariance(f), spreads.task_scales(f))).collect();
     let n = rows.len();
@@ -87,6 +90,43 @@ fn the_likelihood_is_that_of_the_dense_oracle() {
     let found = Evidence::new(&studies, &spreads).unwrap().log_likelihood;
     let dense = dense_log_likelihood(&studies, &spreads);
     assert!((found - dense).abs() < 1e-5 * dense.abs(), "{found} {dense}");
+}
+
+#[test]
+fn the_order_of_a_publications_curves_says_nothing_of_how_widely_it_may_differ() {
+    let curves: Vec<StudyCurve> = literature().publications.into_iter().flat_map(|(_, curves)| curves).collect();
+    let of = |kind: StudyKind| {
+        let healthy = |curve: &&StudyCurve| curve.task.kind == kind && curve.task.region != Region::Abnormal;
+        curves.iter().find(healthy).unwrap().clone()
+    };
+    let abnormal = curves.iter().find(|curve| curve.task.region == Region::Abnormal).unwrap().clone();
+    let both = vec![of(StudyKind::Linear), of(StudyKind::Hyperelastic), abnormal];
+    let mut studies = Studies { publications: vec![("one laboratory".to_owned(), both)] };
+    let spreads = Spreads::default();
+    let likelihood = |studies: &Studies| Evidence::new(studies, &spreads).unwrap().log_likelihood;
+    let found = likelihood(&studies);
+    let dense = dense_log_likelihood(&studies, &spreads);
+    assert!((found - dense).abs() < 1e-5 * dense.abs(), "{found} {dense}");
+    for _ in 0..3 {
+        studies.publications[0].1.rotate_left(1);
+        let turned = likelihood(&studies);
+        assert!((turned - found).abs() < 1e-7 * found.abs(), "{turned} {found}");
+    }
+}
+
+#[test]
+fn the_remainder_is_none_at_rest_and_what_curves_differ_by_there_is_their_level_and_their_step() {
+    use super::basis::REMAINDER;
+    assert!(Basis.at(0.0)[REMAINDER..].iter().all(|value| *value == 0.0));
+    let spreads = Spreads::default();
+    let means = Evidence::new(&literature(), &spreads).unwrap().means;
+    let variance = |of: Of| predict(&means, &spreads, Task::HYPERELASTIC_GREY, of, &[1.0]).sd[0].powi(2);
+    let own = variance(Of::Person) - variance(Of::Mean);
+    let Spreads { level_publication, level_curve, step_publication, step_curve, .. } = spreads;
+    let squares = |a: f64, b: f64| a * a + b * b;
+    // The step is a half to either side.
+    let expected = squares(level_publication, level_curve) + 0.25 * squares(step_publication, step_curve);
+    assert!((own - expected).abs() < 1e-9 * expected, "{own} {expected}");
 }
 
 #[test]
