@@ -10,7 +10,9 @@ use super::simulation::Simulation;
 use super::synthetic::SyntheticFiles;
 use super::user_file::shown;
 use super::why::Explained;
+use crate::material::gp::Spread;
 use crate::material::rheometry::Measured;
+use crate::material::study_level::Of;
 use crate::report::in_words::fit_in_words;
 use serde_json::Value;
 use std::path::Path;
@@ -165,8 +167,28 @@ pub fn fitted_process(facts: &Value, rank: usize) -> String {
     )
 }
 
-/// Materials of a generative model: a row for each level, or the spread of the draws.
-pub fn materials(facts: &Value) -> String {
+/// Whose the moduli of draws are, with what they were drawn with.
+fn drawn_of(settings: &Value) -> &'static str {
+    if let Ok(of) = serde_json::from_value(settings["of"].clone()) {
+        return match of {
+            Of::Mean => " of the task's mean",
+            Of::Laboratory => " of what one laboratory finds on average",
+            Of::Person => " of a person nobody has measured",
+            Of::Study => " of what another laboratory publishes",
+        };
+    }
+    match serde_json::from_value(settings["spread"].clone()) {
+        Ok(Spread::Study) => " of what one more study would report",
+        Ok(Spread::Tissue) => {
+            " of the process's mean curve (with the studies as independent noise about it; what one more study would report \
+             spreads far wider)"
+        }
+        Err(_) => "",
+    }
+}
+
+/// Materials of a generative model: a row for each level, or the spread of the draws. `settings` are what they were made with.
+pub fn materials(facts: &Value, settings: &Value) -> String {
     let rows = facts["materials"].as_array().map_or(&[][..], Vec::as_slice);
     if rows.iter().all(|row| row["sd_level"].is_number()) {
         let row = |row: &Value| {
@@ -183,11 +205,37 @@ pub fn materials(facts: &Value) -> String {
         told.unwrap_or_default()
     };
     format!(
-        "{} draws, {} fitted by a law stable at every stretch\nshear modulus: median {:.1} Pa{}{}\n",
+        "{} draws, {} fitted by a law stable at every stretch\nshear modulus{}: median {:.1} Pa{}{}\n",
         q["count"],
         q["stable"],
+        drawn_of(settings),
         pa("median"),
         between("68", "p16", "p84"),
         between("95", "p2.5", "p97.5")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_spread_of_drawn_moduli_is_said_to_be_whose_it_is() {
+        let facts = json!({
+            "materials": [{ "draw": 0 }],
+            "shear_modulus_pa": { "count": 1, "stable": 1, "median": 1106.5, "p16": 1093.6, "p84": 1119.9 },
+        });
+        let said = |settings: Value| materials(&facts, &settings);
+        let tissue = said(json!({ "spread": Spread::Tissue }));
+        assert!(tissue.contains("of the process's mean curve (with the studies as independent noise"), "{tissue}");
+        assert!(tissue.contains("): median 1106.5 Pa, 68 % in 1093.6 to 1119.9"), "{tissue}");
+        let study = said(json!({ "spread": Spread::Study }));
+        assert!(study.contains("shear modulus of what one more study would report: median"), "{study}");
+        let whose = |of: Of| said(json!({ "model": "study-level", "of": of }));
+        assert!(whose(Of::Person).contains("of a person nobody has measured: median"));
+        // No two spreads are called the same.
+        let all: std::collections::BTreeSet<String> = Of::ALL.map(whose).into_iter().chain([tissue, study]).collect();
+        assert_eq!(all.len(), 6);
+    }
 }

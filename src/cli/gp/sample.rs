@@ -82,6 +82,6 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn emit(made: GenerativeFiles, seed: u64, session: &Session) -> Result<(), Failure> {
     let (file, facts) = (made.files[0].display().to_string(), made.facts);
-    let text = results_in_words::materials(&facts) + &file;
+    let text = results_in_words::materials(&facts, &made.settings) + &file;
     session.emit(&json!({ "file": file, "settings": made.settings, "seed": seed, "result": facts }), &text)
 }
