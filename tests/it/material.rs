@@ -189,6 +189,19 @@ fn slow_the_study_level_model_is_fitted_sampled_and_shown_with_the_same_bytes_on
 }
 
 #[test]
+fn what_is_of_draws_is_refused_where_nothing_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("gp");
+    for of_draws in [&["--spread", "study"][..], &["--curves"]] {
+        for (levels, named) in [(&[][..], "--draws"), (&["--levels", "-1,0,1"], "--levels")] {
+            let (code, said) = refusal(&[&["gp", "sample", "-o", out.to_str().unwrap()], of_draws, levels].concat());
+            assert!(code != Some(0) && said.contains(named), "{said}");
+        }
+    }
+    assert!(!out.exists(), "nothing half-written");
+}
+
+#[test]
 fn options_of_the_other_generative_model_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("gp");

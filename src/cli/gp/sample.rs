@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with = "levels")]
     draws: Option<u64>,
     /// What a draw is of: the tissue's own curve, or what one more study would report of it [default: tissue]
-    #[arg(long, value_name = "tissue|study")]
+    #[arg(long, requires = "draws", conflicts_with = "levels", value_name = "tissue|study")]
     spread: Option<Spread>,
     #[command(flatten)]
     generative: ModelOption,
@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, value_name = "mean|laboratory|person|study")]
     of: Option<Of>,
     /// Also write the drawn curves, one column a draw
-    #[arg(long, requires = "draws")]
+    #[arg(long, requires = "draws", conflicts_with = "levels")]
     curves: bool,
     #[arg(long, default_value = "neo-hookean", help = laws("Law fitted to each: {}"))]
     law: MetaModel,
