@@ -151,7 +151,8 @@ pub enum MergeError {
 pub type Literature = (f64, f64);
 
 impl PopulationFile {
-    /// From what the scans of each patient say of these parameters, each with what the literature expects of it.
+    /// From what the scans of each patient say of these parameters, each with what the literature expects of it. A patient whose
+    /// scans say nothing of any of them does not teach, and is none of its patients.
     ///
     /// # Errors
     /// [`TooMany`].
@@ -162,6 +163,7 @@ impl PopulationFile {
         left_out: BTreeMap<String, usize>,
     ) -> Result<Self, TooMany> {
         // The order of the files that they came from says nothing, and sums in one order give the same bytes.
+        moments.retain(Moments::tells);
         moments.sort_by(Moments::by_value);
         let names: Vec<String> = parameters.iter().map(|(name, _)| name.clone()).collect();
         let found = Population::infer(&names, &moments)?;
@@ -258,11 +260,14 @@ impl PopulationFile {
     /// [`PopulationFileError`] with the file and what is wrong.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, PopulationFileError> {
         let refused = |reason: String| PopulationFileError { file: file.to_owned(), reason };
-        let read: Self = toml::from_str(text).map_err(|error| {
+        let mut read: Self = toml::from_str(text).map_err(|error| {
             let line = crate::material::toml_text::line_of(&error, text);
             refused(format!("line {line}: {}", error.message().trim().replace('\n', " ")))
         })?;
         read.check().map_err(&refused)?;
+        // Older files count patients whose scans say nothing.
+        read.moments.retain(Moments::tells);
+        read.patients = read.moments.len();
         read.check_figures().map_err(refused)?;
         Ok(read)
     }
@@ -371,8 +376,8 @@ pub fn merged(files: &[(String, PopulationFile)]) -> Result<PopulationFile, Merg
         let place = |wanted: &String| file.parameters.iter().position(|taught| taught.name == *wanted);
         let places: Vec<Option<usize>> = parameters.iter().map(|(wanted, _)| place(wanted)).collect();
         let own: Vec<Moments> = file.moments.iter().map(|m| m.among(&places)).collect();
-        // Two people with the same figures to the last bit are one.
-        let count = own.iter().filter(|m| moments.contains(m)).count();
+        // Two people with the same figures to the last bit are one; all of whom nothing is known look alike.
+        let count = own.iter().filter(|m| m.tells() && moments.contains(m)).count();
         if count > 0 {
             return Err(MergeError::Twice { file: name.clone(), count });
         }

@@ -100,6 +100,11 @@ impl Moments {
         self.precision[parameter][parameter] > 0.0
     }
 
+    /// Whether anything is said of any parameter.
+    pub fn tells(&self) -> bool {
+        (0..self.precision.len()).any(|parameter| self.tells_of(parameter))
+    }
+
     /// The same among other parameters: `places` says where each of them stands here.
     pub(super) fn among(&self, places: &[Option<usize>]) -> Self {
         let at = |r: Option<usize>, c: Option<usize>| r.zip(c).map_or(0.0, |(r, c)| self.precision[r][c]);

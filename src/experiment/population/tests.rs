@@ -191,6 +191,30 @@ fn cohorts_of_one_and_of_two_tissues_merge_and_each_teaches_its_own() {
 }
 
 #[test]
+fn who_says_nothing_does_not_teach_and_is_nobody_twice() {
+    let silent = Moments::new(&DMatrix::zeros(2, 2), &DVector::zeros(2));
+    assert!(!silent.tells() && !silent.tells_of(0));
+    let all = moments(&cohort(20, 3));
+    let halves = [&all[..8], &all[8..]].map(<[Moments]>::to_vec);
+    let with_silent = halves.clone().map(|half| file([half, vec![silent.clone()]].concat()));
+    assert_eq!(with_silent, halves.map(file));
+    assert_eq!(with_silent[0].patients, 8);
+    // As files of before have them: counted, and in each of two files.
+    let older = with_silent.clone().map(|mut half| {
+        half.moments.push(silent.clone());
+        half.patients += 1;
+        half
+    });
+    for (half, old) in with_silent.iter().zip(&older) {
+        assert_eq!(PopulationFile::from_toml(&old.to_toml(), "old.toml").unwrap(), *half);
+    }
+    let named: Vec<(String, PopulationFile)> = older.into_iter().map(|half| ("old.toml".to_owned(), half)).collect();
+    assert_eq!(merged(&named).unwrap(), file(all));
+    // Who teaches is somebody all the same.
+    assert!(matches!(merged(&[named[0].clone(), named[0].clone()]), Err(MergeError::Twice { count: 8, .. })));
+}
+
+#[test]
 fn a_small_cohort_is_one_studys_worth_and_a_large_one_moves_the_prior() {
     let all = moments(&cohort(40, 9));
     let small = file(all[..4].to_vec());

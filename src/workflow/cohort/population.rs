@@ -36,6 +36,8 @@ enum LeftOut {
     UnknownFluid,
     #[error("figures that are no Gaussian")]
     NoGaussian,
+    #[error("scans that say nothing of what is learnt")]
+    Silent,
 }
 
 /// One patient whose figures are an answer.
@@ -101,7 +103,8 @@ pub fn learn(members: &[Member], cases: &Path) -> Result<Option<Learnt>, Workflo
     let mut taught = Vec::new();
     for teacher in teachers {
         match Moments::of_estimate(teacher.estimate, &names) {
-            Some(moments) => taught.push((teacher, moments)),
+            Some(moments) if moments.tells() => taught.push((teacher, moments)),
+            Some(_) => leave(LeftOut::Silent),
             None => leave(LeftOut::NoGaussian),
         }
     }
