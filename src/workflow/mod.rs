@@ -200,6 +200,7 @@ fn can_be_done(work: &Work<'_>, goal: Goal) -> Result<(), WorkflowError> {
 
 /// An estimate holds what has moved against a load, and changes parameters that its law names.
 fn can_be_estimated(work: &Work<'_>) -> Result<(), WorkflowError> {
+    work.is_of_equilibria("an estimate")?;
     if work.subject == Subject::Patient && !work.settings.resection.is_loaded() {
         return Err(WorkflowError::NoLoad);
     }

@@ -50,6 +50,7 @@ pub fn predict(
 pub(super) fn can_be_done(work: &Work<'_>) -> Result<(), WorkflowError> {
     let settings = work.settings;
     settings.check()?;
+    work.is_of_equilibria("a prediction")?;
     settings.predict.check_loads(&settings.resection).map_err(PredictError::Loads)?;
     settings.predict.check_taught(&settings.resection, &settings.prior).map_err(PredictError::Taught)?;
     if settings.predict.poisson_log_sd.is_some() && settings.resection.poisson_ratio == 0.0 {

@@ -9,6 +9,7 @@ use super::put_back::Before;
 use super::settings::Settings;
 use super::stage_name::{StageName, Subject};
 use crate::artefact::{Manifest, Produced, Stage, StageError};
+use crate::fem::Method;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::cell::{OnceCell, RefCell};
@@ -86,6 +87,15 @@ impl<'a> Work<'a> {
             held: OnceCell::new(),
             before: OnceCell::new(),
         }
+    }
+
+    /// Refuses a motion where `of` is of equilibria: the method would be noted as used, and be another one than that.
+    pub fn is_of_equilibria(&self, of: &'static str) -> Result<(), WorkflowError> {
+        let (table, solver) = match self.subject {
+            Subject::Phantom { .. } => ("phantom", &self.settings.phantom.solver),
+            Subject::Patient | Subject::Plan => ("resection", &self.settings.resection.solver),
+        };
+        if solver.method == Method::Static { Ok(()) } else { Err(WorkflowError::Moving { table, of }) }
     }
 
     /// A stage of this name after those it is made from.

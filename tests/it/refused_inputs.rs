@@ -212,6 +212,12 @@ fn settings_that_would_stop_a_later_stage_stop_the_job_before_the_first() {
     let config = path("settings.toml");
     let run = ["--config", &config, "run", pair[0], pair[1], "--estimate", "-o", &path("case")];
     refuses(&run, "there is no load", &["gravity_m_per_s2", "[resection]"], &path("case"));
+    std::fs::write(path("settings.toml"), "[resection.solver]\nmethod = \"backward-euler\"\n").unwrap();
+    let moving = ["[resection.solver]", "method = \"static\""];
+    let run = ["--config", &config, "run", pair[0], pair[1], "--estimate", "-o", &path("case")];
+    refuses(&run, "an estimate is of equilibria", &moving, &path("case"));
+    let plan = ["--config", &config, "predict", pair[0], "--resection-ellipsoid", "0,0,0,5,5,5", "-o", &path("case")];
+    refuses(&plan, "a prediction is of equilibria", &moving, &path("case"));
     let run = ["run", pair[0], pair[1], "--cells", "0", "-o", &path("case")];
     refuses(&run, "--cells", &["1 or more"], &path("case"));
 }

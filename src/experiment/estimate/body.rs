@@ -3,7 +3,7 @@
 use super::levenberg_marquardt::{Forward, Linearisation};
 use super::unknown::{Unknown, axes_across};
 use crate::experiment::observed::ObservedSurfaces;
-use crate::fem::{By, FemError, Load, Loads, Materials, Model, Outcome, Scenario, State, Within};
+use crate::fem::{By, FemError, Load, Loads, Materials, Method, Model, Outcome, Scenario, State, Within};
 use crate::material::law::{Material, Parameter, Shape};
 use crate::mesh::TetMesh;
 use nalgebra::{DMatrix, DVector, Point3, Rotation3, Vector3};
@@ -55,6 +55,11 @@ pub enum BodyError {
         /// The tissue.
         tissue: String,
     },
+    /// The scenario asks for a motion; equilibria alone have the sensitivities that are needed, and are what is compared.
+    #[error(
+        "`solver.method` of the scenario asks for a motion, and an estimate or a prediction is of equilibria: give \"static\""
+    )]
+    Moving,
     /// The solver's own.
     #[error(transparent)]
     Fem(#[from] FemError),
@@ -115,6 +120,9 @@ impl<'a> Body<'a> {
         poisson_ratio: f64,
         observation: Observation,
     ) -> Result<Self, BodyError> {
+        if template.solver.method != Method::Static {
+            return Err(BodyError::Moving);
+        }
         let mut template = template.clone();
         // Any moduli will do to check the scenario.
         template.materials = materials(&template, &unknowns, &vec![7.0; unknowns.len()], poisson_ratio)?;
@@ -495,6 +503,19 @@ mod tests {
         assert!([0, 1, 3].iter().all(|&n| partly.sensitivities[n].is_empty()));
         let off = partly.sensitivities[2].iter().flatten().zip(turned[2].iter().flatten());
         assert!(off.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) < 1e-5 * largest);
+    }
+
+    #[test]
+    fn a_motion_is_no_body_of_an_estimate() {
+        let mesh = block(1);
+        let mut scenario = Scenario { fixed: vec!["base".to_owned()], ..Scenario::default() };
+        let posed = |scenario: &Scenario| {
+            let list = vec![Unknown::ShearModulus(Tissue::whole_brain().remove(0))];
+            Body::new(&mesh, scenario, list, 0.45, Observation::Nodes(Vec::new())).map(|_| ())
+        };
+        posed(&scenario).unwrap();
+        scenario.solver.method = Method::BackwardEuler;
+        assert!(matches!(posed(&scenario), Err(BodyError::Moving)));
     }
 
     #[test]

@@ -155,6 +155,11 @@ pub enum WorkflowError {
     )]
     NoLoad,
     #[error(
+        "`method` of the table [{table}.solver] asks for a motion, and {of} is of equilibria: give `method = \"static\"` there, or \
+         leave it out; samples alone may move"
+    )]
+    Moving { table: &'static str, of: &'static str },
+    #[error(
         "`population` of the table [prior] teaches {taught}, and the estimate has {drawn}: set `tissues` of the table [resection] to \
          what the cohort was estimated with, or leave the population out"
     )]
