@@ -78,7 +78,8 @@ class Result(Mesh):
     displacement_mm : (n, 3) float64
         Displacement of every node.
     reaction_n : (n, 3) float64
-        Force of the supports on every held node, N; zero elsewhere.
+        Force that keeps every held or moved node where it is told to be, N; zero elsewhere. Forces of walls and
+        springs are in ``record["contact"]`` and ``record["tethers"]``.
     jacobian : (m,) float64
         Volume ratio of every cell.
     strain_energy_density_pa : (m,) float64

@@ -95,6 +95,7 @@ pub fn simulate<'py>(
     let record = serde_json::json!({
         "convergence": outcome.convergence,
         "contact": outcome.contact,
+        "tethers": outcome.tethers,
         "motion": outcome.motion,
         "warnings": outcome.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
     });

@@ -33,7 +33,7 @@ mod stiffness;
 pub mod units;
 mod warning;
 
-pub use contact::{Contact, ContactOutcome, Support, Tether, Wall};
+pub use contact::{Contact, ContactOutcome, Support, Tether, TetherOutcome, Wall};
 pub use element::ElementKind;
 pub use error::FemError;
 pub(crate) use linear::Within;

@@ -1,6 +1,6 @@
 //! What a simulation answers.
 
-use super::contact::ContactOutcome;
+use super::contact::{ContactOutcome, TetherOutcome};
 use super::element::Laws;
 use super::model::Model;
 use super::warning::FemWarning;
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Outcome {
     /// Displacement of every node, mm.
     pub displacement_mm: Vec<[f64; 3]>,
-    /// Force the supports exert on every held node, N; zero elsewhere.
+    /// Force that keeps every held or moved node where it is told to be, N; zero elsewhere. What walls and springs do is told by
+    /// `contact` and `tethers`: with these it balances the loads.
     pub reaction_n: Vec<[f64; 3]>,
     /// Volume ratio of every cell.
     pub jacobian: Vec<f64>,
@@ -23,6 +24,9 @@ pub struct Outcome {
     /// Pressure of walls on every node, Pa; empty without walls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact_pressure_pa: Vec<f64>,
+    /// What the springs of every entry do; none without springs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tethers: Vec<TetherOutcome>,
     /// How it was found.
     pub convergence: ConvergenceRecord,
     /// How it moved there; absent in statics.
@@ -148,6 +152,7 @@ impl Model {
         Outcome {
             contact_pressure_pa: if contact.is_empty() { Vec::new() } else { self.at_corners(&pressure) },
             contact,
+            tethers: self.supports.outcome_of_tethers(u),
             displacement_mm: self.to_mesh_mm(u),
             reaction_n,
             jacobian: state.iter().map(|s| s[0]).collect(),

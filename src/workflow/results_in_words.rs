@@ -76,6 +76,11 @@ pub fn simulated(found: &Simulation, output: &Path) -> String {
             wall.set, wall.area_mm2, wall.depth_mm
         );
     }
+    for springs in &found.tethers {
+        let force = springs.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        text +=
+            &format!("springs at {}: {force:.3} N, stretched by at most {:.3} mm\n", springs.set, springs.stretch_mm);
+    }
     if let Some(rmse) = found.rmse_mm {
         text += &format!("RMSE against the reference {rmse:.6} mm\n");
     }

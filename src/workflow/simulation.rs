@@ -9,7 +9,7 @@ use crate::artefact::{Produced, Stage, StageError, check_apart, check_writable, 
 use crate::experiment::rmse::{node_errors_mm, root_mean_square};
 use crate::fem::{
     self, ContactOutcome, ConvergenceRecord, ElementKind, FemError, FemWarning, Method, Motion, Outcome, Scenario,
-    simulate_from,
+    TetherOutcome, simulate_from,
 };
 use crate::mesh::TetMesh;
 use crate::mesh::format::{Field, msh, pvd, vtu};
@@ -53,7 +53,7 @@ pub struct Simulation {
     pub displacement_max_mm: f64,
     /// Root mean square of the displacement over the nodes of tetrahedra, mm.
     pub displacement_rms_mm: f64,
-    /// Sum of the supports' forces, N.
+    /// Force on the held and moved nodes together, N; those of walls and springs are theirs below.
     pub reaction_n: [f64; 3],
     /// Root mean square error against the reference over the nodes of tetrahedra, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,6 +61,9 @@ pub struct Simulation {
     /// What presses against what.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact: Vec<ContactOutcome>,
+    /// What springs do.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tethers: Vec<TetherOutcome>,
     /// The solver's record.
     pub convergence: ConvergenceRecord,
     /// The record of a motion.
@@ -284,6 +287,7 @@ fn produced(
         reaction_n: [0, 1, 2].map(|i| outcome.reaction_n.iter().map(|r| r[i]).sum()),
         rmse_mm: errors.as_deref().and_then(over_tets),
         contact: outcome.contact,
+        tethers: outcome.tethers,
         convergence: outcome.convergence,
         motion: outcome.motion,
         warnings: outcome.warnings.iter().map(ToString::to_string).collect(),

@@ -128,6 +128,10 @@ fn slow_what_every_command_prints_with_json_is_one_document_that_the_schema_desc
     std::fs::write(at("session.jsonl"), recording(posed.map(Path::new))).unwrap();
     prints("live", &["live", posed[0], posed[1], "--replay", &at("session.jsonl"), "-o", &at("live.vtu")]);
     prints("simulate", &["simulate", &at("phantom/mesh/rest.vtu"), &at("scenario.toml"), "-o", &at("s.vtu")]);
+    let leaning = "[[contact]]\nset = 'superior'\nwall = { shape = 'own-surface' }\n\
+                   [[tethers]]\nset = 'superior'\nstiffness_pa_per_mm = 5.0\n";
+    std::fs::write(at("leaning.toml"), format!("{SCENARIO}{leaning}")).unwrap();
+    prints("simulate", &["simulate", &at("phantom/mesh/rest.vtu"), &at("leaning.toml"), "-o", &at("leaning.vtu")]);
 
     let printed = checks.iter().filter_map(|check| check.split_once('=')).map(|(command, _)| command.to_owned());
     let printed: BTreeSet<String> = printed.filter(|command| command != "error").collect();

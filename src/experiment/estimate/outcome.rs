@@ -137,6 +137,7 @@ impl Estimate {
         self.state.strain_energy_density_pa.fill(0.0);
         self.state.contact.clear();
         self.state.contact_pressure_pa.clear();
+        self.state.tethers.clear();
         self.state.warnings.clear();
         // The standard deviation with which a size around rest reaches so far.
         self.displacement_sd_mm.fill(reach_mm / reach_95(0.0, 1.0));

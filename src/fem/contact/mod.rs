@@ -42,6 +42,17 @@ pub struct ContactOutcome {
     pub depth_mm: f64,
 }
 
+/// What the springs of one `[[tethers]]` entry do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TetherOutcome {
+    /// The set that they hold.
+    pub set: String,
+    /// Force of the springs on the body, N.
+    pub force_n: [f64; 3],
+    /// How far the longest or shortest of them is from its length at rest, mm.
+    pub stretch_mm: f64,
+}
+
 /// What a node stands before.
 #[derive(Clone, Copy, Debug)]
 enum Before {
@@ -78,10 +89,20 @@ const LEAST_SLOPE: f64 = 0.3;
 struct Tethered {
     node: u32,
     row: u32,
+    /// Place of its set among those that are tethered.
+    set: u32,
     /// N/m.
     stiffness: f64,
     /// Only along this normal.
     along: Option<Vector3<f64>>,
+}
+
+impl Tethered {
+    /// How far its end has moved away from where it holds nothing, m.
+    fn stretch(&self, u: &[[f64; 3]]) -> Vector3<f64> {
+        let moved = Vector3::from(u[self.node as usize]);
+        self.along.map_or(moved, |n| n * moved.dot(&n))
+    }
 }
 
 struct Barrier {
@@ -96,6 +117,8 @@ struct Barrier {
 pub(super) struct Supports {
     standing: Vec<Standing>,
     tethered: Vec<Tethered>,
+    /// The sets of the springs, one for every entry of the scenario.
+    tethered_sets: Vec<String>,
     walls: Vec<Barrier>,
     /// Walls and springs that nothing free is at.
     pub idle: Vec<FemWarning>,
@@ -134,11 +157,13 @@ impl Barrier {
 impl Supports {
     /// The scenario's walls and springs on its mesh (cut open, as [`Scenario::body`] leaves it).
     pub(super) fn new(sharing: &Sharing, scenario: &Scenario, at: &Numbering) -> Result<Self, FemError> {
-        let mut supports = Self { standing: Vec::new(), tethered: Vec::new(), walls: Vec::new(), idle: Vec::new() };
+        let tethered_sets = scenario.tethers.iter().map(|tether| tether.set.clone()).collect();
+        let (standing, tethered, walls, idle) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut supports = Self { standing, tethered, tethered_sets, walls, idle };
         for contact in all_contacts(scenario) {
             supports.add_wall(sharing, &contact, at)?;
         }
-        for tether in &scenario.tethers {
+        for (set, tether) in scenario.tethers.iter().enumerate() {
             let before = supports.tethered.len();
             for (node, area, normal) in surface_nodes(sharing, &tether.set)? {
                 let node = at.number[node as usize];
@@ -146,7 +171,7 @@ impl Supports {
                 let along = tether.only_normal.then_some(normal);
                 let row = at.row_of[node as usize];
                 if row != HELD {
-                    supports.tethered.push(Tethered { node, row, stiffness, along });
+                    supports.tethered.push(Tethered { node, row, set: set as u32, stiffness, along });
                 }
             }
             if supports.tethered.len() == before {
@@ -297,11 +322,7 @@ impl Supports {
             return 0.0;
         }
         let parts = self.each(u, nodes_m, softer, |s, potential, (gap, ..)| s.area_m2 * potential.at(gap)[0]);
-        let springs = self.tethered.iter().map(|t| {
-            let u = Vector3::from(u[t.node as usize]);
-            let square = t.along.map_or_else(|| u.norm_squared(), |n| u.dot(&n).powi(2));
-            0.5 * t.stiffness * square
-        });
+        let springs = self.tethered.iter().map(|t| 0.5 * t.stiffness * t.stretch(u).norm_squared());
         parts.iter().sum::<f64>() + springs.sum::<f64>()
     }
 
@@ -316,8 +337,7 @@ impl Supports {
             (0..3).for_each(|i| forces[s.node as usize][i] += part[i]);
         }
         for t in &self.tethered {
-            let u = Vector3::from(u[t.node as usize]);
-            let part = t.stiffness * t.along.map_or(u, |n| n * u.dot(&n));
+            let part = t.stiffness * t.stretch(u);
             (0..3).for_each(|i| forces[t.node as usize][i] += part[i]);
         }
     }
@@ -410,6 +430,18 @@ impl Supports {
             }
         }
         (walls, pressure_pa)
+    }
+
+    /// What the springs of every entry do.
+    pub(super) fn outcome_of_tethers(&self, u: &[[f64; 3]]) -> Vec<TetherOutcome> {
+        let entry = |set: &String| TetherOutcome { set: set.clone(), ..TetherOutcome::default() };
+        let mut found: Vec<TetherOutcome> = self.tethered_sets.iter().map(entry).collect();
+        for t in &self.tethered {
+            let (entry, stretch) = (&mut found[t.set as usize], t.stretch(u));
+            entry.stretch_mm = entry.stretch_mm.max(stretch.norm() / METRES_PER_MM);
+            (0..3).for_each(|i| entry.force_n[i] -= t.stiffness * stretch[i]);
+        }
+        found
     }
 }
 

@@ -6,7 +6,7 @@ use hgm::mesh::TetMesh;
 
 const GREY: &str = "[materials.grey_matter]\nlaw = 'neo-hookean'\nshear_modulus_pa = 3000.0\npoisson_ratio = 0.4\n";
 
-/// Sum of the supports' forces, N.
+/// Force on the held nodes together, N.
 fn carried(mesh: &TetMesh, held: &str, loads: &str) -> [f64; 3] {
     let text = format!("fixed = ['{held}']\n{GREY}[solver]\nrelative_residual = 1e-11\n[loads]\n{loads}");
     let outcome = simulate(mesh, &Scenario::from_toml(&text).unwrap(), &|_| ()).unwrap();
@@ -95,4 +95,47 @@ fn pressure_on_facets_within_the_body_acts_on_the_side_they_are_turned_to_or_is_
     assert!(error.to_string().contains("`drawn`") && error.to_string().contains("turn all its facets"), "{error}");
     // A force has its own direction.
     close(carried(&mesh, "z0", BOTH[0]), [-0.2, 0.3, -0.4]);
+}
+
+#[test]
+fn what_holds_presses_and_pulls_balances_the_loads() {
+    let mesh = cube(3, 40.0);
+    let weight = [1.5, -0.7, -9.81].map(|g| g * 64e-6 * 400.0);
+    let springs = "[[tethers]]\nset = 'x1'\nstiffness_pa_per_mm = 300.0\n\
+                   [[tethers]]\nset = 'y1'\nstiffness_pa_per_mm = 20.0\nonly_normal = true\n";
+    let wall = "[[contact]]\nset = 'z0'\nwall = { shape = 'plane', point_mm = [0, 0, 0.1], normal = [0, 0, 1] }\n";
+    let moved = "[[prescribed]]\nset = 'x0'\ndisplacement_mm = [0.5, 0, 0]\ncomponents = [true, false, true]\n";
+    for (held, parts) in [
+        ("fixed = ['x0']\n".to_owned() + springs + wall, [true, true, true]),
+        (moved.to_owned() + springs, [true, true, false]),
+        (springs.to_owned() + wall, [false, true, true]),
+        (springs.to_owned(), [false, true, false]),
+    ] {
+        for element in ["tet4", "tet4-nodal", "tet10"] {
+            let text = format!(
+                "{held}{GREY}[solver]\nelement = '{element}'\nrelative_residual = 1e-11\n[loads]\n\
+                 gravity_m_per_s2 = [1.5, -0.7, -9.81]\ndensity_kg_per_m3 = 400.0\n"
+            );
+            let outcome = simulate(&mesh, &Scenario::from_toml(&text).unwrap(), &|_| ()).unwrap();
+            let sum = |forces: &[[f64; 3]]| [0, 1, 2].map(|i| forces.iter().map(|f| f[i]).sum::<f64>());
+            let reaction = sum(&outcome.reaction_n);
+            let of_walls = sum(&outcome.contact.iter().map(|wall| wall.force_n).collect::<Vec<_>>());
+            let of_springs = sum(&outcome.tethers.iter().map(|springs| springs.force_n).collect::<Vec<_>>());
+            close([0, 1, 2].map(|i| reaction[i] + of_walls[i] + of_springs[i] + weight[i]), [0.0; 3]);
+            assert_eq!([reaction, of_springs, of_walls].map(|force| force != [0.0; 3]), parts, "{element}: {held}");
+            // One entry for each, in the scenario's order; those along the normal pull along it alone.
+            let sets: Vec<&str> = outcome.tethers.iter().map(|springs| springs.set.as_str()).collect();
+            assert_eq!(sets, ["x1", "y1"]);
+            assert!(outcome.tethers[1].force_n[0].abs().max(outcome.tethers[1].force_n[2].abs()) < 1e-12);
+            let farthest = |set: &str| {
+                let moved = mesh.node_sets[set].iter().map(|&n| outcome.displacement_mm[n as usize]);
+                moved.map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max)
+            };
+            if element != "tet10" {
+                assert!((outcome.tethers[0].stretch_mm - farthest("x1")).abs() < 1e-9);
+            }
+        }
+    }
+    let alone = simulate(&mesh, &Scenario::from_toml(&format!("fixed = ['z0']\n{GREY}")).unwrap(), &|_| ()).unwrap();
+    assert_eq!(alone.tethers, []);
 }
