@@ -16,6 +16,7 @@ mod load;
 #[cfg(test)]
 mod manufactured;
 mod mass;
+mod measured;
 mod mixture;
 mod model;
 mod order;

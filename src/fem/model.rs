@@ -289,7 +289,8 @@ impl Model {
             .iter()
             .map(|name| materials.get(name).cloned().ok_or_else(|| missing(name)))
             .collect::<Result<_, _>>()?;
-        Ok(self.body.laws(&materials))
+        let measured = materials.iter().map(|material| material.measured().map(|(window, _)| window)).collect();
+        Ok(Laws { measured, ..self.body.laws(&materials) })
     }
 
     /// Stored energy of body, walls and springs, J.

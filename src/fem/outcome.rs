@@ -2,6 +2,7 @@
 
 use super::contact::{ContactOutcome, TetherOutcome};
 use super::element::Laws;
+use super::measured::outside_measured;
 use super::model::Model;
 use super::warning::FemWarning;
 use serde::{Deserialize, Serialize};
@@ -148,6 +149,7 @@ impl Model {
         if crushed > 0 {
             warnings.push(FemWarning::Squeezed { cells: crushed });
         }
+        warnings.extend(outside_measured(&*self.body, &self.names, u, laws));
         let (contact, pressure) = self.supports.outcome(u, &self.nodes_m);
         Outcome {
             contact_pressure_pa: if contact.is_empty() { Vec::new() } else { self.at_corners(&pressure) },

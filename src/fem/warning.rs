@@ -96,6 +96,11 @@ pub enum FemWarning {
          meant, take them out of one of the two"
     )]
     StaysHeld { set: String, nodes: usize, of: usize },
+    #[error(
+        "`[materials.{material}]` was measured at stretches of {low} to {high}, and {cells} of its {of} cells are stretched to \
+         {least:.3} to {most:.3} of their length: beyond what was measured its law is a guess; give a model that was measured there"
+    )]
+    OutsideMeasured { material: String, cells: usize, of: usize, least: f64, most: f64, low: f64, high: f64 },
     #[error("{cells} cells are inside out, among them cell {worst}: lower the load or raise the modulus")]
     InsideOut { cells: usize, worst: usize },
     #[error("{cells} cells are squeezed below a tenth of their volume: treat stresses with care")]

@@ -8,6 +8,7 @@ use super::super::reduce::CHUNK;
 use super::super::sparse::{BlockMatrix, BlockPattern, HELD};
 use super::kernel::{Kernel, M3, cofactors};
 use super::point::Point;
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 
 /// Elements with `K` nodes and `Q` points, ordered so that neighbours in the list share nodes in memory.
@@ -207,4 +208,23 @@ impl<const K: usize, const Q: usize> Elements<K, Q> {
         };
         (0..self.nodes.len()).into_par_iter().with_min_len(CHUNK).map(one).collect()
     }
+
+    /// Per element of a material: the principal stretch that is farthest from rest, the least and the largest of its points.
+    pub(in super::super) fn farthest_stretches(&self, u: &[[f64; 3]], material: u16) -> Vec<[f64; 2]> {
+        let own = |e: &usize| self.portions[*e].material == material;
+        let one = |e: usize| {
+            let local = self.local(e, u);
+            let of_points = self.points[e].iter().map(|point| farthest(&Self::gradient(point, &local)));
+            of_points.fold([f64::INFINITY, 0.0], |[least, most], s| [f64::min(least, s), f64::max(most, s)])
+        };
+        (0..self.nodes.len()).into_par_iter().with_min_len(CHUNK).filter(own).map(one).collect()
+    }
+}
+
+/// The principal stretch farthest from 1 by its logarithm, of a displacement gradient.
+fn farthest(h: &M3) -> f64 {
+    let f = Matrix3::from_fn(|r, c| h[r][c] + f64::from(u8::from(r == c)));
+    let squares: [f64; 3] = (f.transpose() * f).symmetric_eigenvalues().into();
+    let far = |s: f64| s.ln().abs();
+    squares.map(|s| s.max(0.0).sqrt()).into_iter().max_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0)
 }

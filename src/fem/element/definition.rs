@@ -45,6 +45,8 @@ pub(in super::super) struct Laws {
     pub nodal: Vec<Box<dyn Hyperelastic>>,
     /// How many times softer and thicker walls are than they will be: 1 but on the way from rest.
     pub walls_softer: f64,
+    /// The stretches that each material was measured at; none where it makes no claim.
+    pub measured: Vec<Option<[f64; 2]>>,
 }
 
 /// Energy, forces, stiffness and state of a whole body.
@@ -83,6 +85,9 @@ pub(in super::super) trait Body: Send + Sync {
 
     /// Per cell of the mesh: mean and least volume ratio, mean energy density (Pa).
     fn state(&self, u: &[[f64; 3]], laws: &Laws) -> Vec<[f64; 3]>;
+
+    /// Per element of a material: the principal stretch that is farthest from rest, the least and the largest of its points.
+    fn farthest_stretches(&self, u: &[[f64; 3]], material: u16) -> Vec<[f64; 2]>;
 
     /// Nodes and volume (m3) of every element.
     fn each_element(&self, with: &mut dyn FnMut(&[u32], f64));

@@ -34,7 +34,7 @@ impl<const K: usize, const Q: usize> Body for Plain<K, Q> {
 
     fn laws(&self, materials: &[Material]) -> Laws {
         let kernels = materials.iter().map(|m| Kernel::new(m, m.lame_lambda_pa())).collect();
-        Laws { kernels, nodal: Vec::new(), walls_softer: 1.0 }
+        Laws { kernels, nodal: Vec::new(), walls_softer: 1.0, measured: Vec::new() }
     }
 
     fn energy(&self, u: &[[f64; 3]], laws: &Laws) -> f64 {
@@ -70,6 +70,10 @@ impl<const K: usize, const Q: usize> Body for Plain<K, Q> {
 
     fn state(&self, u: &[[f64; 3]], laws: &Laws) -> Vec<[f64; 3]> {
         by_cell(&self.elements.portions, self.elements.state(u, &laws.kernels))
+    }
+
+    fn farthest_stretches(&self, u: &[[f64; 3]], material: u16) -> Vec<[f64; 2]> {
+        self.elements.farthest_stretches(u, material)
     }
 
     fn each_element(&self, with: &mut dyn FnMut(&[u32], f64)) {

@@ -55,6 +55,7 @@ impl Body for Averaged {
             kernels: materials.iter().map(|m| Kernel::new(&part(m, 1.0 - NODAL_SHARE), 0.0)).collect(),
             nodal: materials.iter().map(|m| part(m, NODAL_SHARE).law_with_lambda(m.lame_lambda_pa())).collect(),
             walls_softer: 1.0,
+            measured: Vec::new(),
         }
     }
 
@@ -95,6 +96,10 @@ impl Body for Averaged {
         let averaged = self.nodal.energy_density(u, &laws.nodal);
         state.iter_mut().zip(averaged).for_each(|(state, extra)| state[2] += extra);
         by_cell(&self.elements.portions, state)
+    }
+
+    fn farthest_stretches(&self, u: &[[f64; 3]], material: u16) -> Vec<[f64; 2]> {
+        self.elements.farthest_stretches(u, material)
     }
 
     fn each_element(&self, with: &mut dyn FnMut(&[u32], f64)) {

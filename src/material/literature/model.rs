@@ -45,7 +45,7 @@ pub struct LiteratureModel {
     pub branches: Branches,
     /// What the published program used, where it differs.
     pub published: Option<Branches>,
-    /// Trusted stretches; never to be left.
+    /// Trusted stretches. Curves do not leave them; a simulation in which a body does is told of it.
     pub stretch_window: [f64; 2],
     /// Points of the grid: one number, or one for each half.
     pub points: Points,

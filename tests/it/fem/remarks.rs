@@ -103,3 +103,66 @@ fn a_mesh_that_was_cut_open_along_a_sheet_that_slides_is_not_called_unglued() {
         assert_eq!(told(mesh, &text), []);
     }
 }
+
+#[test]
+fn a_model_that_is_stretched_beyond_what_it_was_measured_at_is_told_of_and_by_how_much() {
+    let mesh = cube(2, 10.0);
+    let side = |set: &str, to: [f64; 3], of: &str| {
+        format!("[[prescribed]]\nset = '{set}'\ndisplacement_mm = {to:?}\ncomponents = {of}\n")
+    };
+    // Free to the sides, as in a test between plates without friction.
+    let told_at = |law: &str, stretch: f64, element: &str| {
+        let planes = [("x0", "[true, false, false]"), ("y0", "[false, true, false]"), ("z0", "[false, false, true]")];
+        let planes = planes.map(|(set, of)| side(set, [0.0; 3], of)).concat();
+        let plate = side("z1", [0.0, 0.0, 10.0 * (stretch - 1.0)], "[false, false, true]");
+        let text = format!(
+            "{planes}{plate}[materials.grey_matter]\n{law}\npoisson_ratio = 0.45\n[solver]\nelement = '{element}'\n"
+        );
+        told(&mesh, &text)
+    };
+    for element in ["tet4", "tet4-nodal", "tet10"] {
+        for (id, stretch, inside) in [
+            ("53-tension", 1.09, true),
+            ("53-tension", 1.105, true),
+            ("53-tension", 1.2, false),
+            ("53-tension", 0.995, true),
+            ("53-tension", 0.93, false),
+            ("53-compression", 0.91, true),
+            ("53-compression", 0.8, false),
+            ("53-compression", 1.07, false),
+        ] {
+            let found = told_at(&format!("law = 'literature'\nid = '{id}'"), stretch, element);
+            let expected = |warning: &FemWarning| {
+                let FemWarning::OutsideMeasured { material, cells: 48, of: 48, least, most, .. } = warning else {
+                    return false;
+                };
+                // Every cell is stretched as the plates are apart.
+                material == "grey_matter" && (least - stretch).abs() < 1e-6 && (most - stretch).abs() < 1e-6
+            };
+            let as_expected = if inside { found.is_empty() } else { found.len() == 1 && expected(&found[0]) };
+            assert!(as_expected, "{element} {id} {stretch}: {found:?}");
+        }
+        // A law of one's own makes no claim.
+        assert_eq!(told_at("law = 'neo-hookean'\nshear_modulus_pa = 500.0", 0.8, element), []);
+    }
+    let said = told_at("law = 'literature'\nid = '53-tension'", 0.93, "tet4")[0].to_string();
+    assert!(said.contains("stretches of 1 to 1.1") && said.contains("0.930"), "{said}");
+}
+
+#[test]
+fn a_corner_that_is_stretched_more_than_a_model_was_measured_at_says_nothing_of_the_body() {
+    let mesh = cube(6, 10.0);
+    let pulled = |n: f64| {
+        let law = "[materials.grey_matter]\nlaw = 'literature'\nid = '53-tension'\npoisson_ratio = 0.45\n";
+        let mut mesh = mesh.clone();
+        let corner = mesh.node_sets["x1"].iter().copied().filter(|n| {
+            let x = mesh.nodes_mm()[*n as usize];
+            x[1] > 9.9 && x[2] > 9.9
+        });
+        let corner = corner.collect();
+        mesh.set_nodes("corner", corner).unwrap();
+        let moved = format!("[[prescribed]]\nset = 'corner'\ndisplacement_mm = [{n}, 0.0, 0.0]\n");
+        told(&mesh, &format!("fixed = ['x0']\n{moved}{law}"))
+    };
+    assert_eq!(pulled(0.4), []);
+}
