@@ -151,18 +151,28 @@ fn a_model_that_is_stretched_beyond_what_it_was_measured_at_is_told_of_and_by_ho
 
 #[test]
 fn a_corner_that_is_stretched_more_than_a_model_was_measured_at_says_nothing_of_the_body() {
-    let mesh = cube(6, 10.0);
-    let pulled = |n: f64| {
-        let law = "[materials.grey_matter]\nlaw = 'literature'\nid = '53-tension'\npoisson_ratio = 0.45\n";
-        let mut mesh = mesh.clone();
-        let corner = mesh.node_sets["x1"].iter().copied().filter(|n| {
-            let x = mesh.nodes_mm()[*n as usize];
-            x[1] > 9.9 && x[2] > 9.9
-        });
-        let corner = corner.collect();
-        mesh.set_nodes("corner", corner).unwrap();
-        let moved = format!("[[prescribed]]\nset = 'corner'\ndisplacement_mm = [{n}, 0.0, 0.0]\n");
-        told(&mesh, &format!("fixed = ['x0']\n{moved}{law}"))
+    let mut mesh = cube(6, 10.0);
+    let nodes = mesh.nodes_mm();
+    let corner = (0..nodes.len() as u32).filter(|&n| nodes[n as usize].iter().all(|x| *x > 9.9)).collect();
+    mesh.set_nodes("corner", corner).unwrap();
+    // How much longer the edge that is stretched most has become, which a cell of it is stretched by at least; and what is told.
+    let pulled = |mm: f64| {
+        let text = format!(
+            "fixed = ['x0']\n[[prescribed]]\nset = 'corner'\ndisplacement_mm = [{mm:?}, 0.0, 0.0]\n\
+             [materials.grey_matter]\nlaw = 'literature'\nid = '1'\npoisson_ratio = 0.45\n"
+        );
+        let found = simulate(&mesh, &Scenario::from_toml(&text).unwrap(), &|_| ()).unwrap();
+        let length = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+        let place = |n: u32| mesh.nodes_mm()[n as usize];
+        let moved = |n: u32| [0, 1, 2].map(|i| place(n)[i] + found.displacement_mm[n as usize][i]);
+        let edges =
+            mesh.tets().iter().flat_map(|t| [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]].map(|e| e.map(|c| t[c])));
+        let stretches = edges.map(|[a, b]| length(moved(a), moved(b)) / length(place(a), place(b)));
+        (stretches.fold(0.0, f64::max), found.warnings)
     };
-    assert_eq!(pulled(0.4), []);
+    // Measured up to 1.1; a few of 1296 cells are beyond it.
+    let (longest, warnings) = pulled(0.7);
+    assert!(longest > 1.13 && warnings.is_empty(), "{longest} {warnings:?}");
+    let (_, warnings) = pulled(2.5);
+    assert!(matches!(warnings[..], [FemWarning::OutsideMeasured { cells: 13.., of: 1296, .. }]), "{warnings:?}");
 }
