@@ -97,6 +97,11 @@ pub enum FemError {
     StartLength { found: usize, nodes: usize },
     #[error("the displacement to start from is not a finite number at node {node}: leave it out and start from rest")]
     StartNotFinite { node: usize },
+    #[error(
+        "a piece of {cells} cells, among them cell {cell}, hangs on to the rest by an edge or a corner alone and would turn about it: hold \
+         a set of it in `fixed`, mesh the body so that it shares whole facets with the rest, or remove it"
+    )]
+    Hinged { cells: usize, cell: usize },
     #[error("there is no {what} to differentiate by: name a material of the scenario and a parameter of its law")]
     NoParameter { what: String },
     #[error(

@@ -10,6 +10,7 @@ mod dynamics;
 mod element;
 mod equilibrium;
 mod error;
+mod hinge;
 mod linear;
 pub mod live;
 mod load;

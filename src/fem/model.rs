@@ -5,6 +5,7 @@ use super::buoyancy::Buoyancy;
 use super::check::{check_held_together, check_materials, check_settings, floating, node_set, stays_held};
 use super::contact::{Numbering, Supports, tethered_nodes};
 use super::element::{Body, Laws, Numbered, Partition, with_mid_edge_nodes};
+use super::hinge::{Hinged, hinged};
 use super::linear::{Symbolic, Tangent};
 use super::load::{Load, NodalForces, nodal_forces_n};
 use super::mixture::portions;
@@ -165,6 +166,13 @@ impl Model {
         let nodes_m: Vec<[f64; 3]> = order.iter().map(|&old| position(old)).collect();
         let numbering = Numbering { number: &number, row_of: &row_of, nodes_m: &nodes_m };
         let supports = Supports::new(&sharing, scenario, &numbering)?;
+        let at = |n: u32| nodes_m[number[n as usize] as usize];
+        let hinged = if moving { Vec::new() } else { hinged(&sharing, &leaning, at) };
+        // A wall may stop what turns.
+        let stopped = |piece: &Hinged| piece.nodes.iter().any(|&n| supports.stands_before_a_wall(number[n as usize]));
+        if let Some(piece) = hinged.iter().find(|piece| !stopped(piece)) {
+            return Err(FemError::Hinged { cells: piece.cells, cell: piece.cell });
+        }
         let mut load_n = vec![[0.0; 3]; nodes];
         let load_parts: Vec<NodalForces> = loads
             .into_iter()
@@ -197,6 +205,7 @@ impl Model {
         warnings.extend(tiny(&nodes_m));
         warnings.extend(floating(scenario));
         warnings.extend(stays_held(mesh, scenario)?);
+        warnings.extend(hinged.iter().map(|piece| FemWarning::Hinged { cells: piece.cells, cell: piece.cell }));
         warnings.extend(supports.idle.iter().cloned());
         warnings.extend(idle_loads(&load_parts, &row_of, scenario));
         if let Some(limit) = element.locks_above() {

@@ -101,6 +101,11 @@ pub enum FemWarning {
          {least:.3} to {most:.3} of their length: beyond what was measured its law is a guess; give a model that was measured there"
     )]
     OutsideMeasured { material: String, cells: usize, of: usize, least: f64, most: f64, low: f64, high: f64 },
+    #[error(
+        "a piece of {cells} cells, among them cell {cell}, hangs on to the rest by an edge or a corner alone: only the wall before it \
+         keeps it from turning; hold a set of it in `fixed`, or mesh the body so that it shares whole facets with the rest"
+    )]
+    Hinged { cells: usize, cell: usize },
     #[error("{cells} cells are inside out, among them cell {worst}: lower the load or raise the modulus")]
     InsideOut { cells: usize, worst: usize },
     #[error("{cells} cells are squeezed below a tenth of their volume: treat stresses with care")]

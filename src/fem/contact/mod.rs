@@ -258,6 +258,11 @@ impl Supports {
         !self.standing.is_empty()
     }
 
+    /// Whether this node (solver numbering) stands before a wall.
+    pub(super) fn stands_before_a_wall(&self, node: u32) -> bool {
+        self.standing.iter().any(|s| s.node == node)
+    }
+
     /// No walls and no springs.
     pub(super) fn is_empty(&self) -> bool {
         self.standing.is_empty() && self.tethered.is_empty()

@@ -56,6 +56,58 @@ fn a_body_that_nothing_holds_is_refused() {
     assert!(matches!(error, FemError::Loose { nodes: 4, node: 4 }), "{error}");
 }
 
+/// Two cubes of 10 mm, the second moved, that share the nodes where they meet; its far faces are the sets `x` and `y`.
+fn touching(moved: [f64; 3]) -> TetMesh {
+    let first = cube(2, 10.0);
+    let mut nodes = first.nodes_mm().to_vec();
+    let number = |x: [f64; 3], nodes: &mut Vec<[f64; 3]>| {
+        nodes.iter().position(|n| *n == x).unwrap_or_else(|| {
+            nodes.push(x);
+            nodes.len() - 1
+        }) as u32
+    };
+    let place = |x: &[f64; 3]| [0, 1, 2].map(|i| x[i] + moved[i]);
+    let second: Vec<u32> = first.nodes_mm().iter().map(|x| number(place(x), &mut nodes)).collect();
+    let tets = [first.tets().to_vec(), first.tets().iter().map(|t| t.map(|n| second[n as usize])).collect()].concat();
+    let labels = vec![2; tets.len()];
+    let mut mesh = TetMesh::new(nodes, tets, labels).unwrap();
+    mesh.set_nodes("held", first.node_sets["x0"].clone()).unwrap();
+    for (set, face) in [("x", "x1"), ("y", "y1")] {
+        let mut nodes: Vec<u32> = first.node_sets[face].iter().map(|n| second[*n as usize]).collect();
+        nodes.sort_unstable();
+        mesh.set_nodes(set, nodes).unwrap();
+    }
+    mesh
+}
+
+#[test]
+fn a_piece_that_hangs_by_an_edge_or_a_corner_is_refused_and_one_that_is_held_or_joined_by_facets_is_not() {
+    let weight = "[loads]\ngravity_m_per_s2 = [0.0, 1.0, 0.0]\ndensity_kg_per_m3 = 100.0\n";
+    let solved = |mesh: &TetMesh, text: &str| simulate(mesh, &Scenario::from_toml(text).unwrap(), &|_| ()).unwrap();
+    let held = format!("fixed = ['held']\n{GREY}{weight}");
+    assert!(solved(&touching([10.0, 0.0, 0.0]), &held).warnings.is_empty(), "whole facets");
+    for apart in [[10.0, 10.0, 0.0], [10.0, 10.0, 10.0]] {
+        let mesh = touching(apart);
+        for element in ["tet4", "tet4-nodal", "tet10"] {
+            let (error, message) = refusal(&mesh, &format!("{held}[solver]\nelement = '{element}'\n"));
+            assert!(matches!(error, FemError::Hinged { cells: 48, cell: 48 }), "{error}");
+            assert!(message.contains("an edge or a corner") && message.contains("`fixed`"), "{message}");
+        }
+        for own in ["fixed = ['held', 'x']\n", "fixed = ['held']\n[[tethers]]\nset = 'x'\nstiffness_pa_per_mm = 50.0\n"]
+        {
+            assert!(solved(&mesh, &format!("{own}{GREY}{weight}")).warnings.is_empty(), "{own}");
+        }
+    }
+    // A wall stops it where it is pulled against one, which is told.
+    let wall = "[[contact]]\nset = 'y'\nwall = { shape = 'own-surface' }\n";
+    let found = solved(&touching([10.0, 10.0, 0.0]), &format!("fixed = ['held']\n{wall}{GREY}{weight}"));
+    assert_eq!(found.warnings, [FemWarning::Hinged { cells: 48, cell: 48 }]);
+    assert!(found.contact[0].force_n[1] < 0.0, "{:?}", found.contact);
+    // Motions have their mass to hold on to.
+    let moving = format!("{held}[solver]\nmethod = 'backward-euler'\n[dynamics]\nsteps = 2\n");
+    assert!(solved(&touching([10.0, 10.0, 0.0]), &moving).motion.is_some());
+}
+
 #[test]
 fn labels_without_name_or_material_are_refused() {
     let mesh = two_tissue_cube(2, 10.0);
