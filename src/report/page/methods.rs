@@ -302,7 +302,7 @@ mod tests {
         let told = |finding| {
             let tissues = vec!["grey_matter".to_owned(), "white_matter".to_owned()];
             let estimate = Some(estimate(finding, [0.3, 0.25]));
-            paragraph(&ExperimentOutcome { tissues, estimate, ..ExperimentOutcome::default() }).into_string()
+            paragraph(&ExperimentOutcome { tissues, estimate, ..ExperimentOutcome::default() }, None).into_string()
         };
         let still = told(Finding::NoShift);
         assert!(still.contains("No shift was seen in 300 observations, each known to 0.10 mm"), "{still}");
