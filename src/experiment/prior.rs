@@ -465,7 +465,9 @@ mod tests {
             .min_by(|a, b| (known.stretches[*a] - 1.0).abs().total_cmp(&(known.stretches[*b] - 1.0).abs()));
         let (mean, sd) = (known.mean[at_rest.unwrap()], known.sd[at_rest.unwrap()]);
         assert!((own.mean - mean).abs() < 0.5 * sd, "{} beside {mean} +- {sd}", own.mean);
-        assert!((own.sd.unwrap() / sd - 1.0).abs() < 0.4, "{own:?} beside {sd}");
+        // A law of one number sees the whole window, at whose ends persons differ most.
+        let widest = known.sd.iter().copied().fold(sd, f64::max);
+        assert!((0.95 * sd..widest).contains(&own.sd.unwrap()), "{own:?} beside {sd} to {widest}");
         let two =
             law_priors(std::slice::from_ref(&tissue), &PriorSettings { law: MetaModel::OGDEN, ..person }).unwrap();
         assert!(two.len() == 2 && two.iter().all(|(_, prior)| prior.mean.is_finite() && prior.sd.unwrap() > 0.0));

@@ -55,7 +55,9 @@ pub(super) fn hinged(sharing: &Sharing, held: &[[bool; 3]], nodes_m: impl Fn(u32
         if more.is_empty() {
             break;
         }
-        more.into_iter().for_each(|n| stands[n] = true);
+        for n in more {
+            stands[n] = true;
+        }
     }
     pieces.into_iter().zip(stands).filter(|(_, stands)| !stands).map(|(piece, _)| piece).collect()
 }
@@ -85,7 +87,9 @@ mod tests {
     fn hinged_of(nodes: &[[f64; 3]], tets: &[[u32; 4]], held: &[u32]) -> Vec<usize> {
         let mesh = TetMesh::new(nodes.to_vec(), tets.to_vec(), vec![2; tets.len()]).unwrap();
         let mut of_nodes = vec![[false; 3]; nodes.len()];
-        held.iter().for_each(|n| of_nodes[*n as usize] = [true; 3]);
+        for &n in held {
+            of_nodes[n as usize] = [true; 3];
+        }
         let sharing = Sharing { mesh: &mesh, quadratic: None, lumped: false };
         hinged(&sharing, &of_nodes, |n| nodes[n as usize]).into_iter().map(|piece| piece.cell).collect()
     }

@@ -129,7 +129,7 @@ pub fn member(out: &Path, cases: &Path, subject: &str) -> Result<Member, CohortE
     };
     Ok(Member {
         participant_id: subject.to_owned(),
-        has_page: participant_level::page_of(out, subject, &status).is_some(),
+        has_page: published::page_of(out, subject, &status).is_some(),
         status,
         message: log.map(|log| format!("{}: {}", log.kind, log.message)).or(stale),
         settings_sha256: read(layout::SETTINGS).filter(|_| outcome.is_some()).map(|text| sha256_hex(text.as_bytes())),

@@ -2,6 +2,7 @@
 
 use super::folderless::without_folders;
 use super::out_folder::may_hold_cases;
+use super::published::page_of;
 use super::{Dataset, DatasetError, Log, begin, case_folder, log_file, plan_folder, planned_subject, subject};
 use crate::artefact::write_whole;
 use crate::report::cohort::Status;
@@ -167,11 +168,6 @@ pub fn participants(
         }
     }
     Ok(done)
-}
-
-/// A subject's page: one that failed shows none, and a gate may have stopped it before there was one.
-pub(super) fn page_of(out: &Path, called: &str, status: &Status) -> Option<PathBuf> {
-    Some(out.join(format!("{called}.html"))).filter(|page| status.has_page() && page.exists())
 }
 
 fn one(

@@ -2,11 +2,12 @@
 
 use crate::artefact::write_whole;
 use crate::layout;
+use crate::report::cohort::Status;
 use crate::report::derivatives::{RawScan, published};
 use crate::report::hand_off::CaseFile;
 use crate::workflow::error::{CaseError, WorkflowError};
 use crate::workflow::{Case, Subject};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Where a subject's files lie in the derivatives.
 #[derive(Debug)]
@@ -52,6 +53,11 @@ impl Published<'_> {
     fn subject(&self) -> Subject {
         if self.scans.len() == 1 { Subject::Plan } else { Subject::Patient }
     }
+}
+
+/// A subject's page: one that failed shows none, and a gate may have stopped it before there was one.
+pub(super) fn page_of(out: &Path, called: &str, status: &Status) -> Option<PathBuf> {
+    Some(out.join(format!("{called}.html"))).filter(|page| status.has_page() && page.exists())
 }
 
 #[cfg(test)]
