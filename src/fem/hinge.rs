@@ -1,6 +1,7 @@
 //! Pieces of a body that hang on to the rest by an edge or a corner: they would turn about it without effort.
 
 use super::sharing::Sharing;
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// A piece that can turn about what it hangs by.
@@ -64,16 +65,11 @@ pub(super) fn hinged(sharing: &Sharing, held: &[[bool; 3]], nodes_m: impl Fn(u32
 
 /// Whether places lie on one line, or are fewer than three.
 fn on_a_line(places: &[[f64; 3]]) -> bool {
-    let way = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| b[i] - a[i]);
-    let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
-    let Some(&first) = places.first() else { return true };
-    let ways = || places.iter().map(|place| way(first, *place));
-    let along = ways().max_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or_default();
-    let across = |v: [f64; 3]| {
-        [along[1] * v[2] - along[2] * v[1], along[2] * v[0] - along[0] * v[2], along[0] * v[1] - along[1] * v[0]]
-    };
-    let farthest = ways().map(|v| square(across(v))).fold(0.0, f64::max);
-    farthest <= (STRAIGHT * square(along)).powi(2)
+    let [first, others @ ..] = places else { return true };
+    let ways = || others.iter().map(|place| Vector3::from(*place) - Vector3::from(*first));
+    let Some(along) = ways().max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return true };
+    let farthest = ways().map(|way| along.cross(&way).norm()).fold(0.0, f64::max);
+    farthest <= STRAIGHT * along.norm_squared()
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(crate) fn loads_in_words(
     let density = mark("density", &|unknown| matches!(unknown, Unknown::Density));
     let pressures = settings.pressure.iter().enumerate().map(|(n, load)| {
         let size = mark("size", &|unknown| matches!(unknown, Unknown::Pressure(of) if *of == n));
-        format!(" and {} Pa on the {}{size}", load.pressure_pa, load.set)
+        format!(" and {} Pa on the {}{size}", to_a_tenth(load.pressure_pa), load.set)
     });
     let room = mark("room before the skull", &|unknown| matches!(unknown, Unknown::Gap(_)));
     let fluid = match &settings.csf {
@@ -31,11 +31,16 @@ pub(crate) fn loads_in_words(
     };
     format!(
         "gravity ({gx:.2}, {gy:.2}, {gz:.2}) m/s2{direction} on tissue of {} kg/m3{density}{}, with {} held{}{room}{fluid}",
-        settings.density_kg_per_m3,
+        to_a_tenth(settings.density_kg_per_m3),
         pressures.collect::<String>(),
         scenario.fixed.join(" and "),
         settings.supports_in_words(),
     )
+}
+
+/// A given number may have more digits than anybody reads.
+fn to_a_tenth(value: f64) -> f64 {
+    (10.0 * value).round() / 10.0
 }
 
 #[cfg(test)]
@@ -50,18 +55,19 @@ mod tests {
     fn every_load_that_is_given_is_told_and_which_of_them_was_estimated() {
         let pressure = [("ventricle", 200.0), ("margin", -50.0)];
         let pressure = pressure.map(|(set, pressure_pa)| PressureLoad { set: set.to_owned(), pressure_pa }).to_vec();
-        let settings = ResectionSettings { pressure, supports: Supports::Fixed, ..ResectionSettings::default() };
+        let given = ResectionSettings { density_kg_per_m3: 191.978_052, ..ResectionSettings::default() };
+        let settings = ResectionSettings { pressure, supports: Supports::Fixed, ..given };
         let scenario = settings.scenario(&UnitQuaternion::identity());
         let said = |open: &[Unknown]| loads_in_words(&settings, &scenario, (open, "estimated along"));
         assert_eq!(
             said(&[]),
-            "gravity (0.00, 0.00, -9.81) m/s2 on tissue of 100 kg/m3 and 200 Pa on the ventricle and -50 Pa on the margin, with base and \
+            "gravity (0.00, 0.00, -9.81) m/s2 on tissue of 192 kg/m3 and 200 Pa on the ventricle and -50 Pa on the margin, with base and \
              falx held"
         );
         let open = [Unknown::Density, Unknown::GravityTurn(Turn::Nodding), Unknown::Pressure(1)];
         assert_eq!(
             said(&open),
-            "gravity (0.00, 0.00, -9.81) m/s2 (direction estimated along) on tissue of 100 kg/m3 (density estimated along) and 200 Pa on \
+            "gravity (0.00, 0.00, -9.81) m/s2 (direction estimated along) on tissue of 192 kg/m3 (density estimated along) and 200 Pa on \
              the ventricle and -50 Pa on the margin (size estimated along), with base and falx held"
         );
     }

@@ -258,8 +258,8 @@ fn of_estimate(outcome: &ExperimentOutcome, estimate: &EstimateOutcome, model: &
             "Shear moduli of " (tissues(outcome)) " were estimated by least squares with solver sensitivities from "
             (count(estimate.observations)) " observations, each known to " (number(estimate.noise_mm, 2)) " mm, under a prior from "
             (prior)
-            @if of_person && estimate.taught_by.is_none() { "; what one more study would report judged the result" }
             @if !laws.is_empty() { ", with " (laws) " laws" }
+            @if of_person && estimate.taught_by.is_none() { "; what one more study would report judged the result" }
             "; intervals are 95 % intervals of the posterior. "
         }
         @if estimate.taken_out_rms_mm.is_some() {
